@@ -12,7 +12,7 @@
 namespace loopbench::peers {
 namespace {
 
-/// What libraries say is long, and of several lines.
+/// Shortens messages of libraries, which are long and have several lines.
 std::string OneLine(const std::string& text) {
   std::string line = text.substr(0, 300);
   std::ranges::replace(line, '\n', ' ');

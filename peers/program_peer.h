@@ -1,4 +1,4 @@
-// A peer's program as the harness runs it.
+// Adapter of a peer's program to the harness.
 #pragma once
 
 #include <functional>
@@ -12,11 +12,11 @@
 
 namespace loopbench::peers {
 
-/// Makes a program; throws exchange::NotThere, or whatever the peer's library throws at a model
-/// that it refuses.
+/// Makes a program; throws exchange::NotThere, or errors of the peer's library for a model that it
+/// rejects.
 using ProgramFactory = std::function<std::unique_ptr<Program>(const exchange::Model&)>;
 
-/// Throws harness::Inexpressible with the peer's name and what it does not have.
+/// Throws harness::Inexpressible with the peer's name and its unsupported parts.
 std::unique_ptr<harness::Peer> MakeProgramPeer(const std::string& name, const ProgramFactory& make,
                                                const MechanismDescription& description);
 

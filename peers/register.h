@@ -1,9 +1,9 @@
-// Gives the peers of harness/config/formulations.cpp their programs.
+// Registers the programs of the peers of harness/config/formulations.cpp.
 #pragma once
 
 namespace loopbench::peers {
 
-/// Before loopbench::Main(), once.
+/// Call once before loopbench::Main().
 void RegisterPeers();
 
 }  // namespace loopbench::peers

@@ -87,7 +87,7 @@ std::vector<std::string> Texts(const std::vector<std::filesystem::path>& paths) 
   return texts;
 }
 
-/// The value as it stands in the file.
+/// Returns the value as written in the file.
 std::string Shown(const Value& value) {
   Record record;
   record.Set("x", value);
@@ -96,7 +96,7 @@ std::string Shown(const Value& value) {
   return text.substr(kBefore, text.size() - kBefore - 1);
 }
 
-/// Throws ConfigError that says the key, and what was found and expected.
+/// Throws ConfigError with the key, the found and the expected value.
 template <class T>
 const T& Required(const Record& record, const std::string& key, const std::string& expected) {
   const Value* value = record.Find(key);
@@ -188,7 +188,7 @@ void CountCases(ClusterRun* run) {
   std::size_t all = 0, smallest = 0;
   if (!workload.is_long()) {
     run->cases.assign(parts, 0.0);
-    std::set<std::string> ids;  // a case that two files share is one case
+    std::set<std::string> ids;  // a case of two files counts once
     for (const Experiment& experiment : workload.some()) {
       for (const Case& one : SelectCases(experiment, files.filter)) {
         if (!ids.insert(RunId(Identified(experiment, one).keys)).second) continue;
@@ -197,7 +197,7 @@ void CountCases(ClusterRun* run) {
     }
     smallest = all;
   } else {
-    // where all combinations have as many cases, those of each part are known
+    // if all combinations have the same number of cases, the numbers of all parts are known
     run->cases.assign(parts, std::numeric_limits<double>::quiet_NaN());
     for (const auto& path : files.paths) {
       const Overview overview = MakeOverview(path, files);
@@ -259,7 +259,7 @@ bool IsDone(const std::filesystem::path& folder, int part) {
 }
 namespace {
 
-/// The command that runs a part, before --shard.
+/// Returns the command that runs a part, without --shard.
 std::vector<std::string> RunWords(const ClusterRun& run) {
   std::vector<std::string> words = {run.program, "run"};
   for (const auto& path : run.experiments) words.push_back(path.string());
@@ -271,7 +271,7 @@ std::vector<std::string> RunWords(const ClusterRun& run) {
   return words;
 }
 
-/// "1-3,7": as short as an array job takes it.
+/// Returns "1-3,7": the shortest form for an array job.
 std::string Ranges(const std::vector<int>& parts) {
   std::string text;
   for (std::size_t i = 0; i < parts.size();) {
@@ -291,8 +291,8 @@ std::string BatchHead(const ClusterRun& run, const std::string& name) {
   return head;
 }
 
-/// A line that says where a job's output goes. Slurm reads quotes and backslashes as a shell does,
-/// and %X as something of the job.
+/// Returns the line that sets a job's output file. Slurm interprets quotes and backslashes as a
+/// shell does, and %X as job properties.
 std::string OutputLine(const std::filesystem::path& folder, const std::string& name) {
   std::string quoted;
   for (const char c : folder.string()) {

@@ -1,4 +1,4 @@
-// A run in parts on a cluster: folder, scripts for Slurm, progress.
+// Runs divided into parts on a cluster: folder, Slurm scripts, progress.
 #pragma once
 
 #include <cstddef>
@@ -13,87 +13,86 @@
 
 namespace loopbench::harness {
 
-// Slurm's own commands: sbatch and squeue.
+// The Slurm commands sbatch and squeue.
 
-/// The number of the job that the script became. Throws std::runtime_error with what sbatch said.
-/// @param options  before the script: "--dependency=afterany:12"
+/// Submits a script; returns its job number. Throws std::runtime_error with the message of sbatch.
+/// @param options  arguments before the script: "--dependency=afterany:12"
 std::string SubmitJob(const std::filesystem::path& script, const std::vector<std::string>& options);
 
-/// States of the tasks of an array job that are in the queue, "running", "pending", ... by their
-/// index; empty when the job has left it. Nothing when there is no Slurm here, or it does not
-/// answer: `problem` then says why.
+/// Returns the states of the queued tasks of an array job by index, "running", "pending", ...;
+/// empty if the job has left the queue. Returns nothing if Slurm is absent or does not answer;
+/// `problem` is then the reason.
 std::optional<std::map<int, std::string>> QueuedTasks(const std::string& job, std::string* problem);
 
-// A run in parts on several machines: the folder that they share.
+// The shared folder of a run in parts on several machines.
 //
-//   DIR/cluster.json   what was asked for (ClusterRun)
-//   DIR/part.sh K      runs part K, or goes on with it: all that an engine has to call
+//   DIR/cluster.json   settings of the run (ClusterRun)
+//   DIR/part.sh K      runs or resumes part K: the only command that an engine needs
 //   DIR/array.sh       the parts as an array job of Slurm; collect.sh, the job after it
-//   DIR/parts/K/       store of part K; "started" when it began last, "done" when it was complete
-//   DIR/logs/          what the jobs print
+//   DIR/parts/K/       store of part K; files "started" (latest start) and "done" (completion)
+//   DIR/logs/          output of the jobs
 //   DIR/whole/         all parts in one store
 
 inline constexpr int kMostParts = 100'000, kMostJobs = 1024;
 
-/// What runs, in how many parts, and what is known of the jobs.
+/// Content and number of parts of a run, with its known jobs.
 struct ClusterRun {
   std::vector<std::filesystem::path> experiments;  ///< absolute
   std::vector<std::string> settings, conditions;   ///< --set and --filter, as typed
   int parts = 1;
-  int jobs = 1;  ///< cases at once in a part
+  int jobs = 1;  ///< simultaneous cases in a part
   bool timing = true;
   bool isolate = false;
-  std::vector<std::string> batch_options;  ///< for sbatch: "--time=1:00:00", ...
+  std::vector<std::string> batch_options;  ///< options of sbatch: "--time=1:00:00", ...
   std::string program;                     ///< absolute path of loopbench on every machine
-  std::string name;                        ///< of the first experiment
+  std::string name;                        ///< name of the first experiment
   std::vector<double> cases;               ///< accuracy cases of each part; NaN: not counted
   std::int64_t all_cases = 0;
-  std::string array_job, collect_job;  ///< Slurm's numbers; "" before
+  std::string array_job, collect_job;  ///< Slurm job numbers; "" before submission
 };
 
-/// The experiments with their selection, as other commands take them.
+/// Returns the experiments with their selection, as used by other commands.
 ExperimentFiles FilesOf(const ClusterRun& run);
 
-/// Reads all that runs, and counts it. Throws ConfigError as `run` does, and when there are fewer
-/// cases than parts, or an experiment is named twice.
+/// Reads and counts all cases. Throws ConfigError as `run`, and if there are fewer cases than parts
+/// or an experiment is named twice.
 void CountCases(ClusterRun* run);
 
-/// Writes cluster.json where there is none; else false, and nothing is written. Of several who try
-/// at once one gets the folder.
+/// Writes cluster.json if there is none; else returns false and writes nothing. Of several
+/// concurrent callers exactly one succeeds.
 bool MakeClusterRun(const ClusterRun& run, const std::filesystem::path& folder);
 void WriteClusterRun(const ClusterRun& run, const std::filesystem::path& folder);
-/// Throws ConfigError that names the file, the key, what was found and what was expected when it
-/// is missing or not such a file.
+/// Throws ConfigError with file, key, found and expected value if it is missing or invalid.
 ClusterRun ReadClusterRun(const std::filesystem::path& folder);
 
 std::filesystem::path PartFolder(const std::filesystem::path& folder, int part);
 bool IsDone(const std::filesystem::path& folder, int part);
 
-// What engines call in the folder of a run in parts.
+// Scripts that engines run in the folder of a run in parts.
 
-/// The scripts, as texts. `parts`: those that are to run, from 1.
+/// Return the text of a script. `parts`: the parts to run, from 1.
 std::string PartScript(const ClusterRun& run, const std::filesystem::path& folder);
 std::string ArrayScript(const ClusterRun& run, const std::filesystem::path& folder,
                         const std::vector<int>& parts);
 std::string CollectScript(const ClusterRun& run, const std::filesystem::path& folder);
 
-// How far the parts of a run are, from their stores alone.
+// Progress of the parts, from their stores only.
 
 struct PartProgress {
   int part = 1;
   std::string state;                 ///< done, running, pending, stopped, waiting, ...
   double cases = 0.0;                ///< NaN: not counted
-  std::size_t done = 0, failed = 0;  ///< different cases that finished, and that ended otherwise
-  double rate = 0.0;                 ///< of records since it began last [1/s]; 0: not known
+  std::size_t done = 0, failed = 0;  ///< distinct cases, finished and otherwise ended
+  double rate = 0.0;                 ///< record rate since the latest start [1/s]; 0: unknown
 };
 
-/// From the folder alone: a part is running when its store is locked, and else done, stopped once
-/// it has begun, or waiting.
+/// Determines progress from the folder only: a part is running if its store is locked, otherwise
+/// done, stopped (if it has started) or waiting.
 /// @param now  [s] since 1970
 PartProgress ProgressOfPart(const ClusterRun& run, const std::filesystem::path& folder, int part,
                             double now);
 
-/// Seconds until all cases are there, by the rates of the parts that run; NaN when none does.
+/// Returns the seconds until all cases are done, from the rates of running parts; NaN if none runs.
 double SecondsLeft(const ClusterRun& run, const std::vector<PartProgress>& parts);
 
 }  // namespace loopbench::harness

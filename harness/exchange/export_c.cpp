@@ -30,7 +30,7 @@ std::string IdentifierOf(const std::string& name) {
   return is_name ? identifier : "mechanism_" + identifier;
 }
 
-/// The recordings of one function, a branch each, all of them of the same motion.
+/// Recordings of one function along one motion, one per branch.
 struct Branches {
   std::vector<RecordedFunction> recorded;
   std::size_t missed = 0;
@@ -42,7 +42,7 @@ std::vector<double> Inputs(const MotionState& state) {
   return x;
 }
 
-/// Whether a branch serves a state: comparisons and a finite result.
+/// Returns true if a branch covers a state: comparisons agree and the result is finite.
 bool Serves(const RecordedFunction& branch, const MotionState& state) {
   const std::vector<double> values = branch.graph.Values(Inputs(state));
   return branch.graph.Holds(values) && std::ranges::all_of(branch.outputs, [&](int node) {
@@ -93,11 +93,11 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
   return branches;
 }
 
-/// The Jacobian with respect to the state, of each branch where it was recorded.
+/// Returns the Jacobian with respect to the state, of each branch at its recorded state.
 Branches JacobianOf(const Branches& derivative, const CodeRequest& request) {
   Branches jacobian = derivative;
   for (RecordedFunction& branch : jacobian.recorded) {
-    // the numbers decide between operands of minima and maxima alone
+    // the numbers only select operands of minima and maxima
     std::vector<double> values;
     for (const MotionState& state : request.motion) {
       values = branch.graph.Values(Inputs(state));
@@ -335,7 +335,7 @@ struct Labelled {
   std::string name, unit;
 };
 
-/// Names of all positions or all speeds of a mechanism, in order.
+/// Returns names of all positions or all speeds of a mechanism, in order.
 template <class Space>
 std::vector<Labelled> Coordinates(const MechanismDescription& description,
                                   const Mechanism<Space, double>& mechanism, bool speeds) {
@@ -361,7 +361,7 @@ std::vector<Labelled> Coordinates(const MechanismDescription& description,
   return labels;
 }
 
-/// Sizes and names; speeds as far as the state carries them.
+/// Sets sizes and names; speeds only if the state contains them.
 template <class Space>
 void Describe(const CodeRequest& request, const std::vector<int>& carried_speeds, Code& code) {
   const MechanismDescription& description = request.subject.description;

@@ -1,5 +1,5 @@
-// A mechanism's equations of motion as C99 for other programs: recorded (harness/generate/), with
-// names and units of the state, an example and a build file. No heap, no library but math.h.
+// Equations of motion of a mechanism as C99 code, recorded by harness/generate/. Includes names and
+// units of the state, an example and a build file. No heap, no library except math.h.
 #pragma once
 
 #include <map>
@@ -30,7 +30,7 @@ struct CodeFunction {
   std::string name;
   int branches = 0;             ///< recorded
   std::int64_t operations = 0;  ///< of the first branch
-  std::size_t missed = 0;       ///< states of the motion that no branch serves
+  std::size_t missed = 0;       ///< number of motion states that no branch covers
 };
 
 struct CodeFile {
@@ -39,7 +39,7 @@ struct CodeFile {
 
 /// Generated code: identifier, names, counts, files.
 struct Code {
-  std::string identifier;  ///< prefix of its functions: the mechanism's name as C has names
+  std::string identifier;  ///< prefix of its functions: the mechanism's name as a C identifier
   int num_q = 0, num_rows = 0;
   std::vector<std::string> state_names, state_units, body_names;
   std::vector<double> start;                                    ///< state at the start
@@ -48,16 +48,16 @@ struct Code {
   std::vector<CodeFile> files;  ///< NAME.h, NAME.c, NAME_example.c, CMakeLists.txt
 };
 
-/// Records each function wherever the motion takes a new branch, at most kMostCodeBranches times
-/// and one more. Throws generate::NotCovered.
+/// Records each function again wherever the motion enters a new branch, at most kMostCodeBranches +
+/// 1 times. Throws generate::NotCovered.
 Code MakeCode(const CodeRequest& request);
 
 inline constexpr int kMostCodeBranches = 16;
 
-/// A text with @WORD@ replaced by its value.
+/// Returns the text with each @WORD@ replaced by its value.
 std::string Fill(std::string text, const std::map<std::string, std::string>& words);
 
-/// Words of all texts: ID, the identifier, and UP, the same in capitals.
+/// Returns the words of all texts: ID, the identifier, and UP, the same in capitals.
 std::map<std::string, std::string> WordsOf(const Code& code);
 
 }  // namespace loopbench::exchange

@@ -22,8 +22,8 @@ constexpr const char* kFunctions =
 #include "harness/exchange/export_fmu.inc"
     ;
 
-/// A zip archive whose files are stored uncompressed (APPNOTE.TXT of PKWARE, sections 4.3.7, 4.3.12
-/// and 4.3.16). Dates are 1 January 1980, so that equal contents are equal bytes.
+/// A zip archive with uncompressed files (APPNOTE.TXT of PKWARE, sections 4.3.7, 4.3.12 and
+/// 4.3.16). Dates are 1 January 1980, so that equal contents give equal bytes.
 class ZipArchive {
  public:
   void Add(const std::string& name, const std::string& text) {
@@ -31,7 +31,7 @@ class ZipArchive {
     crc.process_bytes(text.data(), text.size());
     const auto offset = static_cast<std::uint32_t>(bytes_.size());
     std::string head;
-    Put(head, 20, 2);      // version that is needed to extract
+    Put(head, 20, 2);      // version required to extract
     Put(head, 0x0800, 2);  // names are UTF-8
     Put(head, 0, 2);       // stored
     Put(head, 0, 2);       // time
@@ -74,11 +74,11 @@ class ZipArchive {
   int files_ = 0;
 };
 
-/// A variable of the model; its value reference is its place.
+/// A variable of the model; its value reference is its index.
 struct Variable {
   std::string name, unit;
-  std::string attributes;  ///< of <ScalarVariable>
-  std::string real;        ///< of <Real>
+  std::string attributes;  ///< attributes of <ScalarVariable>
+  std::string real;        ///< attributes of <Real>
 };
 
 std::vector<Variable> Variables(const Code& code) {
@@ -109,7 +109,7 @@ std::vector<Variable> Variables(const Code& code) {
   return all;
 }
 
-/// <Unit> with its exponents of kg, m, s and rad.
+/// Returns <Unit> with its exponents of kg, m, s and rad.
 std::string Unit(const std::string& name) {
   static const std::pair<const char*, const char*> kBase[] = {
       {"m", R"(m="1")"},           {"rad", R"(rad="1")"},          {"m/s", R"(m="1" s="-1")"},
@@ -195,7 +195,7 @@ std::string MakeFmu(const Code& code, const std::string& model_name, double step
   harness::WriteFileAtomically(folder.path() / source->name, source->text);
   harness::WriteFileAtomically(folder.path() / fmi, functions);
   const std::string binary = (folder.path() / (code.identifier + ".so")).string();
-  // for any processor of this kind, not for this one
+  // for every processor of this architecture, not only the present one
   generate::RunCompiler({"-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off",
                          "-fvisibility=hidden", "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-o", binary,
                          (folder.path() / source->name).string(), (folder.path() / fmi).string(),

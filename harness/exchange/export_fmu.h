@@ -11,9 +11,9 @@
 
 namespace loopbench::exchange {
 
-/// The bytes of the archive. They depend on the code and the compiler alone.
-/// @param step  of co-simulation, at most [s]
-/// Throws generate::NotCovered without a C compiler.
+/// Returns the bytes of the archive, which depend only on the code and the compiler.
+/// @param step  maximum step of co-simulation [s]
+/// Throws generate::NotCovered if there is no C compiler.
 std::string MakeFmu(const Code& code, const std::string& model_name, double step);
 
 }  // namespace loopbench::exchange

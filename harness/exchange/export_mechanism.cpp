@@ -17,7 +17,7 @@ namespace {
 
 Vec ToVec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
-/// Planar positions and rotations lie in z = 0.
+/// Converts a pose; planar positions and rotations lie in z = 0.
 template <class Space>
 Frame ToFrame(const Pose<Space, double>& X) {
   Frame frame;
@@ -76,7 +76,7 @@ class Maker {
     const auto& joint = mechanism.joints()[index];
     Joint made;
     made.name = mechanism.joint_names()[index];
-    JointType type = JointType::kFree;  // a virtual one
+    JointType type = JointType::kFree;  // default for a virtual joint
     if (joint.description >= 0) type = description_.joints[joint.description].type;
     if (joint.num_drives > 0) {
       Miss("joint \"{}\": a prescribed motion", made.name);
@@ -96,7 +96,7 @@ class Maker {
     for (const ValueWord& word : ValueWords(type, description_.space, false)) {
       made.coordinates.emplace_back(word.name);
     }
-    // where directions are no axes of F, all of them are imposed
+    // if directions are no axes of F, all of them are imposed
     const JointKind<Space, double>& kind = KindOf<Space, double>(type);
     if (!joint.in_tree() && joint.num_released > 0 && kind.basis == nullptr) {
       const std::vector<int>& released = description_.joints[joint.description].released;
@@ -195,7 +195,7 @@ Model MakeModel(const MechanismDescription& description) { return Make(descripti
 Model MakeModelAtStart(const MechanismDescription& description) { return Make(description, true); }
 namespace {
 
-/// MuJoCo regularises redundant constraints, and gets all of them.
+/// Writes MJCF with all constraints, since MuJoCo regularizes redundant ones.
 ExportedFile WriteMjcf(const MechanismDescription& description, const ExportOptions& options) {
   const Mjcf made =
       MakeMjcf(MakeModelAtStart(description), {.time_step = options.time_step, .shapes = true});
@@ -208,8 +208,8 @@ ExportedFile WriteMjcf(const MechanismDescription& description, const ExportOpti
           made.notes};
 }
 
-/// Simbody finds the rank of constraints at each position anew, and loses it in some of many; so it
-/// gets those that are left when the redundant ones are released.
+/// Writes a Simbody program without redundant constraints. Simbody determines the rank at each
+/// position and sometimes fails with many redundant constraints.
 ExportedFile WriteSimbody(const MechanismDescription& description, const ExportOptions&) {
   CompileOptions options = CompileOptions::None();
   options.redundancy = true;

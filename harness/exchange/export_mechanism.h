@@ -1,4 +1,4 @@
-// A mechanism in the terms that other programs share, and as a file of theirs.
+// A mechanism as plain numbers, and as a file of another program.
 #pragma once
 
 #include <string>
@@ -12,13 +12,12 @@ namespace loopbench::exchange {
 
 // A mechanism as a model in plain numbers.
 
-/// With the tree and the order of Mechanism(description, Coordinates::kJoint), put where all
-/// coordinates and speeds are zero. Model::missing then names prescribed motions, forces that
-/// depend on time, drag, forces along the coordinate of a joint that closes a loop, joints and
-/// forces of other programs.
+/// Makes a model with the tree and order of Mechanism(description, Coordinates::kJoint), at zero
+/// coordinates and speeds. Model::missing then lists prescribed motions, time-dependent forces,
+/// drag, forces along coordinates of cut joints, and joints and forces of other programs.
 Model MakeModel(const MechanismDescription& description);
 
-/// The same at the assembled start. Throws std::runtime_error where it cannot be assembled.
+/// Makes the model at the assembled start. Throws std::runtime_error if assembly fails.
 Model MakeModelAtStart(const MechanismDescription& description);
 
 // A mechanism as a file for other programs.
@@ -32,17 +31,16 @@ struct ExportedFile {
   std::vector<Note> notes;
 };
 
-/// A format that Loopbench writes.
+/// An export format.
 struct ExportFormat {
   std::string_view name, ending, sentence;
   ExportedFile (*write)(const MechanismDescription& description, const ExportOptions& options);
 };
 
-/// A row each.
 const std::vector<ExportFormat>& ExportFormats();
 
-/// The mechanism at its assembled start. The same description gives the same bytes. Throws NotThere
-/// with all that the format does not have, and std::runtime_error where there is no start.
+/// Exports the mechanism at its assembled start, byte-reproducibly. Throws NotThere with all
+/// unsupported parts, and std::runtime_error if assembly fails.
 ExportedFile Export(const MechanismDescription& description, const ExportFormat& format,
                     const ExportOptions& options = {});
 

@@ -16,45 +16,45 @@
 #include "mechanism/description/joint_frames.h"
 
 namespace loopbench::exchange {
-// Tree joints as chains of MuJoCo's joints, all of one body.
+// Tree joints as chains of MuJoCo joints of one body.
 
 /// A slide or hinge along or about an axis of the moved body, or a ball.
 struct MjcfPart {
   char kind = 'h';       ///< 's', 'h', 'b'
-  int coordinate = 0;    ///< the joint's; of a ball the first
-  Eigen::Vector3d axis;  ///< in the axes of the body, as it is put
+  int coordinate = 0;    ///< index in the joint; first one for a ball
+  Eigen::Vector3d axis;  ///< in body axes in the initial pose
   Eigen::Vector3d at;    ///< a point of the axis, from the body's origin
-  double value = 0.0;    ///< where the body is put: MuJoCo's coordinate; 0 of a ball
+  double value = 0.0;    ///< MuJoCo's coordinate in the initial pose; 0 for a ball
 };
 
 struct MjcfChain {
-  loopbench::Frame pose;        ///< of the body in its parent, both from their origins
+  loopbench::Frame pose;        ///< body in its parent, both from their origins
   std::vector<MjcfPart> parts;  ///< in MuJoCo's order
-  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< of a ball, from its fixed frame
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< of the moved joint frame, in the body
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();  ///< ball: rotation from its fixed frame
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< moved joint frame, in body axes
 };
 
-/// Whether MuJoCo has such a joint in a tree.
+/// Returns true if MuJoCo has such a tree joint.
 bool HasParts(const Joint& joint);
 
-/// A tree joint of the model where Model::q puts it. A joint seen from its other side is its parts
-/// in the other order with opposite coordinates.
+/// Returns the chain of a tree joint at Model::q. A reversed joint has its parts in reverse order
+/// with opposite coordinates.
 MjcfChain ChainOf(const Model& model, const Joint& joint);
 
-/// Frames of the model from the user's origin of their body.
+/// Return frames or points of the model relative to the user's origin of their body.
 loopbench::Frame FromOrigin(const Model& model, int body, const Frame& frame);
 Eigen::Vector3d FromOrigin(const Model& model, int body, const Vec& at);
 
-/// w, x, y, z.
+/// Returns w, x, y, z.
 std::array<double, 4> QuaternionOf(const Eigen::Matrix3d& R);
-// Shapes by which MuJoCo's viewer shows a mechanism; they have no mass and touch nothing.
+// Shapes for MuJoCo's viewer, without mass and contact.
 
-/// By body, elements `geom`: bars from its first joint to the others, or to its centre of mass
-/// where it has one joint; a ball where that leaves nothing.
+/// Returns `geom` elements by body: bars from its first joint to the others, or to its centre of
+/// mass if it has one joint; a ball if there is no bar.
 std::vector<std::vector<std::string>> ShapesOf(const Model& model);
 // The writer of MJCF documents; internal to export_mjcf*.cpp.
 
-/// ` name="1.0 2.0"`.
+/// Returns ` name="1.0 2.0"`.
 template <class Range>
 std::string Attribute(const char* name, const Range& values) {
   std::string text;
@@ -64,11 +64,11 @@ std::string Attribute(const char* name, const Range& values) {
 inline std::string Attribute(const char* name, double value) {
   return Attribute(name, std::array<double, 1>{value});
 }
-/// The same of a name.
+/// Returns the attribute of a name.
 inline std::string Named(const char* attribute, const std::string& name) {
   return fmt::format(" {}=\"{}\"", attribute, EscapeXmlAttribute(name));
 }
-/// Of an actuator whose force is a constant, whatever is said to it.
+/// Returns attributes of an actuator with a constant force, independent of its control.
 inline std::string Constant(double force) {
   return R"( gaintype="fixed" gainprm="0.0" biastype="affine")" +
          Attribute("biasprm", std::array{force, 0.0, 0.0});
@@ -85,12 +85,12 @@ class MjcfWriter {
   static std::size_t At(int index) { return static_cast<std::size_t>(index); }
 
   void Say(const std::string& text) { made_.notes.push_back({false, text}); }
-  /// `name`, which stands for the user's `given`: says so where it is another one.
+  /// Returns `name`, which represents the user's `given`; adds a note if they differ.
   std::string Renamed(const char* what, const std::string& given, std::string name);
 
   void NameBodies();
   void AddPoints();
-  /// The name of a new site.
+  /// Adds a site and returns its name.
   std::string AddSite(int body, const Eigen::Vector3d& at, const std::string& wanted);
 
   // bodies and their joints (export_mjcf.cpp)
@@ -98,13 +98,13 @@ class MjcfWriter {
   std::string Inertial(int index) const;
   void AddJoint(std::size_t index, const MjcfChain& chain, const std::string& indent,
                 std::string& text);
-  /// Springs and dampers along a tree joint as attributes, constants as an actuator of `name`.
+  /// Returns springs and dampers of a tree joint as attributes; adds constants as actuator `name`.
   std::string AddEfforts(std::size_t index, const std::string& name);
   void AddCoordinate(const Joint& joint, const MjcfChain& chain, const MjcfPart& part);
   void SayParts(const Joint& joint, const std::vector<std::string>& names);
 
-  // what holds or acts between bodies (export_mjcf.cpp)
-  /// Points that the joint holds together: one for a pivot, more along its axes for orientations.
+  // constraints and forces between bodies (export_mjcf.cpp)
+  /// Adds coincident points of a joint: one for a pivot, more along its axes for orientations.
   void AddClosures(const Joint& joint);
   void AddClosure(const Joint& joint, const Eigen::Vector3d& at, const std::string& name);
   void AddTendon(const std::string& name, int from, const Eigen::Vector3d& at_from, int to,
@@ -124,7 +124,7 @@ class MjcfWriter {
   Mjcf made_;
 };
 
-/// Everything of the model that MJCF does not have.
+/// Returns all parts of the model that MJCF does not have.
 std::vector<std::string> MissingInMjcf(const Model& model);
 namespace {
 
@@ -284,7 +284,7 @@ std::string MjcfWriter::AddEfforts(std::size_t index, const std::string& name) {
 }
 
 void MjcfWriter::AddCoordinate(const Joint& joint, const MjcfChain& chain, const MjcfPart& part) {
-  // speeds of a quaternion are one fewer than its numbers and stand where they do
+  // a quaternion has one speed fewer than coordinates, at the same first index
   const int place =
       joint.num_q > joint.num_u && part.coordinate > 0 ? part.coordinate - 1 : part.coordinate;
   MjcfCoordinate& made = made_.coordinates.emplace_back();
@@ -295,7 +295,7 @@ void MjcfWriter::AddCoordinate(const Joint& joint, const MjcfChain& chain, const
   const double* u = model_.u.data() + made.u;
   if (made.ball) {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(made.axes.data()) = chain.axes;
-    // MuJoCo's speeds are in axes of the body that moves
+    // MuJoCo's speeds are in axes of the moved body
     Vector3d w = made.sign * Vector3d(u[0], u[1], u[2]);
     if (made.sign > 0.0) w = chain.turn.transpose() * w;
     w = chain.axes * w;
@@ -347,15 +347,15 @@ Mjcf MakeMjcf(const Model& model, const MjcfOptions& options) {
   return MjcfWriter(model, options).Write();
 }
 
-// Joints that close loops, springs between points and forces at points as MJCF; and what it lacks.
+// Cut joints, springs between points and point forces as MJCF; and unsupported parts.
 
 namespace {
 
 using Eigen::Vector3d;
 
-/// MuJoCo refuses masses and moments of moving bodies below it (its mjMINVAL).
+/// MuJoCo rejects smaller masses and moments of moving bodies (its mjMINVAL).
 constexpr double kLeastMass = 1e-15;
-/// Deeper documents are refused by the parser that MuJoCo has.
+/// MuJoCo's parser rejects deeper documents.
 constexpr int kMostNested = 90;
 
 }  // namespace
@@ -399,7 +399,7 @@ void MjcfWriter::AddClosures(const Joint& joint) {
   if (kind == "revolute" && !model_.planar) points.push_back(Vector3d::UnitZ());
   if (kind == "weld") points.push_back(Vector3d::UnitX());
   if (kind == "weld" && !model_.planar) points.push_back(Vector3d::UnitY());
-  // as far away as the pivot is from its body's centre of mass, a length of the mechanism
+  // distance of the pivot from its body's centre of mass, a length of the mechanism
   const Vec& p = joint.M.p;
   const double reach = std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -425,7 +425,7 @@ void MjcfWriter::AddClosure(const Joint& joint, const Vector3d& at, const std::s
     AddTendon(name, joint.from, first, joint.to, second, "");
     equalities_ += "    <tendon" + Named("name", name) + Named("tendon1", name) + "/>\n";
   } else {
-    // MuJoCo wants a body other than the world first
+    // MuJoCo requires a body other than the world first
     const bool swap = joint.from == 0;
     if (swap) std::swap(closure.at_first, closure.at_second);
     equalities_ += "    <connect" + Named("name", name) +
@@ -454,7 +454,7 @@ void MjcfWriter::AddSpringDamper(std::size_t index) {
             Attribute("stiffness", force.stiffness) + Attribute("damping", force.damping) +
                 Attribute("springlength", force.length));
   if (force.preload == 0.0) return;
-  // a tension shortens
+  // positive tension shortens
   actuators_ += "    <general" + Named("tendon", name) + Constant(-force.preload) + "/>\n";
   Say(fmt::format("The preload of {} is an actuator without control.", name));
 }
@@ -485,8 +485,8 @@ struct PartKind {
   int coordinate;
 };
 
-/// What a joint of this kind is made of, from F to M, each part in the axes that those before it
-/// have moved.
+/// Returns the parts of a joint of this kind, from F to M, each in axes moved by the previous
+/// parts.
 std::vector<PartKind> KindsOf(const Joint& joint) {
   const std::string& kind = joint.kind;
   if (kind == "revolute") return {{'h', 2, 0}};
@@ -504,7 +504,7 @@ std::vector<PartKind> KindsOf(const Joint& joint) {
 
 Vector3d ToEigen(const Vec& v) { return {v[0], v[1], v[2]}; }
 
-/// What one part does, at these coordinates of its joint.
+/// Returns the motion of one part for these coordinates of its joint.
 loopbench::Frame Motion(const PartKind& part, const double* q, double sign) {
   loopbench::Frame X;
   if (part.kind == 's') X.p[part.axis] = sign * q[part.coordinate];
@@ -553,10 +553,10 @@ MjcfChain ChainOf(const Model& model, const Joint& joint) {
   MjcfChain chain;
   chain.axes = on_child.R;
   chain.parts.resize(kinds.size());
-  loopbench::Frame moved;  // the frame on the child, in the frame behind part i
+  loopbench::Frame moved;  // frame on the child, relative to the frame after part i
   for (std::size_t i = kinds.size(); i-- > 0;) {
     const PartKind& kind = kinds[i];
-    // behind part i, seen from the child
+    // frame after part i, relative to the child
     const loopbench::Frame behind = on_child * moved.Inverse();
     MjcfPart& part = chain.parts[i];
     part.kind = kind.kind;
@@ -578,7 +578,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Where joints are on each body, from its origin, then its centre of mass.
+/// Returns joint positions on each body from its origin, then its centre of mass.
 std::vector<std::vector<Vector3d>> PlacesOnBodies(const Model& model) {
   std::vector<std::vector<Vector3d>> places(model.bodies.size());
   const auto add = [&](int body, const Vec& at) {
@@ -598,7 +598,7 @@ std::vector<std::vector<Vector3d>> PlacesOnBodies(const Model& model) {
 
 std::vector<std::vector<std::string>> ShapesOf(const Model& model) {
   const auto places = PlacesOnBodies(model);
-  double size = 0.0;  // of the largest body
+  double size = 0.0;  // size of the largest body
   for (std::size_t b = 1; b < places.size(); ++b) {
     for (const Vector3d& at : places[b]) size = std::max(size, (at - places[b].front()).norm());
   }
@@ -606,7 +606,7 @@ std::vector<std::vector<std::string>> ShapesOf(const Model& model) {
   std::vector<std::vector<std::string>> shapes(places.size());
   for (std::size_t b = 1; b < places.size(); ++b) {
     const Vector3d& first = places[b].front();
-    // the centre of mass of a body with several joints says nothing of its form
+    // with several joints the centre of mass is not part of the body's outline
     const std::size_t ends = std::max<std::size_t>(2, places[b].size() - 1);
     for (std::size_t i = 1; i < std::min(ends, places[b].size()); ++i) {
       const Vector3d& end = places[b][i];

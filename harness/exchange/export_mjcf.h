@@ -1,14 +1,14 @@
-// A Model as a document of MuJoCo (MJCF), and where our coordinates are in it. C++17, as model.h.
+// A Model as a MuJoCo document (MJCF), with the mapping of coordinates. C++17, as model.h.
 //
-// MuJoCo's frame of a body is the user's. Tree joints are chains of slides, hinges and balls of
-// one body. Joints that close loops are equality constraints: points held together (`connect`), or
-// at a distance (a tendon). Constant efforts, forces at points and preloads are actuators without
-// control (`biasprm`); springs and dampers are MuJoCo's own.
+// MuJoCo's body frame is the user's body frame. Tree joints become chains of slides, hinges and
+// balls of one body. Cut joints become equality constraints: coincident points (`connect`), or
+// points at a distance (a tendon). Constant efforts, point forces and preloads become actuators
+// without control (`biasprm`). Springs and dampers are MuJoCo's own.
 //
-// MuJoCo's closures are soft: each is held by a spring and damper (`solref`) and by forces that
-// leave a share 1 - `solimp` of the acceleration unopposed, and accelerations that come with speed
-// (J' u) are left out. Here they are as stiff as it allows: a time constant of two steps,
-// critically damped, and a share of 1e-4.
+// MuJoCo's closures are soft: a spring and damper (`solref`) hold each. Its forces leave a share 1
+// - `solimp` of the acceleration unopposed, and the acceleration term J' u is neglected. Closures
+// are exported as stiff as allowed: a time constant of two steps, critically damped, and a share of
+// 1e-4.
 #pragma once
 
 #include <string>
@@ -18,23 +18,23 @@
 
 namespace loopbench::exchange {
 
-/// A coordinate of MuJoCo that is one of ours, or, of a ball, the first of a quaternion's.
+/// A MuJoCo coordinate that equals a Model coordinate, or the first one of a ball's quaternion.
 struct MjcfCoordinate {
   bool ball = false;
-  int q = 0, u = 0;   ///< places among our coordinates and speeds
-  double sign = 1.0;  ///< ours = sign * MuJoCo's; a ball with -1 is turned round
-  Matrix axes = {};   ///< of a ball: the axes in which ours are, in those of the moved body
+  int q = 0, u = 0;   ///< indices among the Model's coordinates and speeds
+  double sign = 1.0;  ///< Model's = sign * MuJoCo's; -1 inverts a ball's rotation
+  Matrix axes = {};   ///< ball: axes of the Model's coordinates, in axes of the moved body
 };
 
-/// A point of each of two bodies, in MuJoCo's body frames, held together; or at a distance.
+/// A closure of two body points, in MuJoCo's body frames: coincident, or at a distance.
 struct MjcfClosure {
   Vec at_first = {}, at_second = {};
   double rod = -1.0;  ///< distance [m]; negative: none
 };
 
 struct MjcfOptions {
-  double time_step = 1e-3;  ///< [s], of which closures are as stiff as they may be
-  bool shapes = false;      ///< for viewers; they cost time in every step
+  double time_step = 1e-3;  ///< step [s], which limits the stiffness of closures
+  bool shapes = false;      ///< shapes for viewers; they slow down every step
 };
 
 struct Mjcf {
@@ -44,10 +44,10 @@ struct Mjcf {
   std::vector<Note> notes;
 };
 
-/// The model put where Model::q says: there its closures hold in the document if they do in the
-/// model. Throws NotThere for what MJCF does not have: Model::missing, helical joints, closures
-/// other than revolute, spherical, weld and rod, moments of inertia that no body has, masses and
-/// moments below 1e-15.
+/// Makes the document at Model::q. Its closures hold there if they hold in the model. Throws
+/// NotThere for parts that MJCF does not have: Model::missing, helical joints, closures other than
+/// revolute, spherical, weld and rod, inertias that no body can have, masses and moments below
+/// 1e-15.
 Mjcf MakeMjcf(const Model& model, const MjcfOptions& options = {});
 
 }  // namespace loopbench::exchange

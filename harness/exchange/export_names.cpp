@@ -12,7 +12,7 @@
 namespace loopbench::exchange {
 namespace {
 
-/// Applies `other` to what stands between tabs and line ends, and `of_break` to these.
+/// Applies `other` to text between tabs and line ends, and `of_break` to these.
 template <class Other, class OfBreak>
 std::string Between(std::string_view text, const Other& other, const OfBreak& of_break) {
   std::string made;
@@ -61,7 +61,7 @@ std::string CommentLines(const std::string& begin, std::string_view text) {
       if (end == std::string::npos || end <= from)
         end = std::min(line.find(' ', from), line.size());
     }
-    // a backslash at the end of a line would go on in the next one
+    // a backslash at the end of a line would continue the comment
     std::string part = line.substr(from, end - from);
     if (part.ends_with('\\')) part += '.';
     made += (from == 0 ? begin : begin + "  ") + part + "\n";
@@ -118,10 +118,10 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Largest moment less the sum of the others.
+/// Returns the largest moment minus the sum of the others.
 double Excess(const Vector3d& moments) { return 2.0 * moments.maxCoeff() - moments.sum(); }
 
-/// An eigenvalue has an error of some eps times the largest; three of them are compared.
+/// Bounds round-off: an eigenvalue has an error of some eps times the largest; three are compared.
 double RoundOff(const Vector3d& moments) {
   return 16.0 * std::numeric_limits<double>::epsilon() * moments.maxCoeff();
 }

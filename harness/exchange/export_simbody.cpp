@@ -20,7 +20,7 @@ constexpr const char* kHead = R"(//
 //
 )";
 
-// The texts are files of their own: a program prints in other ways than Loopbench does.
+// The texts are separate files, because a program prints differently from Loopbench.
 constexpr const char* kDeclarations =
 #include "harness/exchange/export_simbody_begin.inc"
     ;
@@ -43,7 +43,7 @@ namespace {
 
 using Type = SimbodyConstraintType;
 
-/// The class of a tree joint; "" for none.
+/// Returns the class of a tree joint; "" if unsupported.
 std::string MobilizerOf(const Joint& joint) {
   const std::string& kind = joint.kind;
   if (kind == "revolute") return "Pin";
@@ -58,7 +58,7 @@ std::string MobilizerOf(const Joint& joint) {
   return kind == "pin-in-slot" ? "BendStretch" : "";
 }
 
-/// The conditions of one joint that closes a loop.
+/// Adds the constraints of one cut joint.
 class Closure {
  public:
   Closure(std::size_t joint, std::vector<SimbodyConstraint>* made) : joint_(joint), made_(made) {}
@@ -69,16 +69,16 @@ class Closure {
   void Perpendicular(int axis_on_F, int axis_on_M) {
     Add(Type::kConstantAngle, axis_on_F, axis_on_M);
   }
-  /// z of F and z of M stay parallel.
+  /// Keeps z of F and z of M parallel.
   void ParallelZ() {
     Perpendicular(kZ, kX);
     Perpendicular(kZ, kY);
   }
-  /// Within z = 0, which the tree keeps: along z every point is free to be where it is.
+  /// Closes a planar joint; the tree keeps z = 0, so that points stay free along z.
   bool InPlane(const std::string& kind);
   bool InSpace(const std::string& kind);
-  /// Rotations about x and y of F, by z of M, which a free turn about z leaves; about z where there
-  /// is none.
+  /// Constrains rotations about x and y of F by z of M, independent of a free rotation about z;
+  /// about z if there is none.
   void Along(const std::vector<int>& components);
 
  private:
@@ -142,7 +142,7 @@ void Closure::Along(const std::vector<int>& components) {
   }
 }
 
-/// False for a joint that Simbody does not have there.
+/// Returns false for a joint that Simbody does not support there.
 bool AddConstraints(const Model& model, std::size_t index, SimbodyParts* parts) {
   const Joint& joint = model.cut[index];
   Closure closure(index, &parts->constraints);
@@ -157,7 +157,7 @@ bool AddConstraints(const Model& model, std::size_t index, SimbodyParts* parts) 
   return true;
 }
 
-/// Where P hangs on Q, Simbody defines the coordinates in reverse: then they are ours again.
+/// Makes a mobilizer. If P is the child of Q, MobilizedBody::Reverse keeps the Model's coordinates.
 SimbodyMobilizer MakeMobilizer(const Model& model, std::size_t index) {
   const Joint& joint = model.tree[index];
   const Body& body = model.bodies[static_cast<std::size_t>(joint.child())];
@@ -171,15 +171,15 @@ SimbodyMobilizer MakeMobilizer(const Model& model, std::size_t index) {
   made.reverse = joint.from_is_child;
   made.pitch = joint.parameter;
   if (made.type == "BendStretch") {
-    // M slides in F and turns; seen from M, F turns back and slides back along the turned axis,
-    // which is BendStretch in the other direction, with the opposite coordinates
+    // M slides in F and turns; relative to M, F turns back and slides back along the turned axis.
+    // This is BendStretch in the other direction, with the opposite coordinates.
     made.reverse = !made.reverse;
     made.sign = -1.0;
   }
   made.mass = body.mass;
   const Matrix& I = body.inertia;
-  // A planar body has a moment about z only; Simbody asks for the other two, of which the motion
-  // says nothing.
+  // A planar body has a moment about z only; Simbody requires the other two, which have no effect
+  // on the motion.
   made.inertia = {I[0], I[4], I[8], I[1], I[2], I[5]};
   if (model.planar) made.inertia = {I[8], I[8], I[8], 0.0, 0.0, 0.0};
   return made;
@@ -265,13 +265,13 @@ std::string Axis(const Frame& frame, int axis) {
   return format("UnitVec3({})", Numbers(Vec{frame.R[a], frame.R[3 + a], frame.R[6 + a]}));
 }
 
-/// A name as the member "name" of a JSON object.
+/// Returns a name as the member "name" of a JSON object.
 std::string Member(const std::string& key, const std::string& name) {
   const std::string object = harness::JsonObject().Add(key, name).Text();
   return QuoteCpp(object.substr(1, object.size() - 2));
 }
 
-/// Statements of the program. Bodies are counted as Simbody does, in the order of the tree.
+/// Writes the statements of the program. Bodies are numbered as in Simbody, in tree order.
 class Writer {
  public:
   explicit Writer(const Model& model) : model_(model), parts_(MakeSimbodyParts(model)) {
@@ -397,7 +397,7 @@ class Writer {
     return text + "}\n\n";
   }
 
-  /// Tables of names. None of them is empty in C++: a row without a name ends each.
+  /// Returns tables of names. C++ has no empty arrays: a row without a name ends each table.
   std::string Names() const {
     std::string joints, bodies, points;
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
@@ -452,7 +452,7 @@ class Writer {
 
   const Model& model_;
   const SimbodyParts parts_;
-  std::vector<std::size_t> number_;  ///< Simbody's of each body of the model
+  std::vector<std::size_t> number_;  ///< Simbody's number of each body of the model
   SimbodyProgramText made_;
 };
 

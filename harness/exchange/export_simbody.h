@@ -9,35 +9,35 @@
 
 namespace loopbench::exchange {
 
-// What is the same in all programs for Simbody; internal to export_simbody.cpp.
+// Text common to all programs for Simbody; internal to export_simbody.cpp.
 
-/// From the comment on top to the declaration of `Mechanism`, whose constructor and SetStart()
-/// follow.
+/// Returns the text from the first comment to the declaration of `Mechanism`, before its
+/// constructor and SetStart().
 std::string SimbodyHead(const std::string& name, const std::vector<Note>& notes);
 
-/// What prints, integrates and reads arguments. It stands behind kJoints, kBodies and kPoints.
+/// Returns the code that prints, integrates and reads arguments; follows kJoints, kBodies, kPoints.
 std::string SimbodyTail();
 
-// A Model as Simbody's mobilizers, constraints and forces: one list, from which the peer builds a
-// System and export_simbody.h writes a program that builds the same one. C++17, as model.h.
+// A Model as Simbody's mobilizers, constraints and forces. The peer builds a System from this list,
+// and export_simbody.h writes a program that builds the same System. C++17, as model.h.
 //
-// Body frames are at centres of mass. Names are those of Simbody's classes, arguments stand in the
+// Body frames are at centres of mass. Names are those of Simbody's classes; arguments have the
 // order of their constructors.
 
 struct SimbodyMobilizer {
   std::string type;                    ///< "Pin": MobilizedBody::Pin
-  std::size_t joint = 0;               ///< of Model::tree
+  std::size_t joint = 0;               ///< index into Model::tree
   int parent = 0, child = 0;           ///< bodies of the model
   Frame on_parent, on_child;           ///< inboard and outboard frame
   bool reverse = false;                ///< MobilizedBody::Reverse
-  double pitch = 0.0;                  ///< of a Screw [m/rad]
-  double sign = 1.0;                   ///< coordinates and speeds of ours = sign * Simbody's
-  double mass = 0.0;                   ///< of the child [kg]
+  double pitch = 0.0;                  ///< pitch of a Screw [m/rad]
+  double sign = 1.0;                   ///< Model's coordinates and speeds = sign * Simbody's
+  double mass = 0.0;                   ///< mass of the child [kg]
   std::array<double, 6> inertia = {};  ///< xx, yy, zz, xy, xz, yz [kg m^2]
 };
 
 enum class SimbodyConstraintType {
-  kBall,                 ///< points F.p and M.p together
+  kBall,                 ///< points F.p and M.p coincide
   kPointOnLine,          ///< M.p on the line through F.p along an axis of F
   kPointInPlane,         ///< M.p in the plane through F.p across an axis of F
   kConstantAngle,        ///< an axis of F perpendicular to one of M
@@ -48,7 +48,7 @@ enum class SimbodyConstraintType {
 
 struct SimbodyConstraint {
   SimbodyConstraintType type = SimbodyConstraintType::kBall;
-  std::size_t joint = 0;             ///< of Model::cut
+  std::size_t joint = 0;             ///< index into Model::cut
   int axis_on_F = 0, axis_on_M = 0;  ///< x, y, z
 };
 
@@ -56,10 +56,10 @@ enum class SimbodyForceType {
   kMobilityConstantForce,  ///< first mobilizer: effort
   kMobilityLinearSpring,   ///< stiffness, rest
   kMobilityLinearDamper,   ///< damping
-  kConstantForce,          ///< a vector in ground axes at a point of the first body
+  kConstantForce,          ///< force vector in ground axes at a point of the first body
   kTwoPointLinearSpring,   ///< stiffness, free length
   kTwoPointLinearDamper,   ///< damping
-  kTwoPointConstantForce,  ///< positive ones push apart
+  kTwoPointConstantForce,  ///< positive values push apart
 };
 
 struct SimbodyForce {
@@ -75,22 +75,22 @@ struct SimbodyParts {
   std::vector<SimbodyForce> forces;  ///< without gravity
 };
 
-/// Throws NotThere for what Simbody does not have here: Model::missing, helical joints that close a
-/// loop, forces in axes of a body, moments of inertia that no body has.
+/// Throws NotThere for unsupported parts: Model::missing, helical cut joints, forces in body axes,
+/// inertias that no body can have.
 SimbodyParts MakeSimbodyParts(const Model& model);
 
-// A Model as a C++17 program of its own that builds it in Simbody 3.7.
+// A Model as a standalone C++17 program for Simbody 3.7.
 
 struct SimbodyProgramText {
   std::string program;  ///< one .cpp file
   std::vector<Note> notes;
 };
 
-/// Without arguments the program prints coordinates, speeds and accelerations of all joints and the
-/// places of all bodies and named points at Model::q and Model::u, as JSON; with a time [s] and an
-/// accuracy the same after it has integrated to there. Users' names stand in it as string literals
-/// and in comments, in ASCII or escaped. Throws NotThere for what Simbody does not have here
-/// (export_simbody.h).
+/// Without arguments the program prints the following as JSON at Model::q and Model::u:
+/// coordinates, speeds and accelerations of all joints, positions of all bodies and named points.
+/// With a time [s] and an accuracy it prints the same after integrating to that time. User names
+/// appear as string literals and comments, in ASCII or escaped. Throws NotThere for unsupported
+/// parts (see above).
 SimbodyProgramText WriteSimbodyProgram(const Model& model);
 
 }  // namespace loopbench::exchange

@@ -18,7 +18,7 @@ namespace loopbench::harness {
 
 namespace {
 
-/// The root element of each format, in their order.
+/// Returns the root element of each format, in their order.
 const std::vector<std::string>& Roots() {
   static const std::vector<std::string> roots = {"mujoco", "robot", "sdf"};
   return roots;
@@ -60,18 +60,18 @@ Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions&
   return ImportText(ReadTextFile(path), path.string(), options);
 }
 
-// What is done with an imported mechanism whatever its format.
+// Steps common to all formats after the import.
 
 namespace {
 
-/// Why a body cannot move by itself, and the values that it needs; "" if it can.
+/// Reason why a body cannot move by itself, and the required values; "" if it can.
 struct MassFault {
   std::string found, expected;
 };
 
 MassFault MassFaultOf(const BodyDescription& body) {
-  constexpr double kPrinted = 0.01;  // as mechanism files allow (mechanism_bodies.cpp)
-  // elements of a sum of turned inertias carry some rounding errors of its largest moment each
+  constexpr double kPrinted = 0.01;  // precision of mechanism files (mechanism_bodies.cpp)
+  // each element of a sum of rotated inertias has some rounding errors of its largest moment
   constexpr double kRoundOff = 64.0 * std::numeric_limits<double>::epsilon();
   if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
     return {"numbers too large for its mass and inertia", "a body of finite mass and size"};
@@ -91,12 +91,12 @@ MassFault MassFaultOf(const BodyDescription& body) {
   return {};
 }
 
-/// Bodies that welds hold to `root`, and the body in or beside the cluster that carries them. The
-/// carrier is the ground if it is there, else the first sound body, else the first with a mass.
+/// Bodies welded to `root`, and their carrier in or next to the cluster: the ground if present,
+/// else the first body with valid mass properties, else the first with a mass.
 class Cluster {
  public:
-  /// `welds`: numbers of the welds at each body. Bodies that are sound end the cluster and carry
-  /// it, unless it is the `whole` of all parts fixed together.
+  /// `welds`: indices of the welds at each body. Bodies with valid mass properties end the cluster
+  /// and carry it, unless `whole` includes all parts fixed together.
   Cluster(const MechanismDescription& description, const std::vector<std::vector<int>>& welds,
           const std::vector<bool>& sound, bool whole, int root)
       : d_(description), sound_(sound) {
@@ -119,7 +119,7 @@ class Cluster {
     members_ = std::move(queue);
   }
 
-  /// -1: none has a mass.
+  /// Returns the carrier; -1 if no body has a mass.
   int carrier() const { return carrier_; }
   const std::vector<int>& members() const { return members_; }
   Attachment AttachmentOf(int body) const {
@@ -289,13 +289,13 @@ Imported ImportDraft::Finish(const std::string& format) {
 
 namespace {
 
-/// The mechanism so far, and where its bodies stand.
+/// The present mechanism and the poses of its bodies.
 struct Sidecar : Draft {
   const std::vector<Frame>* at_rest = nullptr;
   bool has_gravity = false;
 };
 
-/// A joint given on one side: at rest the other is at the same place.
+/// A joint given on one side: at rest its other frame coincides.
 struct Loop : JointDescription {};
 using LoopPart = PartOf<Loop>;
 
@@ -348,7 +348,7 @@ const Fields<LoopPart>& LoopFields() {
   return fields;
 }
 
-/// The other side, from where the bodies stand.
+/// Computes the other side from the body poses.
 void CloseAtRest(const std::vector<Frame>& at_rest, JointDescription* joint) {
   if (joint->from.body < 0 || joint->to.body < 0) return;
   const Frame X_QP = at_rest[static_cast<std::size_t>(joint->to.body)].Inverse() *

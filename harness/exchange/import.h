@@ -1,4 +1,4 @@
-// Mechanisms of MuJoCo (MJCF), URDF and SDF as files of this program.
+// Import of mechanisms from MuJoCo (MJCF), URDF and SDF.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,13 +13,13 @@
 
 namespace loopbench::harness {
 
-// What reading a description of another program gives.
+// Result of an import.
 
-/// Something of the file that the mechanism does not have, or has in another way.
+/// A part of the file that the mechanism does not have, or represents differently.
 struct ImportNote {
   int line = 0;         ///< in the file
-  std::string element;  ///< <joint name="knee">, perhaps with an attribute behind it
-  std::string reason;   ///< what became of it, and why
+  std::string element;  ///< <joint name="knee">, optionally with an attribute
+  std::string reason;   ///< replacement or omission, and the reason
   bool changes_motion = false;
 };
 
@@ -30,39 +30,39 @@ struct Imported {
   std::vector<ImportNote> notes;  ///< by line
 };
 
-// Mechanisms described for other programs: MuJoCo's MJCF, URDF and SDF (docs/exchange.md).
+// Import of files for other programs: MuJoCo's MJCF, URDF and SDF (docs/exchange.md).
 
 struct ImportOptions {
-  std::string format;                      ///< of ImportFormats(); "": what the root element says
-  std::filesystem::path sidecar;           ///< loops, forces and a start beside the file; "": none
-  bool planar = false;                     ///< as a planar mechanism, which it must be
+  std::string format;                      ///< of ImportFormats(); "": from the root element
+  std::filesystem::path sidecar;           ///< file with loops, forces and a start; "": none
+  bool planar = false;                     ///< import as a planar mechanism; rejects others
   bool floats = false;                     ///< URDF: the root link is free, not fixed to the ground
-  bool keeps_digits = false;               ///< rounded angles and directions stay as written
-  std::optional<Eigen::Vector3d> gravity;  ///< in place of the file's or the format's [m/s^2]
+  bool keeps_digits = false;               ///< keep rounded angles and directions as written
+  std::optional<Eigen::Vector3d> gravity;  ///< overrides the file's or format's [m/s^2]
 };
 
-/// mjcf, urdf, sdf.
+/// Returns mjcf, urdf, sdf.
 const std::vector<std::string>& ImportFormats();
 
-/// Reads a file. Throws ConfigError for what cannot be read or cannot be said as a mechanism: file,
-/// line, element, value found, what was expected.
+/// Reads a file. Throws ConfigError for invalid or inexpressible content, with file, line, element,
+/// found and expected value.
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options = {});
 
-/// The same from text; `file` is the name used in messages.
+/// Reads a text; `file` is the name used in messages.
 Imported ImportText(std::string_view text, const std::string& file,
                     const ImportOptions& options = {});
 
-// What a description of another program cannot say, beside it: loops, forces and a start, with the
-// keys of mechanism files (docs/exchange.md).
+// Sidecar: loops, forces and a start that the other format cannot express, with the keys of
+// mechanism files (docs/exchange.md).
 
 struct SidecarFacts {
   SceneObservation observe;
   bool has_gravity = false;
 };
 
-/// Adds to `description` what the file says; its start takes the place of the description's.
-/// `at_rest` has the bodies in ground axes where all coordinates are 0: loops that are given on one
-/// side close there. Throws ConfigError with all mistakes, one per line.
+/// Adds the content of the file to `description`; its start replaces the given one. `at_rest`
+/// contains body frames in ground axes at zero coordinates: loops given on one side close there.
+/// Throws ConfigError with all mistakes, one per line.
 SidecarFacts ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
                          MechanismDescription* description);
 

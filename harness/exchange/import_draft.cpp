@@ -48,7 +48,7 @@ Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d&
   return q;
 }
 
-/// Eigen's FromTwoVectors takes the compiler eight seconds.
+/// Eigen's FromTwoVectors would take the compiler eight seconds.
 Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
   const Eigen::Vector3d z = to.normalized();
   if (z.z() < 0.0) {
@@ -199,16 +199,16 @@ void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
   });
 }
 
-// --planar: an imported mechanism in its plane, with gravity along -y.
+// --planar: projects an imported mechanism onto its plane, with gravity along -y.
 
 namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kRounding = 1e-12;  // as axes are level to (plane.h)
+constexpr double kRounding = 1e-12;  // tolerance for parallel axes, as in plane.h
 
-/// Ground axes with z = n and, where there is gravity across n, y against it: q_WC.
+/// Returns ground axes with z = n and y against the in-plane gravity, if any: q_WC.
 Quaterniond AxesOfPlane(const Vector3d& n, const Vector3d& gravity) {
   const Vector3d across = gravity - gravity.dot(n) * n;
   if (!(across.norm() > kRounding * gravity.norm())) return Quaterniond(AxesWithNormal(n));
@@ -218,7 +218,7 @@ Quaterniond AxesOfPlane(const Vector3d& n, const Vector3d& gravity) {
   return Quaterniond(R);
 }
 
-/// The same mechanism in other ground axes; q_CW.
+/// Rotates the ground axes of the mechanism; q_CW.
 void TurnGround(const Quaterniond& q, MechanismDescription* description) {
   description->gravity = q * description->gravity;
   for (auto& [name, point] : description->bodies[kGround].points) point = q * point;
@@ -245,7 +245,7 @@ void ImportDraft::MakeBallsPins(const Vector3d& n) {
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     JointDescription& joint = description.joints[j];
     if (joint.type != JointType::kSpherical) continue;
-    joint.type = JointType::kRevolute;  // all that a ball can do in a plane
+    joint.type = JointType::kRevolute;  // the planar motion of a ball
     for (JointSide* side : {&joint.from, &joint.to}) {
       const Quaterniond& q = at_rest[static_cast<std::size_t>(side->body)].q;
       side->rotation = RotationVector(q.conjugate() * Quaterniond(AxesWithNormal(n)));
@@ -285,17 +285,17 @@ void ImportDraft::GoToPlane() {
       description.gravity.unaryExpr([=](double g) { return std::abs(g) <= least ? 0.0 : g; });
 }
 
-// Angles and directions that files give with few digits: 1.5708 for a quarter turn.
+// Angles and directions with few digits in files: 1.5708 for a quarter turn.
 //
-// Loops close, and their redundant constraints are found, to round-off only where such numbers are
-// exact. A number stands for an exact one if it is that, rounded or cut off at its last digit.
+// Loops close, and their redundant constraints are found, to round-off only if such numbers are
+// exact. A number is replaced by an exact value that rounds or truncates to it at its last digit.
 
 namespace {
 
 using std::numbers::pi;
 using List = std::vector<double>;
 
-/// One in the last digit of a number.
+/// Returns one unit in the last digit of a number.
 double UnitOf(const std::string& word) {
   const std::size_t end = std::min(word.find_first_of("eE"), word.size());
   const std::size_t point = word.find('.');
@@ -305,26 +305,26 @@ double UnitOf(const std::string& word) {
 }
 
 constexpr double kRoundOff = 4.0 * std::numeric_limits<double>::epsilon();  // of a few products
-/// Largest error of directions and quaternions that are rounded. Programs compute them from angles
-/// such as 3.1416 and 1.5708, which are wrong by 7.4e-6 and 3.7e-6 rad.
+/// Maximum error of rounded directions and quaternions. Programs compute them from angles such as
+/// 3.1416 and 1.5708, with errors of 7.4e-6 and 3.7e-6 rad.
 constexpr double kLean = 1e-5;
 
-/// `unit`: one in its last digit.
+/// Returns true if `number` is a rounded `exact`. `unit`: one unit in its last digit.
 bool Rounds(double number, double unit, double exact) {
-  // Two decimals are enough for right angles (1.57, 3.14), three for others. Numbers of more than
-  // 14 are as exact as doubles.
+  // Two decimals suffice for right angles (1.57, 3.14), three for others. Numbers with more than 14
+  // decimals are as exact as doubles.
   const bool is_right = std::abs(std::remainder(exact, 0.5 * pi)) <= kRoundOff;
   if (unit > (is_right ? 2e-2 : 2e-3) || unit < 5e-15) return false;
   const double cut_off = std::copysign(1.0, exact) * (exact - number);
-  constexpr double kHalf = 0.5 + 1e-6;  // both neighbours of a five round it
+  constexpr double kHalf = 0.5 + 1e-6;  // a final five may be rounded up or down
   return cut_off >= -kHalf * unit && cut_off < unit;
 }
 
-/// A multiple of pi/12, hence also of pi/4 and pi/6.
+/// Returns the nearest multiple of pi/12, which includes multiples of pi/4 and pi/6.
 double NearestAngle(double angle) { return std::round(12.0 * angle / pi) / 6.0 * (0.5 * pi); }
 
-/// The nearest unit vector whose squared elements are multiples of 1/12: multiples of pi/4 and pi/6
-/// in a plane of two axes, and diagonals. Returns the given numbers if none is within kLean.
+/// Returns the nearest unit vector whose squared elements are multiples of 1/12: multiples of pi/4
+/// and pi/6 in a plane of two axes, and diagonals. Returns `v` if none is within kLean.
 List NearestDirection(const List& v) {
   List exact;
   double sum = 0.0;
@@ -336,12 +336,12 @@ List NearestDirection(const List& v) {
   return sum == 12.0 ? exact : v;
 }
 
-/// The nearest quaternion (w, x, y, z) of rotations about x, then y, then z by multiples of pi/12.
+/// Returns the nearest quaternion (w, x, y, z) of rotations by multiples of pi/12 about x, y, z.
 List NearestQuaternion(const List& q) {
   const double w = q[0], x = q[1], y = q[2], z = q[3], norm2 = w * w + x * x + y * y + z * z;
   if (!(norm2 > 0.0)) return q;
   const double sine = std::clamp(2.0 * (w * y - z * x) / norm2, -1.0, 1.0);
-  constexpr double kUpright = 0.999;  // there, one of the turns about x and z is free
+  constexpr double kUpright = 0.999;  // there, one of the rotations about x and z is free
   Eigen::Vector3d angles(0.0, std::asin(sine), -std::copysign(2.0, sine) * std::atan2(x, w));
   if (std::abs(sine) < kUpright) {
     angles.x() = std::atan2(2.0 * (w * x + y * z), norm2 - 2.0 * (x * x + y * y));

@@ -1,4 +1,4 @@
-// A mechanism under construction by an importer: placements, plane, rounding.
+// A mechanism during its import: poses, planar reduction, exact values.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,9 +20,9 @@
 
 namespace loopbench::harness {
 
-// Where a frame stands in another one, and the forms in which XML formats say orientations.
+// Pose of a frame in another one, and orientation notations of XML formats.
 //
-// Orientations are quaternions, so that a turn about one axis stays one to the last bit.
+// Orientations are quaternions, so that a rotation about one axis stays exactly about that axis.
 
 inline constexpr double kDegree = std::numbers::pi / 180.0;  ///< [rad]
 
@@ -34,40 +34,40 @@ struct Placement {
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
 
-  /// X_AC from X_AB and X_BC.
+  /// Returns X_AC from X_AB and X_BC.
   friend Placement operator*(const Placement& X_AB, const Placement& X_BC) {
     return {X_AB.q * X_BC.q, X_AB.p + X_AB.q * X_BC.p};
   }
-  /// A point given in B, in A.
+  /// Converts a point from B to A.
   Eigen::Vector3d At(const Eigen::Vector3d& point) const { return p + q * point; }
   Placement Inverse() const { return {q.conjugate(), q.conjugate() * Eigen::Vector3d(-p)}; }
   Frame AsFrame() const { return {q.toRotationMatrix(), p}; }
 };
 
-/// The rotation vector of a unit quaternion, at most half a turn [rad].
+/// Returns the rotation vector of a unit quaternion, at most half a turn [rad].
 Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q);
 
-/// Rz(yaw) Ry(pitch) Rx(roll): the fixed-axes angles of URDF and SDF [rad].
+/// Returns Rz(yaw) Ry(pitch) Rx(roll): the fixed-axes angles of URDF and SDF [rad].
 Eigen::Quaterniond FromRollPitchYaw(const Eigen::Vector3d& angles);
 
-/// Turns about axes one after the other: 'x', 'y', 'z' about those that turn with it, 'X', 'Y', 'Z'
-/// about those that stand still (MJCF's eulerseq) [rad].
+/// Returns successive rotations: 'x', 'y', 'z' about body-fixed axes, 'X', 'Y', 'Z' about
+/// space-fixed axes (MJCF's eulerseq) [rad].
 Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d& angles);
 
-/// The shortest turn that takes z there; half a turn about x to the other side, as MuJoCo's.
+/// Returns the shortest rotation from z to `to`; for -z half a turn about x, as in MuJoCo.
 Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to);
 
-/// An inertia in axes B, in axes A; q is R_AB. The same bits where they are parallel.
+/// Converts an inertia from axes B to A; q is R_AB. Bit-identical if the axes are parallel.
 Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia);
 
-/// The matrix with these elements, xx, yy, zz, xy, xz, yz.
+/// Returns the symmetric matrix with elements xx, yy, zz, xy, xz, yz.
 Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz, double yz);
 
-// A mechanism while it is imported, in whatever format: what the readers of the formats fill, and
-// what is done with it afterwards.
+// A mechanism during its import in any format: the format readers fill it, and Finish() completes
+// it.
 
-/// Why what nobody read has no place in a mechanism, by attributes ("@armature joint@ref") and tags
-/// ("visual"). Without a reason nothing is noted: it says nothing about the motion.
+/// Reason why unread attributes ("@armature joint@ref") or tags ("visual") are dropped. Without a
+/// reason no note is made: they have no influence on the motion.
 struct DroppedReason {
   std::string_view words;  ///< with spaces between
   std::string_view reason;
@@ -83,79 +83,79 @@ class ImportDraft {
   ImportDraft(const XmlFile& file, const ImportOptions& options);
 
   MechanismDescription description;
-  std::vector<Placement> at_rest;  ///< of bodies in ground axes where all coordinates are 0
+  std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
 
-  /// A body of that name, or of the next free number where it is "". Refuses one that is taken.
-  /// Mass 0 until it is set.
+  /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
+  /// initially 0.
   int AddBody(const XmlElement& element, const std::string& name);
-  /// The index of a body that must be there; `also` are further names of Ground.
+  /// Returns the index of an existing body; `also`: further names of Ground.
   int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
   int BodyNamed(const std::string& name, const XmlElement& user) const;
   int LineOf(int body) const { return lines_[static_cast<std::size_t>(body)]; }
 
-  /// A name that no joint has.
+  /// Returns the name of a new joint; rejects a name in use.
   std::string NewJointName(const XmlElement& element, const std::string& name);
-  /// For the joint that is added next, which the file does not name: it is called `stem`, or nearly
-  /// so where the file has a joint of that name. "" until all joints are read.
+  /// Returns "" for an unnamed joint that is added next. After all joints are read it is called
+  /// `stem`, with a suffix if necessary.
   std::string NameLater(const std::string& stem);
-  /// From X_PF on `from` to X_QM on `to`. The joint stays where it is until the next one is added.
+  /// Adds a joint from X_PF on `from` to X_QM on `to`; the reference is valid until the next call.
   JointDescription& AddJoint(const std::string& name, JointType type, int from,
                              const Placement& X_PF, int to, const Placement& X_QM);
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
-  /// The body's mass stands in a file that is not read: if the body moves, `value` is rejected.
+  /// Records that the mass is in a file that is not read: `value` is rejected if the body moves.
   void LeaveMass(int body, const XmlValue& value) { without_mass_.emplace_back(body, value); }
-  /// As many times its weight, upwards: what a body without gravity feels.
+  /// Adds an upward force of `share` times its weight: gravity compensation.
   void AddLift(int body, double share);
 
-  /// What the format takes where the file says nothing [m/s^2], along -z.
+  /// Sets the default gravity of the format along -z [m/s^2].
   void AssumeGravity(const XmlElement& element, double gravity);
 
-  /// The numbers of a value by their `kinds`: 'a' an angle [rad], 'd' the 3 of a direction, 'q' the
-  /// 4 of a quaternion, 'r' with its scalar last, 'n' others. Rounded ones are exact, and noted.
+  /// Returns the numbers of a value by `kinds`: 'a' angle [rad], 'd' direction (3), 'q' quaternion
+  /// (4), 'r' quaternion with scalar last, 'n' others. Makes rounded values exact with a note.
   std::vector<double> Numbers(const XmlValue& value, std::string_view kinds);
-  /// 3 of them.
+  /// Returns three numbers in the same way.
   Eigen::Vector3d Vector(const XmlValue& value, std::string_view kinds);
 
   void Note(const XmlElement& element, std::string reason, bool changes_motion = false);
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
             bool changes_motion = false);
-  /// A note for all that was not read.
+  /// Adds a note for each unread part.
   void NoteUnread(std::span<const DroppedReason> reasons);
 
-  /// Sidecar, floating parts, bodies that are fixed together, plane; then it is a mechanism.
+  /// Completes the mechanism: sidecar, floating parts, merged fixed bodies, planar reduction.
   Imported Finish(const std::string& format);
 
  private:
   void NameJoints();
   void HoldFloatingParts();
   void CheckUnreadMasses() const;
-  /// Merges bodies that are none by themselves with those that welds fix them to; with `whole`, all
-  /// bodies that are fixed together with one of them.
+  /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
+  /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);
-  /// Refuses masses and inertias of bodies that move, with all that was merged.
+  /// Rejects invalid masses and inertias of moving bodies, including their merged bodies.
   void CheckMasses() const;
   void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
   const XmlFile& file_;
   const ImportOptions& options_;
-  std::vector<XmlElement> elements_;  ///< of bodies; the root element for Ground
+  std::vector<XmlElement> elements_;  ///< elements of bodies; the root element for Ground
   std::vector<int> lines_;
   std::map<std::string, int> bodies_;
   exchange::UniqueNames joints_;
-  std::vector<std::pair<std::size_t, std::string>> stems_;  ///< of joints without names
+  std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names
   std::vector<ImportNote> notes_;
-  std::size_t rounded_ = 0, rounded_note_ = 0;  ///< values that were rounded; the note of the first
+  std::size_t rounded_ = 0, rounded_note_ = 0;  ///< number of rounded values; note of the first
   std::vector<std::pair<int, double>> lifts_;
   std::vector<std::pair<int, XmlValue>> without_mass_;
-  std::optional<XmlElement> assumed_gravity_;  ///< who would have had to say it
+  std::optional<XmlElement> assumed_gravity_;  ///< element that lacks the gravity
 };
 
-/// Of length 1; refuses one that is zero, which `value` says.
+/// Returns q normalized; rejects zero, given by `value`.
 Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q);
 
-/// The readers of the formats; each fills the draft from the root element.
+/// Read a format: fill the draft from the root element.
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);
 void ReadSdf(const XmlElement& root, ImportDraft* draft);

@@ -24,7 +24,7 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"option@integrator", "runs choose their own integrator"},
     {"option@density option@viscosity option@wind", "there is no medium", true},
     {"compiler@fusestatic", "bodies without joints stay bodies, welded"},
-    // nothing to say
+    // without influence on the motion
     {"visual statistic size custom light camera @group @user @margin @solimplimit @solreflimit "
      "@solimpfriction @solreffriction @actuatorfrcrange @actuatorfrclimited freejoint@align "
      "site@type site@size @rgba @material @width body@sleep option@cone option@jacobian "
@@ -40,9 +40,9 @@ constexpr DroppedReason kMjcfReasons[] = {
      "compiler@exactmeshinertia compiler@fitaabb compiler@saveinertial compiler@alignfree",
      ""}};
 
-constexpr std::size_t kActuatorGroups = 31;  // that can be switched off
+constexpr std::size_t kActuatorGroups = 31;  // groups that can be disabled
 
-/// Refuses elements that stand for other parts of a model, wherever something is read.
+/// Rejects macro elements anywhere, which represent other parts of a model.
 void RefuseMacros(const XmlElement& root) {
   const std::vector<std::string_view> macros = {"include", "composite", "flexcomp", "replicate",
                                                 "attach"};
@@ -141,7 +141,7 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
   }
 }
 
-/// Tendons that an active <equality><tendon> keeps at their length.
+/// Returns tendons whose length an active <equality><tendon> keeps constant.
 std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, MjcfModel* model) {
   std::map<std::string, XmlElement> held;
   for (const XmlElement& section : root.Children("equality")) {
@@ -191,14 +191,14 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   draft->NoteUnread(kMjcfReasons);
 }
 
-// Classes of defaults, and orientations.
+// Default classes, and orientations.
 
 namespace {
 
-constexpr const char* kMain = "main";     // the class of elements without one
-constexpr std::size_t kMostLayers = 100;  // each of many elements looks at all of its defaults
+constexpr const char* kMain = "main";     // class of elements without one
+constexpr std::size_t kMostLayers = 100;  // each element searches all its defaults
 
-/// What an element of a class describes: its tag, or "actuator".
+/// Returns the element type of defaults: the tag, or "actuator".
 std::string DescribedBy(const std::string& tag) {
   static const std::set<std::string> kActuators = {"general",     "motor",  "position", "velocity",
                                                    "intvelocity", "damper", "cylinder", "muscle",
@@ -233,7 +233,7 @@ void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   if (!given && !parent.empty()) element.Fail("no \"class\"", "a name: it is a nested class");
   const std::string name = parent.empty() ? kMain : given->Name();
   if (parent.empty()) {
-    // a second <default> at the top adds to the first
+    // a second top-level <default> adds to the first
     const std::string also = given ? given->Name() : kMain;
     if (also != kMain && classes_.contains(also)) given->Fail("a class that is not described yet");
     names_of_main_.insert(also);
@@ -273,7 +273,7 @@ std::vector<XmlElement> MjcfDefaults::Layers(const XmlElement& element,
        found = classes_.find(found->second.parent)) {
     const auto defaults = found->second.elements.find(wanted);
     if (defaults == found->second.elements.end()) continue;
-    // of several in one class the last one has the last word
+    // of several defaults in one class, the last one counts
     layers.insert(layers.end(), defaults->second.rbegin(), defaults->second.rend());
     if (used != nullptr) used->emplace(found->first, wanted);
     if (layers.size() > kMostLayers) {
@@ -363,7 +363,7 @@ std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const 
   const std::vector<double> ends = given->Numbers(2, 2);
   if (ends[0] < ends[1]) return MjcfLimits{ends[0], ends[1]};
   if (choice == 1) given->Fail("two numbers, the first below the second");
-  return std::nullopt;  // as MuJoCo has it, and its default: 0 0
+  return std::nullopt;  // as in MuJoCo, whose default is 0 0
 }
 
 void MjcfModel::NoteLimits(const MjcfElement& element, const char* reason) const {

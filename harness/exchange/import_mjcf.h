@@ -1,4 +1,4 @@
-// MJCF, the format of MuJoCo (mujoco.readthedocs.io, "XML reference"): what its parts share.
+// MJCF, the format of MuJoCo (mujoco.readthedocs.io, "XML reference"): common parts.
 //
 // Internal to import_mjcf*.cpp.
 #pragma once
@@ -14,13 +14,13 @@
 
 namespace loopbench::harness {
 
-/// Why springs, dampers and efforts of a joint of several coordinates are dropped.
+/// Reason why springs, dampers and efforts of a joint with several coordinates are dropped.
 inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
 
-/// What limits the efforts of all actuators of a joint.
+/// Attributes that limit the efforts of all actuators of a joint.
 inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange = "actuatorfrcrange";
 
-/// An element with what its classes say where it is silent: itself first, then the nearest class.
+/// An element with the defaults of its classes: own attributes first, then the nearest class.
 class MjcfElement {
  public:
   MjcfElement(XmlElement own, std::vector<XmlElement> classes)
@@ -29,7 +29,7 @@ class MjcfElement {
   const XmlElement& own() const { return own_; }
   std::optional<XmlValue> Attribute(const std::string& name) const;
   double Number(const std::string& name, double otherwise, const Range& range = {}) const;
-  /// Itself and its classes, nearest first.
+  /// Returns the element and its classes, nearest first.
   std::vector<XmlElement> Layers() const;
 
  private:
@@ -37,32 +37,32 @@ class MjcfElement {
   std::vector<XmlElement> classes_;
 };
 
-/// <default> and the classes nested in it. The class at the top is "main", which elements without
-/// a class have; it may have another name too.
+/// <default> and its nested classes. The top class is "main", the default of elements without a
+/// class; it may have another name too.
 class MjcfDefaults {
  public:
   void Read(const XmlElement& element, const std::string& parent);
-  /// `childclass`: of the bodies around the element; `tag`: that of its defaults, if it is not its
-  /// own.
+  /// Returns the element with its defaults. `childclass`: class of the enclosing bodies; `tag`: tag
+  /// of its defaults, if different from its own.
   MjcfElement Of(const XmlElement& element, const std::string& childclass,
                  const std::string& tag = "") const;
-  /// The same, of an element that may be dropped yet: its classes do not count as in use.
+  /// Returns the same for an element that may still be dropped: its classes do not count as used.
   MjcfElement Peek(const XmlElement& element, const std::string& childclass,
                    const std::string& tag = "") const;
-  /// Refuses a class that nobody has described.
+  /// Rejects an undefined class.
   void CheckClass(const XmlValue& value) const;
-  /// What no element took counts as read.
+  /// Marks unused defaults as read.
   void IgnoreUnused() const;
 
  private:
   struct Class {
     std::string parent;
-    /// By what they describe: actuators of all tags have one default. In the order of the file.
+    /// Defaults by element type, in file order: actuators of all tags have one default.
     std::map<std::string, std::vector<XmlElement>> elements;
   };
-  using Use = std::pair<std::string, std::string>;  ///< a class, and what it describes
+  using Use = std::pair<std::string, std::string>;  ///< a class and an element type
 
-  /// The name under which a class is described.
+  /// Returns the name under which a class is defined.
   std::string Known(const std::string& name) const;
   std::vector<XmlElement> Layers(const XmlElement& element, const std::string& childclass,
                                  const std::string& tag, std::set<Use>* used) const;
@@ -72,7 +72,7 @@ class MjcfDefaults {
   mutable std::set<Use> used_;
 };
 
-/// Attributes of <compiler> and <option> that matter.
+/// Relevant attributes of <compiler> and <option>.
 struct MjcfSettings {
   bool degrees = true;
   std::string euler = "xyz";
@@ -82,19 +82,19 @@ struct MjcfSettings {
   int first_group = 0, last_group = 5;
   bool has_contact = true, has_equality = true, has_springs = true, has_dampers = true;
   bool has_actuation = true, clamps_controls = true;
-  std::set<int> silent_groups;  ///< of actuators
+  std::set<int> silent_groups;  ///< groups of disabled actuators
 
-  /// Springs, dampers, and gravity compensation while one of them acts.
+  /// True if springs or dampers act; gravity compensation acts only with them.
   bool has_passive() const { return has_springs || has_dampers; }
   double Angle(double value) const { return degrees ? value * kDegree : value; }
 };
 
 enum class MjcfKind { kHinge, kSlide, kBall, kFree };
 
-/// Least and largest value.
+/// Minimum and maximum value.
 using MjcfLimits = std::pair<double, double>;
 
-/// A joint of MuJoCo: with others on the same body it is part of one of ours.
+/// A joint of MuJoCo; several on one body form one Loopbench joint.
 struct MjcfJoint {
   explicit MjcfJoint(MjcfElement element_) : element(std::move(element_)) {}
 
@@ -103,23 +103,23 @@ struct MjcfJoint {
   std::string name;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in body axes [m]
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
-  double reference = 0.0;                              ///< its coordinate where the file draws it
-  double spring_reference = 0.0;                       ///< and where its spring is free
-  int joint = -1;                                      ///< ours that it became a part of
-  bool alone = true;                                   ///< it is all of it
+  double reference = 0.0;                              ///< its coordinate in the drawn position
+  double spring_reference = 0.0;                       ///< its coordinate with a relaxed spring
+  int joint = -1;                                      ///< Loopbench joint that contains it
+  bool alone = true;                                   ///< it is the only part of that joint
 
   int num_q() const { return kind == MjcfKind::kFree ? 7 : kind == MjcfKind::kBall ? 4 : 1; }
   int num_u() const { return kind == MjcfKind::kFree ? 6 : kind == MjcfKind::kBall ? 3 : 1; }
 };
 
-/// The joints of a body, from the outermost, and what they are for us.
+/// The joints of a body, from the outermost, and the Loopbench joint that they form.
 struct MjcfChain {
   int parent = kGround, child = kGround;
-  Placement X_PB;                  ///< where the file draws the body in its parent
-  std::vector<std::size_t> parts;  ///< in MjcfModel::joints; none of a body that is fixed
+  Placement X_PB;                  ///< drawn pose of the body in its parent
+  std::vector<std::size_t> parts;  ///< in MjcfModel::joints; none for a fixed body
   int joint = -1;
-  bool from_is_child = false;  ///< ours leads from the child to its parent
-  Placement X_BJ;              ///< our frame on the child, in its axes
+  bool from_is_child = false;  ///< the Loopbench joint leads from the child to its parent
+  Placement X_BJ;              ///< Loopbench joint frame on the child, in its axes
 };
 
 class MjcfModel {
@@ -130,60 +130,59 @@ class MjcfModel {
   MjcfSettings settings;
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
-  std::vector<MjcfChain> chains;  ///< of all bodies, in that order
+  std::vector<MjcfChain> chains;  ///< of all bodies, in the order of the file
   std::map<std::string, BodyPoint> sites;
   std::map<std::string, std::size_t> joint_names;
 
-  /// The orientation that the element says, in whichever way; the class's if it says none.
+  /// Returns the orientation of the element in any notation; by default the one of its class.
   Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
   Placement PlacementOf(const MjcfElement& element) const;
-  /// What the element says in `range`, where `flag` or, without it, the range itself makes it
-  /// count.
+  /// Returns the limits in `range`, if `flag` or, without it, the range itself makes them active.
   std::optional<MjcfLimits> LimitsOf(const MjcfElement& element, const std::string& flag,
                                      const std::string& range) const;
-  /// Notes that a joint or tendon is limited, with any range or none: limits are dropped.
+  /// Notes that limits of a joint or tendon are dropped, with or without a range.
   void NoteLimits(const MjcfElement& element, const char* reason) const;
-  /// Bodies in ground axes where the springs of joints are free: tendons that do not say their
-  /// free length are free there.
+  /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
+  /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
   const BodyPoint& SiteNamed(const XmlValue& value) const;
   MjcfJoint& JointNamed(const XmlValue& value);
 };
 
-/// A geom of a body, its class, and the frame around it.
+/// A geom of a body, its class, and its enclosing frame.
 struct MjcfGeom {
   MjcfElement element;
   Placement X;
 };
 
-/// Mass, centre of mass and inertia of the geoms [kg, m, kg m^2], body axes.
+/// Mass, centre of mass and inertia of geoms in body axes [kg, m, kg m^2].
 struct MassProperties {
   double mass = 0.0;
   Eigen::Vector3d com = Eigen::Vector3d::Zero();
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
 };
-/// Refuses meshes, whose files are not read, unless they count as nothing.
+/// Computes mass properties. Rejects meshes, whose files are not read, unless they are ignored.
 MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
                            bool drops_meshes);
 
-/// <worldbody>.
+/// Reads <worldbody>.
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
-/// Total mass, bounds: what <compiler> does to all bodies.
+/// Applies the total mass and the bounds of <compiler> to all bodies.
 void AdjustMasses(MjcfModel* model);
-/// A <joint> or <freejoint>, with its springs and dampers still unread; X is the frame around it in
-/// its body.
+/// Reads a <joint> or <freejoint>, but not its springs and dampers; X is the enclosing frame in its
+/// body.
 MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element, const Placement& X,
                         const std::string& childclass);
-/// Makes one joint of ours of those of a body; X_PB is where the file draws the body.
+/// Makes one Loopbench joint from the joints of a body; X_PB is the drawn pose of the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
                   const Placement& X_PB, const std::vector<MjcfJoint>& joints);
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
-/// Spatial tendons between two sites; `held`: names of tendons that keep their length, which become
-/// rods.
+/// Reads spatial tendons between two sites; `held` contains tendons of constant length, which
+/// become rods.
 void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,
                      MjcfModel* model);
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model);
-/// Constant efforts of actuators under these controls; without any, under 0.
+/// Sets constant actuator efforts for these controls; by default all controls are 0.
 void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& controls,
                        MjcfModel* model);
 

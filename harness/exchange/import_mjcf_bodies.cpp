@@ -11,14 +11,14 @@ namespace loopbench::harness {
 
 namespace {
 
-/// A child of a body, the frame around it, and the class that counts there.
+/// A child of a body, its enclosing frame, and its default class.
 struct Placed {
   XmlElement element;
   Placement X;
   std::string childclass;
 };
 
-/// What a body holds, frames (<frame>) dissolved.
+/// Contents of a body, without intermediate <frame> elements.
 struct Contents {
   std::vector<Placed> bodies, geoms, sites, joints;
 };
@@ -31,7 +31,7 @@ std::string ClassWithin(const MjcfModel& model, const XmlElement& element,
   return given->text();
 }
 
-/// In the order of the file, within frames and beside them: it is that of qpos.
+/// Collects contents in file order, inside and outside of frames; this is the order of qpos.
 void Gather(const MjcfModel& model, const XmlElement& element, const Placement& X,
             const std::string& childclass, Contents* contents) {
   const std::map<std::string, std::vector<Placed>*> lists = {{"body", &contents->bodies},
@@ -66,7 +66,7 @@ void ReadSites(const std::vector<Placed>& sites, int body, MjcfModel* model) {
   }
 }
 
-/// <inertial>: about its own axes, turned into those of the body.
+/// Reads <inertial>: about its own axes, rotated into body axes.
 void ReadInertial(const XmlElement& element, int body, MjcfModel* model) {
   const Placement X = model->PlacementOf({element, {}});
   const double mass = element.Required("mass", "a number [kg]").Number(kNotNegative);
@@ -79,14 +79,14 @@ void ReadInertial(const XmlElement& element, int body, MjcfModel* model) {
     inertia = SymmetricMatrix(I[0], I[1], I[2], I[3], I[4], I[5]);
   } else if (diagonal) {
     inertia.diagonal() = diagonal->Vector();
-  }  // else a point, as MuJoCo has it
+  }  // otherwise a point mass, as in MuJoCo
   BodyDescription& described = model->draft->description.bodies[static_cast<std::size_t>(body)];
   described.mass = mass;
   described.com = X.p;
   described.inertia = InTurnedAxes(X.q, inertia);
 }
 
-/// `is_fixed`: to the ground, where masses move nothing unless they count in a total.
+/// Reads masses. `is_fixed`: fixed to the ground, where masses matter only for a total mass.
 void ReadMasses(const XmlElement& element, const Contents& contents, int body, bool is_fixed,
                 MjcfModel* model) {
   const auto inertial = element.Child("inertial");
@@ -101,7 +101,7 @@ void ReadMasses(const XmlElement& element, const Contents& contents, int body, b
   if (wants_geoms) {
     of_geoms = MassOfGeoms(*model, geoms, is_fixed && settings.total_mass <= 0.0);
   }
-  const bool from_geoms = of_geoms.mass > 0.0;  // as in MuJoCo: else <inertial> stays
+  const bool from_geoms = of_geoms.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains
   if (from_geoms) {
     BodyDescription& described = model->draft->description.bodies[static_cast<std::size_t>(body)];
     described.mass = of_geoms.mass;
@@ -124,7 +124,7 @@ void ReadMasses(const XmlElement& element, const Contents& contents, int body, b
   }
 }
 
-/// `is_fixed`: the parent is fixed to the ground, or is it.
+/// Reads a body. `is_fixed`: the parent is the ground or is fixed to it.
 void ReadBody(const Placed& placed, int parent, bool is_fixed, MjcfModel* model) {
   const XmlElement& element = placed.element;
   ImportDraft* draft = model->draft;
@@ -154,7 +154,7 @@ void ReadBody(const Placed& placed, int parent, bool is_fixed, MjcfModel* model)
   for (const Placed& child : contents.bodies) ReadBody(child, body, is_fixed, model);
 }
 
-/// As MuJoCo's compiler: A + B >= C by taking the mean of the three.
+/// Enforces A + B >= C as MuJoCo's compiler: replaces all three moments by their mean.
 void Balance(Eigen::Matrix3d* inertia) {
   const Eigen::Vector3d moments = SymmetricEigenvalues(*inertia);
   if (moments[0] + moments[1] < moments[2]) {
@@ -212,18 +212,18 @@ void AdjustMasses(MjcfModel* model) {
   }
 }
 
-// Masses of MuJoCo's shapes.
+// Masses of MuJoCo shapes.
 
 namespace {
 
 using std::numbers::pi;
 
 constexpr double kDensity = 1000.0;  // [kg/m^3], MuJoCo's default
-/// Shapes of less [m^3] have no mass that is given, and masses of less [kg] do not count: mjEPS in
+/// Smaller volumes [m^3] ignore a given mass, and smaller masses [kg] are ignored: mjEPS in
 /// MuJoCo's src/user/user_objects.cc.
 constexpr double kLeast = 1e-14;
 
-/// Volume [m^3], and moments of inertia per mass [m^2] about its own axes; z is its axis.
+/// Volume [m^3], and moments of inertia per mass [m^2] about its own axes; z is its symmetry axis.
 struct Shape {
   double volume = 0.0;
   Eigen::Vector3d moments = Eigen::Vector3d::Zero();
@@ -245,7 +245,7 @@ Shape CylinderOf(double radius, double half) {
   return {2.0 * pi * radius * radius * half, {across, across, radius * radius / 2.0}};
 }
 
-/// A cylinder and two half balls, whose centres of mass are 3/8 of the radius beyond its ends.
+/// Returns a cylinder with two hemispheres; their centres of mass are 3/8 radius beyond its ends.
 Shape CapsuleOf(double radius, double half) {
   const Shape middle = CylinderOf(radius, half);
   const double ends = 4.0 / 3.0 * pi * radius * radius * radius;
@@ -256,7 +256,7 @@ Shape CapsuleOf(double radius, double half) {
   return {volume, (middle.volume * middle.moments + ends * of_ends) / volume};
 }
 
-/// How many numbers `size` has for each type, and how many with `fromto`.
+/// Number of values of `size` for each type, without and with `fromto`.
 struct SizeOf {
   std::size_t own, along;
 };
@@ -267,7 +267,7 @@ const std::vector<std::string>& Types() {
 }
 constexpr SizeOf kSizes[] = {{1, 1}, {2, 1}, {2, 1}, {3, 1}, {3, 1}};
 
-/// The geom's frame and its sizes; `fromto` gives the place, the axis and the half length.
+/// Returns the sizes of a geom and its frame; `fromto` gives position, axis and half length.
 std::vector<double> PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, std::size_t type,
                                  Placement* X) {
   const auto size = geom.Attribute("size");
@@ -285,7 +285,7 @@ std::vector<double> PlaceAndSize(const MjcfModel& model, const MjcfElement& geom
   const double length = (to - from).norm();
   if (!(length > 0.0)) along->Fail("two different points");
   X->p = 0.5 * (from + to);
-  // z along the line, from the second end to the first as MuJoCo has it: the shapes are symmetric
+  // z along the line, from the second end to the first as in MuJoCo: shapes are symmetric
   X->q = TurnOfZ(to - from);
   if (type == 1 || type == 2) return {sizes[0], 0.5 * length, 0.0};
   return {sizes[0], sizes[0], 0.5 * length};
@@ -299,7 +299,7 @@ Shape ShapeOf(std::size_t type, const std::vector<double>& size) {
   return type == 3 ? BoxOf(sizes) : EllipsoidOf(sizes);
 }
 
-/// False for one that has no mass.
+/// Reads a geom; returns false if it has no mass.
 bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes,
               BodyDescription* read, Placement* X) {
   const MjcfElement& element = geom.element;

@@ -1,8 +1,8 @@
-// Joints of MuJoCo: one at a time, and several on a body as one of ours.
+// Joints of MuJoCo: single ones, and several on a body as one Loopbench joint.
 //
-// MuJoCo's joints of a body act one after the other, each in the axes that those before it have
-// moved: with X_i(q_i) the motion of joint i in body axes, the body stands in its parent at
-// X_PB X_1 .. X_n. What such a product can reach decides which of our kinds it is.
+// MuJoCo's joints of a body act in sequence, each in axes moved by the previous joints. With
+// X_i(q_i) the motion of joint i in body axes, the pose of the body in its parent is X_PB X_1 ..
+// X_n. The set of reachable poses determines the Loopbench joint type.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,8 +18,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Axes are parallel, perpendicular or through one point when rounding of 1e-9 (a file with nine
-/// digits) says so.
+/// Tolerance for parallel, perpendicular and intersecting axes: rounding in a file with nine
+/// digits.
 constexpr double kAligned = 1e-9;
 
 void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
@@ -39,13 +39,13 @@ void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
   }
 }
 
-/// Where the axes of hinges meet; nothing when they do not.
+/// Returns the intersection of the axes of hinges; nothing if there is none.
 std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
   const auto at_first = [&](const MjcfJoint& hinge) {
     return hinge.position == hinges[0].position;
   };
   if (std::ranges::all_of(hinges, at_first)) return hinges[0].position;
-  // the point of the least squares of the distances to all axes
+  // least-squares point of the distances to all axes
   MatrixX<double> A = MatrixX<double>::Zero(3, 3), U(3, 3);
   VectorX<double> lambda(3);
   Vector3d b = Vector3d::Zero();
@@ -58,7 +58,7 @@ std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
     arms += hinge.position.norm();
   }
   SymmetricEigen<double>(A, U, lambda);
-  // axes 2e-7 rad apart have an eigenvalue of 2e-14; that of parallel ones is round-off
+  // axes 2e-7 rad apart have an eigenvalue of 2e-14; parallel axes have round-off
   const double least = 16.0 * std::numeric_limits<double>::epsilon() * lambda[2];
   Vector3d point = Vector3d::Zero();
   for (Eigen::Index k = 0; k < 3; ++k) {
@@ -75,7 +75,7 @@ std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
 bool Parallel(const Vector3d& a, const Vector3d& b) { return a.cross(b).norm() <= kAligned; }
 bool Perpendicular(const Vector3d& a, const Vector3d& b) { return std::abs(a.dot(b)) <= kAligned; }
 
-/// Axes x, y, z with these two, which are perpendicular up to rounding.
+/// Returns axes x, y, z from two axes that are perpendicular up to rounding.
 Eigen::Quaterniond Axes(const Vector3d& x, const Vector3d& z_near) {
   const Vector3d z = (z_near - x.dot(z_near) * x).normalized();
   Eigen::Matrix3d R;
@@ -170,7 +170,7 @@ Composed Compose(const XmlElement& body, const std::vector<MjcfJoint>& joints) {
             "or free joint or a pin in a slot");
 }
 
-/// Springs and dampers of a joint that is all of ours; others are dropped.
+/// Adds springs and dampers of a joint that is a whole Loopbench joint; drops others.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   ImportDraft* draft = model->draft;
   const MjcfElement& element = joint.element;
@@ -197,7 +197,7 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   }
 }
 
-/// The joint of ours, and where it stands on the child.
+/// Adds the Loopbench joint and sets its frame on the child.
 void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints,
                  const Composed& composed, ImportDraft* draft, MjcfChain* chain) {
   std::vector<std::string> names;
@@ -302,7 +302,7 @@ void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int chil
   model->chains.push_back(std::move(chain));
 }
 
-// <actuator>: under controls that stay, motors of joints are constant efforts.
+// <actuator>: at constant controls, motors of joints are constant efforts.
 //
 // MuJoCo: force = gain * ctrl + bias, with ctrl within ctrlrange and force within forcerange; the
 // joint's effort is the sum of gear * force over its actuators, within its actuatorfrcrange.
@@ -313,11 +313,11 @@ double Within(const std::optional<MjcfLimits>& limits, double value) {
   return limits ? std::clamp(value, limits->first, limits->second) : value;
 }
 
-/// Gain and bias of an actuator, where they are constants.
+/// Gain and bias of an actuator, if constant.
 struct Law {
   std::vector<double> gain = {1.0}, bias = {0.0};
   std::string gain_type = "fixed", bias_type = "none", dynamics = "none";
-  bool is_other = false;  ///< a layer of another kind has set what is not followed here
+  bool is_other = false;  ///< a layer of another kind has set unsupported parameters
 
   bool is_constant() const {
     if (is_other || gain_type != "fixed" || dynamics != "none") return false;
@@ -331,7 +331,7 @@ struct Law {
   }
 };
 
-/// What one layer makes of it; as numbers of a shorter list, those that it does not say stay.
+/// Applies one layer; in a shorter list the remaining values stay unchanged.
 void Apply(const XmlElement& layer, Law* law) {
   if (layer.tag() == "motor") {
     *law = Law();
@@ -339,7 +339,7 @@ void Apply(const XmlElement& layer, Law* law) {
   }
   if (layer.tag() != "general") {
     law->is_other = true;
-    // parameters of such actuators, which a motor nearer than they are replaces
+    // parameters of such actuators, which a nearer motor replaces
     for (const char* name : {"kp", "kv", "dampratio", "timeconst", "inheritrange", "area",
                              "diameter", "bias", "gain", "scale", "force"}) {
       layer.Attribute(name);
@@ -363,7 +363,7 @@ void Apply(const XmlElement& layer, Law* law) {
   numbers("biasprm", &law->bias);
 }
 
-/// Layers of all kinds of actuators set the same values, the nearest one last.
+/// Returns the law from layers of all kinds of actuators, where the nearest one has precedence.
 Law LawOf(const MjcfElement& actuator) {
   Law law;
   const std::vector<XmlElement> layers = actuator.Layers();
@@ -372,7 +372,7 @@ Law LawOf(const MjcfElement& actuator) {
   return law;
 }
 
-/// What says nothing about an actuator without dynamics.
+/// Reads attributes without effect on an actuator without dynamics.
 void ReadRest(const MjcfElement& actuator) {
   for (const char* name : {"name", "group", "user", "dynprm", "actdim", "actlimited", "actrange",
                            "actearly", "lengthrange", "cranklength"}) {
@@ -380,7 +380,7 @@ void ReadRest(const MjcfElement& actuator) {
   }
 }
 
-/// A constant effort on a joint, which is one of MjcfModel::joints.
+/// A constant effort on a joint in MjcfModel::joints.
 struct Effort {
   std::size_t joint = 0;
   double value = 0.0;
@@ -388,7 +388,7 @@ struct Effort {
 
 constexpr const char* kNoMotor = "there are no actuators but motors of joints (<key ctrl=...>)";
 
-/// An actuator on a joint with one coordinate, under a control that stays; others are dropped.
+/// Reads an actuator on a joint with one coordinate at a constant control; drops others.
 std::optional<Effort> ReadActuator(const XmlElement& element, double control, MjcfModel* model) {
   const auto drop = [&](const char* why, bool changes_motion) {
     element.Ignore();
@@ -434,7 +434,7 @@ void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& co
   }
   std::vector<double> ctrl(actuators.size(), 0.0);
   if (controls) ctrl = controls->Numbers(ctrl.size(), ctrl.size());
-  std::vector<Effort> efforts;  // of each joint together, in the order of their first actuators
+  std::vector<Effort> efforts;  // summed for each joint, in the order of their first actuators
   std::map<std::size_t, std::size_t> index_of;
   for (std::size_t i = 0; i < actuators.size(); ++i) {
     const auto effort = ReadActuator(actuators[i], ctrl[i], model);

@@ -1,4 +1,4 @@
-// <equality> and <tendon>: what closes loops and what pulls between two points.
+// <equality> and <tendon>: constraints that close loops, and forces between two points.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,13 +13,13 @@ namespace {
 
 constexpr const char* kMjcfWorld = "world";
 
-/// The two frames of a loop, each on its body, at the same place where all coordinates are 0.
+/// Two frames of a loop, each on its body, coincident at zero coordinates.
 struct Ends {
   int first = kGround, second = kGround;
   Placement X_first, X_second;
 };
 
-/// The frame on the second body that is where `X` on the first is.
+/// Returns the frame on the second body that coincides with `X` on the first at rest.
 Placement AtRestOn(const MjcfModel& model, int first, const Placement& X, int second) {
   const auto& rest = model.draft->at_rest;
   return rest[static_cast<std::size_t>(second)].Inverse() * rest[static_cast<std::size_t>(first)] *
@@ -61,7 +61,7 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
       .cut = true;
 }
 
-/// `relpose`: the second body in the first, from the anchor on the second.
+/// Adds a weld. `relpose`: pose of the second body in the first, from the anchor on the second.
 void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   if (equality.Attribute("site1")) {
     equality.own().Fail("a weld of sites", "a weld of bodies (body1, body2)");
@@ -72,10 +72,10 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   if (const auto pose = equality.Attribute("relpose")) {
     const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
-    // a quaternion of zeros asks for the poses that the file draws
+    // a zero quaternion selects the drawn poses
     if (q.norm() > 0.0) relative = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
   }
-  equality.Attribute("anchor");  // where the two are held together: a weld holds them everywhere
+  equality.Attribute("anchor");  // point of the weld; irrelevant, since a weld holds everywhere
   equality.Attribute("torquescale");
   const auto name = equality.own().Attribute("name");
   ImportDraft* draft = model->draft;
@@ -85,7 +85,7 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
       .cut = true;
 }
 
-/// A joint of one coordinate at a constant value. False for a coupling of two, which is dropped.
+/// Holds a joint of one coordinate at a constant. Returns false for a coupling of two (dropped).
 bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
   const auto joint1 = equality.Attribute("joint1");
   if (!joint1) equality.own().Fail("no \"joint1\"", "the name of a joint");
@@ -99,7 +99,7 @@ bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
                        true);
     return false;
   }
-  // MuJoCo: q1 - q1_0 = a_0, with q1_0 the coordinate where the file draws the joint
+  // MuJoCo: q1 - q1_0 = a_0, with q1_0 the coordinate in the drawn position
   JointDescription& ours = model->draft->description.joints[static_cast<std::size_t>(joint.joint)];
   ours.motions = {{0, Polynomial{{a[0]}}}};
   return true;
@@ -137,7 +137,7 @@ void ReadMjcfEquality(const XmlElement& section, MjcfModel* model) {
 
 namespace {
 
-/// The two sites of a tendon that is straight, or nothing.
+/// Returns the two sites of a straight tendon, or nothing.
 std::optional<std::pair<BodyPoint, BodyPoint>> StraightEnds(const XmlElement& element,
                                                             const MjcfModel& model) {
   const std::vector<XmlElement> sites = element.Children("site");
@@ -149,7 +149,7 @@ std::optional<std::pair<BodyPoint, BodyPoint>> StraightEnds(const XmlElement& el
   return std::pair{end(sites[0]), end(sites[1])};
 }
 
-/// A tendon of a length that does not change.
+/// Adds a tendon of constant length as a rod.
 void AddRod(const std::string& name, const std::pair<BodyPoint, BodyPoint>& ends, double length,
             MjcfModel* model) {
   const auto& [a, b] = ends;
@@ -210,7 +210,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   }
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
-  equality.own().Attribute("name");  // the tendon's is the rod's
+  equality.own().Attribute("name");  // the rod has the name of the tendon
   const auto coefficients = equality.Attribute("polycoef");
   const double offset = coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
   const double drawn = LengthOf(*ends, model->draft->at_rest);
@@ -231,18 +231,18 @@ void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElem
   }
 }
 
-// <keyframe>: coordinates and speeds of MuJoCo's joints as those of ours.
+// <keyframe>: conversion of coordinates and speeds from MuJoCo's joints.
 
 namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-/// The motion of a chain's joints at their coordinates, in body axes as the file draws them.
+/// Motion of a chain of joints at its coordinates, in drawn body axes.
 struct ChainMotion {
   Placement X;                    ///< the product of their motions
   Vector3d w = Vector3d::Zero();  ///< angular velocity
-  Vector3d v = Vector3d::Zero();  ///< of the point that is `at` in the moved body
+  Vector3d v = Vector3d::Zero();  ///< velocity of the point `at` in the moved body
 };
 
 Placement MotionOf(const MjcfJoint& joint, const double* q) {
@@ -281,8 +281,8 @@ ChainMotion Move(const MjcfModel& model, const MjcfChain& chain, const double* q
   return motion;
 }
 
-/// Several joints as one: its coordinates are those of the pose they make, its speeds what is left
-/// of the velocity along the free directions, which is all of it.
+/// Converts several joints to one: coordinates from their common pose, speeds from the velocity
+/// along the free directions, which contain it completely.
 void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type, const double* q,
                  const double* u, std::vector<double>* coordinates, std::vector<double>* speeds) {
   const ChainMotion motion = Move(model, chain, q, u);
@@ -290,7 +290,7 @@ void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type,
   Placement X_FM = chain.X_BJ.Inverse() * motion.X * chain.X_BJ;
   Vector3d w = chain.X_BJ.q.conjugate() * motion.w, v = chain.X_BJ.q.conjugate() * motion.v;
   if (chain.from_is_child) {
-    // seen from the other side: of the origin of the parent's frame, in axes of the child's
+    // reversed: velocity of the origin of the parent's frame, in axes of the child's frame
     const Placement X_MF = X_FM.Inverse();
     v = X_MF.q * Vector3d(-(v + w.cross(-X_FM.p)));
     w = X_MF.q * Vector3d(-w);
@@ -317,13 +317,13 @@ void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type,
   }
 }
 
-/// The value at which an <equality> holds the joint, if one does.
+/// Returns the value at which an <equality> holds the joint, if any.
 std::optional<double> HeldAt(const JointDescription& joint) {
   if (joint.motions.empty()) return std::nullopt;
   return std::get<Polynomial>(joint.motions[0].value).coefficients[0];
 }
 
-/// A start that a joint cannot have is dropped.
+/// Drops a start that contradicts a held joint.
 void NoteHeld(const XmlElement& key, const std::string& name, double held, double coordinate,
               double speed, ImportDraft* draft) {
   const std::string reason =
@@ -340,7 +340,7 @@ void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const d
   }
 }
 
-/// Coordinates of our joints, and speeds if there are any, from those of MuJoCo.
+/// Sets coordinates, and speeds if given, of the Loopbench joints from MuJoCo's.
 void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<double>& qpos,
                   const std::vector<double>& qvel, bool has_speeds) {
   InitialDescription& initial = model->draft->description.initial;
@@ -353,7 +353,7 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
         model->draft->description.joints[static_cast<std::size_t>(chain.joint)];
     std::vector<double> coordinates, speeds;
     if (first.alone && first.kind == MjcfKind::kFree) {
-      // a place in ground axes, an angular velocity in those of the body
+      // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
       const Vector3d w =
           Quaterniond(q[3], q[4], q[5], q[6]).normalized() * Vector3d(u[3], u[4], u[5]);

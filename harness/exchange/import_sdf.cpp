@@ -12,20 +12,20 @@
 #include "harness/exchange/import_draft.h"
 
 namespace loopbench::harness {
-// SDF (sdformat.org, versions 1.4 to 1.12): what its parts share.
+// SDF (sdformat.org, versions 1.4 to 1.12): common parts.
 //
 // Internal to import_sdf*.cpp.
 
-/// Something with a pose: a link, joint, frame or nested model.
+/// An element with a pose: a link, joint, frame or nested model.
 struct SdfFrame {
   XmlElement element;
-  Placement raw;                 ///< as the file says it
+  Placement raw;                 ///< as given in the file
   std::string relative_to;       ///< a name in the same scope; "" for the scope's own frame
-  std::string attached_to;       ///< of a frame and of a joint: what it moves with
-  bool is_raw_to_child = false;  ///< of a joint: raw is in the frame of its child
+  std::string attached_to;       ///< for frames and joints: the name that they move with
+  bool is_raw_to_child = false;  ///< for joints: raw is in the frame of the child
 };
 
-/// A world or a model: what it has by name, each in its own frame.
+/// A world or a model: its named elements, each in its own frame.
 class SdfScope {
  public:
   SdfScope(XmlElement element_, std::string prefix_, bool is_static_)
@@ -43,14 +43,14 @@ class SdfScope {
 
   /// Refuses a name that is in use here.
   void Add(const std::string& name, SdfFrame frame);
-  /// Where the frame of that name is, in this scope's. `user` is who asks.
+  /// Returns the pose of a frame in this scope's frame. `user`: the referring element.
   Placement Resolve(const std::string& name, const XmlElement& user) const;
-  /// The link that a link, frame or model moves with.
+  /// Returns the link that a link, frame or model moves with.
   Link LinkOf(const std::string& name, const XmlElement& user) const;
   bool is_world() const { return element.tag() != "model"; }
 
  private:
-  // answers, so that a chain of frames is followed once
+  // results, so that a chain of frames is followed once
   mutable std::map<std::string, Placement> resolved_;
   mutable std::map<std::string, Link> links_;
 };
@@ -59,12 +59,12 @@ struct SdfVersion {
   int minor = 0;  ///< of 1.x
 };
 
-/// <pose> of an element, and what it is relative to.
+/// Reads the <pose> of an element and its `relative_to`.
 SdfFrame ReadSdfPose(const XmlElement& element, SdfVersion version, ImportDraft* draft);
-/// A <joint> between links that are bodies already, with their numbers by full name.
+/// Reads a <joint> between links that are bodies already, with their indices by full name.
 void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfScope& scope,
                   SdfVersion version, ImportDraft* draft);
-/// <inertial>, and what else a link says about itself.
+/// Reads <inertial> and the other properties of a link.
 void ReadSdfLink(const XmlElement& element, int body, bool is_static, SdfVersion version,
                  ImportDraft* draft);
 
@@ -87,7 +87,7 @@ constexpr DroppedReason kSdfReasons[] = {
     {"state", "the start is that of the poses", true},
     {"actor", "actors are no mechanism"},
     {"population", "it makes models while it runs", true},
-    // nothing to say
+    // without influence on the motion
     {"audio_source audio_sink light projector particle_emitter battery scene gui audio "
      "magnetic_field spherical_coordinates self_collide allow_auto_disable must_be_base_link "
      "road gripper link@name model@canonical_link sdf@version",
@@ -113,7 +113,7 @@ void RefuseIncludes(const XmlElement& element) {
   }
 }
 
-/// What a joint moves.
+/// Returns the child of a joint.
 XmlValue ReadChild(const XmlElement& joint) {
   const XmlValue child = joint.RequiredChild("child").Content();
   if (child.Name() == "world") {
@@ -122,7 +122,7 @@ XmlValue ReadChild(const XmlElement& joint) {
   return child;
 }
 
-/// All names of a world or model, models within it included.
+/// Reads all names of a world or model, including nested models.
 void ReadNames(SdfScope* scope, SdfVersion version, ImportDraft* draft) {
   const XmlElement& element = scope->element;
   RefuseIncludes(element);
@@ -157,7 +157,7 @@ void ReadNames(SdfScope* scope, SdfVersion version, ImportDraft* draft) {
   }
 }
 
-/// Where models and links stand; links become bodies.
+/// Sets poses of models and links, and adds links as bodies.
 void ReadLinks(SdfScope* scope, SdfVersion version, ImportDraft* draft) {
   for (const XmlElement& child : scope->element.Children("link")) {
     const std::string name = child.Required("name", "a name").Name();
@@ -249,7 +249,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   SdfScope scope(top, "", false);
   ReadNames(&scope, version, draft);
   if (models.size() == 1) {
-    // names within the only model need not say whose they are
+    // names within the only model need no model prefix
     SdfScope& only = *scope.models.begin()->second;
     const std::string before = only.prefix;
     draft->description.name = models[0].Required("name", "a name").Name();
@@ -267,7 +267,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   draft->NoteUnread(kSdfReasons);
 }
 
-// Frames of SDF: who stands where, and what moves with what.
+// SDF frame semantics: poses and `attached_to`.
 
 namespace {
 
@@ -284,7 +284,7 @@ bool IsOwn(const std::string& name, const SdfScope& scope) {
             "a link, joint, frame or nested model of the same model");
 }
 
-/// "arm::hand" as the model "arm" and "hand".
+/// Splits "arm::hand" into the model "arm" and the name "hand".
 const SdfScope* NestedScope(const SdfScope& scope, const std::string& name, std::string* rest) {
   const std::size_t cut = name.find(kWithin);
   if (cut == std::string::npos) return nullptr;
@@ -337,7 +337,7 @@ void SdfScope::Add(const std::string& name, SdfFrame frame) {
 }
 
 Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
-  // frames that stand in each other, up to one that is known
+  // chain of relative frames, up to a known one
   std::vector<std::pair<std::string, Placement>> chain;
   Placement X;
   std::string here = name;
@@ -346,7 +346,7 @@ Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) con
       X = known->second;
       break;
     }
-    // no chain without a cycle has more than each frame and a name within each model
+    // without a cycle, a chain has at most each frame and a name within each model
     if (chain.size() > 2 * frames.size()) {
       user.Fail("frames that are relative to each other", "no cycle");
     }
@@ -387,7 +387,7 @@ SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user)
     } else if (IsOwn(here, *this) && is_world()) {
       link = Link{nullptr, ""};
     } else if (IsOwn(here, *this)) {
-      // a model moves with its canonical link, the first one unless it names another
+      // a model moves with its canonical link, by default the first one
       const auto canonical = element.Attribute("canonical_link");
       const std::vector<XmlElement> links = element.Children("link");
       if (canonical && !canonical->text().empty()) {
@@ -416,10 +416,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPerpendicular = 1e-9;  // cosine that rounding of nine digits leaves
+constexpr double kPerpendicular = 1e-9;  // cosine tolerance for nine digits
 constexpr double kNoLimit = 1e15;        // the defaults are 1e16 and infinity
 
-/// The axis in the joint's frame. Before 1.5 it was in the model's.
+/// Returns the axis in the joint's frame; before 1.5 it was given in the model's frame.
 Vector3d ReadAxis(const XmlElement& axis, const SdfScope& scope, const Placement& X_model_joint,
                   SdfVersion version, ImportDraft* draft) {
   Vector3d xyz = Vector3d::UnitZ();
@@ -457,7 +457,7 @@ void NoteLimits(const XmlElement& axis, ImportDraft* draft) {
   if (ends) draft->Note(*limit, "dropped: joints turn and slide without ends", true);
 }
 
-/// Where a joint starts: a coordinate for each of its own axes, 0 where the file says none.
+/// Sets the start of a joint: a coordinate for each of its own axes, 0 by default.
 void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportDraft* draft) {
   std::vector<double> values(num_own);
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -473,7 +473,7 @@ void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportD
   if (moves) draft->description.initial.coordinates.push_back({draft->last_joint(), values});
 }
 
-/// Spring and damper of one axis; `has_one`: it is the only one of the joint.
+/// Reads spring and damper of one axis; `has_one`: the joint has only this axis.
 void ReadDynamics(const XmlElement& axis, bool has_one, ImportDraft* draft) {
   NoteLimits(axis, draft);
   const int joint = draft->last_joint();
@@ -498,8 +498,8 @@ void ReadDynamics(const XmlElement& axis, bool has_one, ImportDraft* draft) {
   if (c > 0.0) draft->description.forces.emplace_back(JointDamper{joint, c});
 }
 
-/// What both axes say but for their directions. Those that are the joint's own stand first:
-/// `num_own` is 1 of most, 2 of universal joints, 0 of balls.
+/// Reads all of both axes except their directions. The joint's own axes come first: `num_own` is
+/// usually 1, 2 for universal joints, 0 for balls.
 void ReadAxisForces(const std::optional<XmlElement>& axis, const std::optional<XmlElement>& axis2,
                     std::size_t num_own, ImportDraft* draft) {
   std::vector<XmlElement> axes;
@@ -512,8 +512,8 @@ void ReadAxisForces(const std::optional<XmlElement>& axis, const std::optional<X
   ReadStart(axes, num_own, draft);
 }
 
-/// Advance per angle [m/rad]. thread_pitch is in rad/m, and positive for a left-handed thread;
-/// screw_thread_pitch, from 1.10 on, in m per turn, and positive for a right-handed one.
+/// Returns the advance per angle [m/rad]. thread_pitch is in rad/m and positive for a left-handed
+/// thread; screw_thread_pitch, from 1.10 on, in m per turn and positive for a right-handed one.
 double ReadPitch(const XmlElement& joint) {
   const auto old = joint.Child("thread_pitch");
   if (const auto pitch = joint.Child("screw_thread_pitch")) {
@@ -540,7 +540,7 @@ JointType TypeOfSdf(std::size_t index) {
   return kTypes[index];
 }
 
-/// The body that a parent or child moves with, and where it stands in ground axes.
+/// The body that a parent or child moves with, and its pose in ground axes.
 struct JointEnd {
   int body = kGround;
   Placement at_rest;
@@ -555,7 +555,7 @@ JointEnd EndOf(const XmlElement& side, const SdfScope& scope, const ImportDraft&
   return {body, draft.at_rest[static_cast<std::size_t>(body)]};
 }
 
-/// x along the first axis, y along the second.
+/// Returns axes with x along the first axis, y along the second.
 Eigen::Quaterniond UniversalAxes(const XmlElement& joint, Vector3d first, Vector3d second) {
   first.normalize();
   second.normalize();
@@ -586,7 +586,7 @@ void ReadSdfJoint(const XmlElement& element, const std::string& name, const SdfS
   const SdfFrame& frame = scope.frames.at(element.Required("name", "a name").Name());
   const Placement X_model_joint = scope.Resolve(element.Required("name", "a name").Name(), element);
   const Placement X_rest = scope.at_rest * X_model_joint;
-  // as the file says it, to the last bit, where the child is a link and no frame on one
+  // bit-identical to the file if the child is a link and not a frame on a link
   const auto named = scope.frames.find(frame.attached_to);
   const bool is_raw = frame.is_raw_to_child && Q.body != kGround && named != scope.frames.end() &&
                       named->second.element.tag() == "link";

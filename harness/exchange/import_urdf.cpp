@@ -7,7 +7,7 @@ namespace loopbench::harness {
 
 namespace {
 
-constexpr double kGravity = 9.81;  // [m/s^2]: URDF does not say any
+constexpr double kGravity = 9.81;  // [m/s^2]: default, since URDF specifies none
 
 constexpr DroppedReason kUrdfReasons[] = {
     {"visual", "shapes do not move anything"},
@@ -21,7 +21,7 @@ constexpr DroppedReason kUrdfReasons[] = {
     {"gazebo", "it is for another program; loops in it belong in a sidecar (--loops)", true},
     {"sensor", "there are no sensors"},
     {"dynamics@friction", "dry friction is no force of mechanism files", true},
-    // nothing to say
+    // without influence on the motion
     {"material robot@version link@type", ""}};
 
 Placement OriginOf(const XmlElement& element, ImportDraft* draft) {
@@ -55,7 +55,7 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   described.inertia = InTurnedAxes(X.q, I);
 }
 
-/// A joint as the file says it, before poses are known.
+/// A joint as given in the file, before poses are known.
 struct UrdfJoint {
   XmlElement element;
   std::string type;
@@ -125,7 +125,7 @@ std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world, Import
   return joints;
 }
 
-/// Joints in an order from parents to children, and links without a parent.
+/// Joints ordered from parents to children, and links without a parent.
 class UrdfTree {
  public:
   UrdfTree(std::vector<UrdfJoint> joints, std::size_t count)
@@ -170,7 +170,7 @@ class UrdfTree {
   std::vector<std::vector<int>> below_;
 };
 
-/// Where all links stand; what no root leads to is a cycle.
+/// Sets the poses of all links; links that no root reaches form a cycle.
 void PlaceLinks(const UrdfTree& tree, const std::vector<int>& roots, ImportDraft* draft) {
   std::vector<bool> placed(draft->at_rest.size(), false);
   for (const int root : roots) {
@@ -205,7 +205,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   std::vector<XmlElement> of_body = {root};
   for (const XmlElement& link : root.Children("link")) {
     const XmlValue name = link.Required("name", "a name");
-    // "world" is by custom what does not move
+    // "world" is by convention the fixed link
     if (name.Name() == "world" && !link.Child("inertial")) {
       if (has_world) name.Fail("a name that is not in use");
       has_world = true;

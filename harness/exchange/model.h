@@ -1,10 +1,8 @@
-// A mechanism in plain numbers: what documents and programs for others are written from, and what
-// peers build their own models from.
+// A mechanism in plain numbers: source of all exported documents, programs and peer models.
 //
-// A forest of tree joints from Ground and the joints that close its loops, bodies about their
-// centres of mass, all in three dimensions (a planar mechanism lies in z = 0). No Eigen and nothing
-// newer than C++17: the headers of peers ask for that, and what is built for them has other
-// processor flags than Loopbench.
+// A forest of tree joints from Ground, the joints that close its loops, and bodies about their
+// centres of mass, all in 3D (a planar mechanism lies in z = 0). No Eigen and only C++17: required
+// by headers of peers, which are built with other processor flags than Loopbench.
 #pragma once
 
 #include <array>
@@ -19,7 +17,7 @@ using Vec = std::array<double, 3>;
 /// Row by row.
 using Matrix = std::array<double, 9>;
 
-/// A frame in axes of a body, from its centre of mass.
+/// A frame in body axes, relative to the centre of mass.
 struct Frame {
   Matrix R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   Vec p = {0, 0, 0};
@@ -29,51 +27,51 @@ struct Body {
   std::string name;
   double mass = 0.0;    ///< [kg]
   Matrix inertia = {};  ///< about the centre of mass, in body axes [kg m^2]
-  Vec com = {};         ///< centre of mass from the user's origin of the body, in body axes [m]
-  std::vector<std::pair<std::string, Vec>> points;  ///< named ones, from the centre of mass [m]
+  Vec com = {};         ///< centre of mass from the user's body origin, in body axes [m]
+  std::vector<std::pair<std::string, Vec>> points;  ///< named points, from the centre of mass [m]
 };
 
-/// From P to Q, with frame F on P and M on Q, as mechanism/model/joint.h has it: its kinds, axes,
-/// coordinates and speeds.
+/// A joint from P to Q, with frame F on P and M on Q; kinds, axes, coordinates and speeds as in
+/// mechanism/model/joint.h.
 struct Joint {
   std::string name;
-  std::string kind;        ///< as in files: "revolute"
+  std::string kind;        ///< as in mechanism files: "revolute"
   double parameter = 0.0;  ///< pitch [m/rad] of "helical", length [m] of "rod"
   int from = 0, to = 0;    ///< indices of bodies P and Q
   Frame F, M;
-  // of tree joints:
-  int num_q = 0, num_u = 0, q = -1, u = -1;  ///< sizes, and place among all coordinates and speeds
+  // for tree joints:
+  int num_q = 0, num_u = 0, q = -1, u = -1;  ///< sizes, and first index among all
   std::vector<std::string> coordinates;      ///< their names: "angle"
-  bool from_is_child = false;                ///< P hangs on Q
-  /// Of a joint in space that closes a loop and of which some directions say nothing that the loop
-  /// does not say already (mechanism/simplify/redundancy.h): the others, as components of a motion
-  /// [w; v] in axes of F. Empty: all that its kind constrains.
+  bool from_is_child = false;                ///< P is the child of Q
+  /// Constrained directions of a spatial cut joint that the loop does not already imply
+  /// (mechanism/simplify/redundancy.h): components of a motion [w; v] in axes of F. Empty: all
+  /// directions that its kind constrains.
   std::vector<int> imposed;
 
   int parent() const { return from_is_child ? to : from; }
   int child() const { return from_is_child ? from : to; }
 };
 
-/// constant - stiffness (q - rest) - damping u along the one coordinate of a tree joint.
+/// Effort constant - stiffness (q - rest) - damping u along the one coordinate of a tree joint.
 struct JointForce {
   int joint = 0;  ///< index into Model::tree
   double constant = 0.0, stiffness = 0.0, rest = 0.0, damping = 0.0;
 };
 
-/// A material point of a body, from its centre of mass in body axes [m].
+/// A material point of a body, from its centre of mass, in body axes [m].
 struct Point {
   int body = 0;
   Vec at = {};
 };
 
-/// A constant force [N] in ground axes, or in those of the body.
+/// A constant force [N] in ground or body axes.
 struct PointForce {
   Point point;
   Vec force = {};
   bool in_body_axes = false;
 };
 
-/// The tension preload + stiffness (d - length) + damping d' between points at distance d.
+/// Tension preload + stiffness (d - length) + damping d' between points at distance d.
 struct SpringDamper {
   Point from, to;
   double stiffness = 0.0, damping = 0.0, length = 0.0, preload = 0.0;
@@ -85,25 +83,24 @@ struct Model {
   Vec gravity = {};
   std::vector<Body> bodies;  ///< [0] is Ground
   std::vector<Joint> tree;   ///< parents before children, one per body but Ground
-  std::vector<Joint> cut;    ///< those that close loops
+  std::vector<Joint> cut;    ///< joints that close loops
   std::vector<JointForce> joint_forces;
   std::vector<PointForce> point_forces;
   std::vector<SpringDamper> spring_dampers;
   int num_q = 0, num_u = 0;
-  /// Where the model is put first, in the order of the tree: zero, turns as quaternions of one, or
-  /// the assembled start.
+  /// Initial state in the order of the tree: the assembled start, or zero with unit quaternions.
   std::vector<double> q, u;
-  /// What the mechanism has and a Model has not, each with the name of its joint or body.
+  /// Parts of the mechanism that a Model cannot contain, each with its joint or body.
   std::vector<std::string> missing;
 };
 
-/// What a format says in other words: with the same motion, or with a loss.
+/// A part that a format expresses differently: with the same motion, or with a loss.
 struct Note {
   bool loss = false;
   std::string text;
 };
 
-/// Thrown for parts of a model that a format or peer does not have; what() has all of them.
+/// Error for parts of a model that a format or peer does not support; what() lists all.
 class NotThere : public std::runtime_error {
  public:
   explicit NotThere(std::vector<std::string> parts)

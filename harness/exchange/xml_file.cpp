@@ -13,7 +13,7 @@
 
 namespace loopbench::harness {
 
-/// The parsed text; `read` has elements and attributes.
+/// Parsed text; `read` contains elements and attributes.
 struct XmlDocument {
   tinyxml2::XMLDocument xml;
   std::string file;
@@ -24,8 +24,8 @@ namespace {
 
 std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '"'; }
 
-/// What is no UTF-8 would garble messages and cannot be written as JSON: numeric references of XML
-/// can make it of a file that is.
+/// Returns true for valid UTF-8. XML numeric references can produce invalid text from a valid file,
+/// which would garble messages and cannot be written as JSON.
 bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
 
 std::string ShownElement(const tinyxml2::XMLElement& element) {
@@ -70,7 +70,7 @@ void RefuseDocumentTypes(const XmlDocument& document) {
   }
 }
 
-/// Before parsing: the parser compares each attribute with all before it in its element.
+/// Limits attributes before parsing, since the parser compares all attributes of an element.
 void RefuseManyAttributes(std::string_view text, const std::string& file) {
   constexpr int kMost = 1000;
   constexpr std::string_view kEndOfComment = "-->", kEndOfData = "]]>";

@@ -1,11 +1,10 @@
-// An XML file as the importers see it: elements and values that know their place, are read
-// strictly, and remember whether anybody has read them.
+// An XML file for the importers: elements and values with their location, strict parsing, and a
+// record of the parts that were read.
 //
-// What nobody reads is told at the end (XmlFile::Unread), so that nothing is left out without a
-// word. All errors are ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...".
-// Hostile files are refused: larger than kMaxConfigBytes, deeper than the parser's limit of
-// elements, with a document type (which is where entities are declared, and none is ever expanded),
-// no UTF-8.
+// XmlFile::Unread lists all unread parts at the end, so that none is lost silently. All errors are
+// ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...". Rejected files: larger
+// than kMaxConfigBytes, nested deeper than the parser's limit, invalid UTF-8, or with a document
+// type, the only place for entity declarations (no entity is expanded).
 #pragma once
 
 #include <Eigen/Core>
@@ -28,25 +27,25 @@ namespace loopbench::harness {
 class XmlElement;
 struct XmlDocument;
 
-/// A name of an attribute, or "" for what stands within the element, and its text.
+/// The name and text of an attribute, or the text within an element (name "").
 class XmlValue {
  public:
   XmlValue(const XmlElement& element, std::string attribute, std::string text);
 
-  /// Without blanks around it; may be empty.
+  /// Returns the text without surrounding blanks; may be empty.
   const std::string& text() const { return text_; }
   const std::string& attribute() const { return attribute_; }
   XmlElement element() const;
-  /// A text that is not empty and can be printed: UTF-8 without zero bytes.
+  /// Returns a non-empty printable text: UTF-8 without zero bytes.
   std::string Name() const;
-  /// A finite number, with a point whatever the locale, and nothing behind it.
+  /// Returns a finite number, with a decimal point in any locale and nothing after it.
   double Number(const Range& range = {}) const;
-  /// `least` to `most` of them, between blanks.
+  /// Returns `least` to `most` numbers separated by blanks.
   std::vector<double> Numbers(std::size_t least, std::size_t most) const;
   Eigen::Vector3d Vector() const;
-  /// true, false, 1 or 0.
+  /// Accepts true, false, 1 or 0.
   bool Bool() const;
-  /// Its index among `words`.
+  /// Returns the index among `words`.
   std::size_t Choice(const std::vector<std::string>& words) const;
 
   [[noreturn]] void Fail(std::string_view expected) const;
@@ -65,32 +64,32 @@ class XmlElement {
 
   std::string tag() const;
   int line() const;
-  /// <tag name="...">, for messages and notes.
+  /// Returns <tag name="...">, for messages and notes.
   std::string Shown() const;
 
-  /// Its children, which count as read, in the order of the file.
+  /// Returns its children in file order and marks them as read.
   std::vector<XmlElement> Children() const;
   std::vector<XmlElement> Children(std::string_view tag) const;
-  /// Those of one of these tags, in the order of the file.
+  /// Returns children with one of these tags, in file order.
   std::vector<XmlElement> ChildrenOf(const std::vector<std::string_view>& tags) const;
-  /// The only child of this tag; a second one is refused.
+  /// Returns the only child with this tag; throws if there are several.
   std::optional<XmlElement> Child(std::string_view tag) const;
-  /// The same; refused where it is absent.
+  /// Returns the only child with this tag; throws if it is absent.
   XmlElement RequiredChild(std::string_view tag) const;
 
   std::optional<XmlValue> Attribute(const std::string& name) const;
-  /// Refused where it is absent; `expected` says what it would be.
+  /// Returns an attribute; if absent, throws with `expected`.
   XmlValue Required(const std::string& name, std::string_view expected) const;
-  /// The text of the element itself.
+  /// Returns the text of the element itself.
   XmlValue Content() const;
   bool HasAttribute(const std::string& name) const;
 
-  /// The first element of one of these tags within it, at whatever depth; it alone counts as read.
+  /// Returns the first descendant with one of these tags; marks only that element as read.
   std::optional<XmlElement> Within(const std::vector<std::string_view>& tags) const;
 
-  /// Counts as read, with all that is in it.
+  /// Marks the element and all its contents as read.
   void Ignore() const;
-  /// Its attributes count as read, its children do not.
+  /// Marks its attributes as read, but not its children.
   void IgnoreAttributes() const;
 
   [[noreturn]] void Fail(std::string_view found, std::string_view expected) const;
@@ -110,8 +109,8 @@ class XmlFile {
   XmlElement root() const;
   const std::string& name() const;
 
-  /// What nobody has read, in the order of the file: an element with all in it (attribute ""), or
-  /// an attribute of an element that was read.
+  /// Calls `see` for all unread parts in file order: for an element with its contents (attribute
+  /// ""), or for an attribute of an element that was read.
   void Unread(
       const std::function<void(const XmlElement&, const std::string& attribute)>& see) const;
 

@@ -10,9 +10,9 @@
 namespace loopbench::harness {
 namespace {
 
-/// a (mu - middle)^2 + c on [from, to]: the least cost of all segmentations whose last level is mu,
-/// and where their last segment begins. About its middle: of the powers of mu large parts would
-/// cancel, and a step of one in a million be lost beside one of a thousand.
+/// Cost a (mu - middle)^2 + c on [from, to]: the minimum over all segmentations with last level mu,
+/// and the start of their last segment. The centred form avoids the cancellation of powers of mu,
+/// which would lose a step of 1 in 1e6 next to a step of 1000.
 struct CostPiece {
   double from, to, a, middle, c;
   std::size_t begin;
@@ -23,8 +23,8 @@ struct CostPiece {
   }
 };
 
-/// The smaller of the piece and the constant `level`, which stands for a segment that begins at
-/// `begin`. Pieces that meet in a constant of one begin are joined.
+/// Appends the minimum of the piece and the constant `level`, which represents a segment beginning
+/// at `begin`. Adjacent constants with equal `begin` are joined.
 void AddCapped(const CostPiece& piece, double level, std::size_t begin,
                std::vector<CostPiece>* pieces) {
   const auto add = [pieces](const CostPiece& one) {
@@ -57,7 +57,7 @@ void AddCapped(const CostPiece& piece, double level, std::size_t begin,
   add(constant(right, piece.to));
 }
 
-/// The piece with min((x - mu)^2, bound^2) added.
+/// Adds min((x - mu)^2, bound^2) to the piece.
 void AddLoss(const CostPiece& piece, double x, double bound, std::vector<CostPiece>* pieces) {
   const double left = std::clamp(x - bound, piece.from, piece.to);
   const double right = std::clamp(x + bound, piece.from, piece.to);
@@ -70,15 +70,15 @@ void AddLoss(const CostPiece& piece, double x, double bound, std::vector<CostPie
   add({right, piece.to, piece.a, piece.middle, piece.c + bound * bound, piece.begin});
 }
 
-/// Outliers are few: where more than a quarter of the differences seem to be made by them, they are
-/// what the series is like, such as times of a machine with two speeds.
+/// Outliers are few: if they seem to cause more than a quarter of the differences, the differences
+/// are typical, for instance for a machine with two speeds.
 constexpr double kFewest = 0.75;
 
-/// Mean square of x[i+lag] - x[i] without steps and outliers: the median tells which these are.
+/// Returns the mean square of x[i+lag] - x[i] without steps and outliers, found from the median.
 double VarianceOfDifferences(std::span<const double> x, std::size_t lag) {
   std::vector<double> differences;
   for (std::size_t i = lag; i < x.size(); ++i) differences.push_back(std::abs(x[i] - x[i - lag]));
-  // of a normal variable the median of |.| is 0.6745 standard deviations, one in 2000 is above 3.5
+  // normal variable: median of |.| is 0.6745 standard deviations; one in 2000 is above 3.5
   const double most = 3.5 * Median(differences) / 0.6745;
   double sum = 0.0, all = 0.0, count = 0.0;
   for (const double one : differences) {
@@ -91,7 +91,7 @@ double VarianceOfDifferences(std::span<const double> x, std::size_t lag) {
   return count < kFewest * n ? all / n : sum / count;
 }
 
-/// Probability that at least `least` of n values are outliers.
+/// Returns the probability that at least `least` of n values are outliers.
 double AreOutliers(std::size_t n, std::size_t least, double share) {
   if (share >= 1.0) return 1.0;
   double sum = 0.0;
@@ -104,7 +104,7 @@ double AreOutliers(std::size_t n, std::size_t least, double share) {
   return std::min(1.0, sum);
 }
 
-/// Segments of a series and how sure the changes between them are.
+/// Segments of a series and the certainty of the changes between them.
 class Segments {
  public:
   Segments(std::span<const double> x, const Resolution& resolution)
@@ -117,8 +117,7 @@ class Segments {
     edges_ = RobustSegments(x, bound_, 2.0 * long_run * long_run * std::log(n));
     edges_.insert(edges_.begin(), 0);
     edges_.push_back(x.size());
-    // a root mean square of n differences of neighbours has a standard error of 0.87 / sqrt(n) of
-    // itself
+    // standard error of the root mean square of n neighbour differences: 0.87 / sqrt(n) of itself
     noise_ = noise.sigma == 0.0 ? 0.0 : long_run * (1.0 + 2.0 * 0.87 / std::sqrt(n));
   }
 
@@ -158,17 +157,17 @@ class Segments {
 
   std::size_t SizeOf(std::size_t segment) const { return edges_[segment + 1] - edges_[segment]; }
 
-  /// Values of a segment that lie further from a level than `far`, on the side of its sign.
+  /// Counts values of a segment farther from a level than `far`, on the side of its sign.
   std::size_t Beyond(std::size_t segment, double level, double far) const {
     return static_cast<std::size_t>(std::ranges::count_if(
         x_.subspan(edges_[segment], SizeOf(segment)),
         [=](double value) { return (value - level) * std::copysign(1.0, far) > std::abs(far); }));
   }
 
-  /// Probability that the values of the segment `fewer` are outliers of `level`, the level of its
-  /// neighbour. Outliers are as many as lie beyond half of the step, and at least half of the
-  /// values, for they decide the median. Their share is the share in the series beyond the bound,
-  /// with one more than seen.
+  /// Returns the probability that the values of segment `fewer` are outliers of `level`, the level
+  /// of its neighbour. It counts values beyond half of the step, at least half of the values, since
+  /// they determine the median. The outlier share is the share in the series beyond the bound, with
+  /// one more than observed.
   double AreOutliersOf(double level, std::size_t fewer) const {
     const double step = LevelOf(fewer).median - level;
     const double far = std::copysign(std::max(bound_, 0.5 * std::abs(step)), step);
@@ -179,12 +178,12 @@ class Segments {
     }
     const std::size_t n = SizeOf(fewer);
     const std::size_t half = (n + 1) / 2;
-    // where several are seen, they come in bursts: more of them are no less likely than half
+    // several outliers come in bursts: more of them are as likely as half
     const std::size_t least = outliers > 2 ? half : std::max(half, Beyond(fewer, level, far));
     return AreOutliers(n, least, static_cast<double>(outliers) / static_cast<double>(x_.size()));
   }
 
-  /// How often noise alone is expected to show the difference of the means, or outliers the change.
+  /// Returns a change with its expected number by noise: from differing means, or from outliers.
   LevelChange ChangeAt(std::size_t i) const {
     const Level before = LevelOf(i - 1), after = LevelOf(i);
     LevelChange change{edges_[i], before.median, after.median};
@@ -210,9 +209,9 @@ class Segments {
 std::vector<std::size_t> RobustSegments(std::span<const double> x, double bound, double penalty) {
   if (x.size() < 2) return {};
   const auto [least, most] = std::ranges::minmax(x);
-  // wider than the values by a little, so that equal ones have an interval too
+  // slightly wider than the range of values, so that equal values have an interval too
   const double margin = std::max(bound, 1e-12 * std::max(std::abs(least), std::abs(most)));
-  // differences of values near 0 keep their digits
+  // keeps the digits of differences of values near 0
   const double shift = 0.5 * (least + most);
   std::vector<CostPiece> costs = {
       {least - shift - margin, most - shift + margin, 0.0, 0.0, 0.0, 0}};
@@ -249,7 +248,7 @@ double Noise::LongRun() const {
 
 Noise NoiseOf(std::span<const double> x) {
   if (x.size() < 4) return {};
-  double variances[3];  // of differences over k values: 2 sigma^2 (1 - correlation^k)
+  double variances[3];  // variance of differences over lag k: 2 sigma^2 (1 - correlation^k)
   for (std::size_t lag = 1; lag <= 3; ++lag) variances[lag - 1] = VarianceOfDifferences(x, lag);
   if (variances[0] == 0.0) return {};
   const double two = variances[1] / variances[0] - 1.0;    // the correlation r

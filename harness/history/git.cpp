@@ -12,8 +12,8 @@
 namespace loopbench::harness {
 namespace {
 
-/// What says which repository, index and work tree a git command is about: `git rev-parse
-/// --local-env-vars`, without settings (GIT_CONFIG_*), which may hold who commits.
+/// Variables that select repository, index and work tree of git: `git rev-parse --local-env-vars`,
+/// without settings (GIT_CONFIG_*), which may contain the committer.
 constexpr const char* kLocal[] = {"GIT_ALTERNATE_OBJECT_DIRECTORIES",
                                   "GIT_OBJECT_DIRECTORY",
                                   "GIT_DIR",
@@ -28,7 +28,7 @@ constexpr const char* kLocal[] = {"GIT_ALTERNATE_OBJECT_DIRECTORIES",
                                   "GIT_SHALLOW_FILE",
                                   "GIT_COMMON_DIR"};
 
-/// Hooks and settings that are made for the code, and how long git waits for another git.
+/// Settings that disable hooks and monitors of the code's repository, and the lock timeout of git.
 constexpr const char* kSettings[] = {"core.hooksPath=/dev/null", "core.fsmonitor=false",
                                      "core.splitIndex=false", "core.filesRefLockTimeout=10000"};
 
@@ -37,19 +37,19 @@ std::string WithoutLineEnd(std::string text) {
   return text;
 }
 
-/// As it is called, in the user's environment.
+/// Runs git in the user's environment.
 ProgramResult PlainGit(std::vector<std::string> words) {
   words.insert(words.begin(), "git");
   return RunProgram(std::move(words));
 }
 
-/// In a folder as work tree, whatever the repository has for one.
+/// Returns the words for a folder as work tree, in place of the repository's own.
 std::vector<std::string> At(const std::filesystem::path& folder, std::vector<std::string> words) {
   words.insert(words.begin(), {"-C", folder.string(), "--work-tree=" + folder.string()});
   return words;
 }
 
-/// `who`: AUTHOR or COMMITTER.
+/// Returns variables of a default identity. `who`: AUTHOR or COMMITTER.
 std::vector<std::string> Nobody(const std::string& who) {
   return {"GIT_" + who + "_NAME=loopbench", "GIT_" + who + "_EMAIL=loopbench@localhost"};
 }
@@ -93,7 +93,7 @@ std::optional<std::string> GitRepository::BranchAt(const std::string& branch) co
 }
 
 std::string GitRepository::CheckedOutIn(const std::string& branch) const {
-  Try({"worktree", "prune"});  // those whose folder is gone
+  Try({"worktree", "prune"});  // removes work trees whose folder is gone
   std::istringstream lines(Get({"worktree", "list", "--porcelain"}));
   std::string folder;
   for (std::string line; std::getline(lines, line);) {
@@ -105,7 +105,7 @@ std::string GitRepository::CheckedOutIn(const std::string& branch) const {
 
 void GitRepository::Export(const std::string& commit, const std::filesystem::path& folder,
                            const std::string& index) const {
-  // through an index, which takes no path that leads out of the folder
+  // an index rejects paths that lead out of the folder
   Get({"read-tree", commit}, {"GIT_INDEX_FILE=" + index});
   const std::string listed =
       Get(At(folder, {"ls-files", "--stage", "-z"}), {"GIT_INDEX_FILE=" + index});
@@ -114,7 +114,7 @@ void GitRepository::Export(const std::string& commit, const std::filesystem::pat
   std::istringstream files(listed);  // "MODE OBJECT STAGE\tPATH\0"
   for (std::string file; std::getline(files, file, '\0');) {
     const std::size_t path = file.find('\t') + 1, object = file.find(' ') + 1;
-    // a path with a line end is none of a history's, and Commit() could not say it
+    // histories have no paths with a line end, and Commit() could not pass them
     if (!file.starts_with("100") || file.find('\n') != std::string::npos) continue;
     paths.push_back(file.substr(path));
     objects += file.substr(object, file.find(' ', object) - object) + '\n';
@@ -146,7 +146,7 @@ std::string GitRepository::Commit(const std::filesystem::path& folder, const std
   for (const auto& file : std::filesystem::recursive_directory_iterator(folder)) {
     if (!file.is_regular_file()) continue;
     paths.push_back(file.path().lexically_relative(folder).string());
-    names += "./" + paths.back() + '\n';  // git would unquote a name that begins with a quote
+    names += "./" + paths.back() + '\n';  // "./": git would unquote an initial quote
   }
   std::istringstream objects(
       Get(At(folder, {"hash-object", "-w", "--no-filters", "--stdin-paths"}), {}, names));
@@ -169,16 +169,16 @@ std::string GitRepository::Commit(const std::filesystem::path& folder, const std
 }
 
 CheckedOut FindCommit(const std::string& commit) {
-  // in the user's environment: HEAD is that of the work tree that a hook runs in
+  // in the user's environment, because HEAD is the one of the work tree of a hook
   const auto parse = [](const std::string& name) {
     const ProgramResult found = PlainGit({"rev-parse", "--verify", "--end-of-options", name});
     if (found.error != 0) throw ConfigError(found.Failure("git") + ", which finds commits");
     return found.Failure("git").empty() ? WithoutLineEnd(found.output) : "";
   };
   const std::string object = parse(commit);
-  const std::string hash = object.empty() ? "" : parse(object + "^{commit}");  // of a tag
+  const std::string hash = object.empty() ? "" : parse(object + "^{commit}");  // dereferences tags
   if (hash.empty()) return {};
-  // %cd of --date=format-local: UTC dates can be sorted as texts
+  // %cd with --date=format-local: UTC dates sort as text
   const ProgramResult date =
       RunProgram({"env", "TZ=UTC", "git", "show", "-s", "--format=%cd",
                   "--date=format-local:%Y-%m-%dT%H:%M:%SZ", "--no-show-signature", hash});
@@ -188,7 +188,7 @@ CheckedOut FindCommit(const std::string& commit) {
 namespace {
 
 void RequireBranchName(const GitRepository& git, const std::string& branch) {
-  // "--branch" refuses "-x" and "HEAD" as `git branch` does, and takes "@{-1}" for another name
+  // "--branch" rejects "-x" and "HEAD" as `git branch` does, and resolves "@{-1}"
   const ProgramResult checked = git.Try({"check-ref-format", "--branch", branch});
   if (checked.status == 0 && checked.output == branch + "\n") return;
   throw ConfigError(fmt::format("--branch: found \"{}\", expected the name of a branch", branch));
@@ -242,7 +242,7 @@ bool HistoryBranch::Commit(const std::string& message) {
         "--branch: found \"{}\" checked out in {}, expected a branch that is in no work tree",
         branch_, where));
   }
-  // git refuses when the branch is not at at_ any more; "" is a branch that is not there yet
+  // git refuses if the branch is no longer at at_; "" means a new branch
   const ProgramResult moved =
       git_.Try({"update-ref", "-m", message, "refs/heads/" + branch_, commit,
                 at_.empty() ? std::string(commit.size(), '0') : at_});

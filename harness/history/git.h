@@ -1,4 +1,4 @@
-// Git as the home of a history: commands, branches, places.
+// Git as storage of a history: commands, branches, locations.
 #pragma once
 
 #include <filesystem>
@@ -12,111 +12,111 @@
 
 namespace loopbench::harness {
 
-// git, called as a program.
+// The git program.
 
-/// The repository that the program was called in. What a hook's variables say (GIT_DIR,
-/// GIT_INDEX_FILE, ...) decides which one that is and nothing else: index and work tree are never
-/// the user's. No hook runs, and nothing of the user's settings changes what a file holds or which
-/// files there are.
+/// Git repository of the current directory. Variables of a hook (GIT_DIR, GIT_INDEX_FILE, ...) only
+/// select this repository: the user's index and work tree are never used. Hooks do not run. User
+/// settings cannot change file contents or the set of files.
 class GitRepository {
  public:
-  /// Throws ConfigError where there is none, or no git.
+  /// Throws ConfigError if there is no repository or no git.
   GitRepository();
 
-  /// @param variables  "NAME=value", beside the environment
-  /// @param input      what it reads
+  /// @param variables  "NAME=value", in addition to the environment
+  /// @param input      standard input
   ProgramResult Try(const std::vector<std::string>& words,
                     const std::vector<std::string>& variables = {},
                     const std::string& input = "") const;
 
-  /// What it writes, without the line end. Throws std::runtime_error with what git said.
+  /// Returns the output without the line end. Throws std::runtime_error with the message of git.
   std::string Get(const std::vector<std::string>& words,
                   const std::vector<std::string>& variables = {},
                   const std::string& input = "") const;
 
-  /// The commit that a branch is at.
+  /// Returns the commit of a branch.
   std::optional<std::string> BranchAt(const std::string& branch) const;
 
-  /// The work tree in which a branch is checked out; "" where in none.
+  /// Returns the work tree in which a branch is checked out; "" if none.
   std::string CheckedOutIn(const std::string& branch) const;
 
-  /// Writes the files of a commit into `folder`, byte for byte: no attribute, filter or line end of
-  /// the user's has a part in it. What is no regular file stays in the commit alone.
-  /// @param index  a file that is not there yet, outside of the folder: for Commit()
+  /// Writes the regular files of a commit into `folder`, byte for byte: attributes, filters and
+  /// line-end settings of the user have no effect. Other entries are not written.
+  /// @param index  a file that does not exist yet, outside of the folder: for Commit()
   void Export(const std::string& commit, const std::filesystem::path& folder,
               const std::string& index) const;
 
-  /// A new commit on top of `parent` ("": on none) with its files, and with all of `folder` as they
-  /// are, however the user ignores, converts or signs; `parent` itself where it has these files
-  /// already. Of the user, or of "loopbench" where git knows nobody.
-  /// @param index  what Export() made of the parent; where there is none, a file that is not there
+  /// Returns a new commit on top of `parent` ("": no parent) with its files and all of `folder`,
+  /// unchanged by ignore, conversion or signature settings. Returns `parent` if nothing changed.
+  /// The author is the user, or "loopbench" if git has no user.
+  /// @param index  file made by Export() for the parent; without a parent, a file that does not
+  /// exist
   std::string Commit(const std::filesystem::path& folder, const std::string& index,
                      const std::string& parent, const std::string& message) const;
 
  private:
-  std::string folder_;  ///< .git, of all work trees
+  std::string folder_;  ///< .git, common to all work trees
 };
 
-/// The commit that is checked out and its date (ISO 8601, UTC); "" and "" outside of a repository.
+/// Checked-out commit and its date (ISO 8601, UTC); both "" outside of a repository.
 struct CheckedOut {
   std::string commit, date;
 };
-/// @param commit  another commit than the one checked out, by any name that git resolves
-/// Throws ConfigError where there is no git.
+/// @param commit  a commit in any notation of git
+/// Throws ConfigError if there is no git.
 CheckedOut FindCommit(const std::string& commit = "HEAD");
 
-// A history that lives on a branch of a git repository of its own: a folder while it is worked on.
+// A history on a branch of its own in a git repository, edited in a folder.
 
-/// The branch's files in a temporary folder, of the repository that the program was called in.
-/// Nothing of the repository changes before Commit(), and several may be at work at once.
+/// Files of a branch of the current repository, in a temporary folder. The repository changes only
+/// in Commit(). Several processes may work at once.
 class HistoryBranch {
  public:
-  /// Throws ConfigError when there is no such branch and it may not begin, when it is no name of a
-  /// branch, or has files but no history.jsonl; std::runtime_error with what git said.
+  /// Throws ConfigError if the branch is absent and `may_begin` is false, if its name is invalid,
+  /// or if it has files but no history.jsonl. Throws std::runtime_error with the message of git.
   explicit HistoryBranch(std::string branch, bool may_begin = false);
 
   const std::filesystem::path& folder() const { return folder_; }
 
-  /// The message with the branch's name in the place of the folder's: "measured:history.jsonl".
+  /// Returns the message with the branch in place of the folder: "measured:history.jsonl".
   std::string Named(std::string message) const;
 
-  /// Puts all changes onto the branch, which begins here where it is to; nothing when there are
-  /// none. False when somebody else changed the branch meanwhile: the changes are then to be made
-  /// again, to a new HistoryBranch. Throws ConfigError when the branch is checked out somewhere,
-  /// std::runtime_error with what git said.
+  /// Commits all changes to the branch, and creates it if necessary; does nothing without changes.
+  /// Returns false if another process has changed the branch: repeat the changes in a new
+  /// HistoryBranch. Throws ConfigError if the branch is checked out anywhere, and
+  /// std::runtime_error with the message of git.
   bool Commit(const std::string& message);
 
  private:
   std::string Index() const { return (temporary_.path() / "index").string(); }
 
   GitRepository git_;
-  std::string branch_, at_;  ///< at_: the commit that was read, "" where the branch is to begin
+  std::string branch_, at_;  ///< at_: the commit that was read, "" for a new branch
   TemporaryFolder temporary_;
   std::filesystem::path folder_;
 };
 
-// Where a history lies, as users say it.
+// Location of a history, as given by users.
 
-/// A folder, or a branch of the repository that the program is called in: one of both.
+/// Either a folder or a branch of the current repository.
 struct HistoryPlace {
   std::filesystem::path store;
   std::string branch;
 };
 
-/// A history that is open.
+/// An open history.
 struct OpenHistory {
   std::filesystem::path folder;
-  /// A message as users understand it: of a branch its folder is a temporary one.
+  /// Rewrites a message for users: for a branch, the folder is temporary.
   std::function<std::string(std::string)> named;
 };
 
-/// Calls `read` with the history. What it throws names the branch, not its folder. Throws as
-/// HistoryBranch besides, and ConfigError when not exactly one of both is said.
+/// Calls `read` with the history. Errors contain the branch instead of its folder. Throws as
+/// HistoryBranch, and ConfigError unless exactly one of both is given.
 void ReadPlace(const HistoryPlace& place, const std::function<void(const OpenHistory&)>& read);
 
-/// The same for `change`, which says what it did: the message of the branch's commit. It is called
-/// again, with what is there then, when somebody else changed the branch meanwhile.
-/// @param may_begin  a branch that is not there begins
+/// Calls `change`, which returns the commit message for the branch. If another process has changed
+/// the branch meanwhile, calls it again on the new state.
+/// @param may_begin  creates an absent branch
 void ChangePlace(const HistoryPlace& place, bool may_begin,
                  const std::function<std::string(const OpenHistory&)>& change);
 

@@ -27,7 +27,7 @@ namespace {
 constexpr const char* kFile = "history.jsonl";
 constexpr const char* kAccepted = "accepted";
 
-/// Without the series of a run: those of samples of times stay.
+/// Returns a record without the time series of its run, but with samples of times.
 Record Slim(const Record& record) {
   Record slim;
   for (const auto& [key, value] : record.items()) {
@@ -51,7 +51,7 @@ std::string MachineOf(const std::vector<Record>& records) {
   return *machines.begin();
 }
 
-/// 2026-11-24, or 2026-11-24T09:30:00Z: dates in UTC are in order as texts.
+/// Accepts 2026-11-24 or 2026-11-24T09:30:00Z: UTC dates sort as text.
 bool IsDate(const std::string& text) {
   constexpr std::string_view kPattern = "dddd-dd-ddTdd:dd:ddZ";
   if (text.size() != 10 && text.size() != kPattern.size()) return false;
@@ -70,8 +70,8 @@ bool IsDate(const std::string& text) {
 
 std::filesystem::path FileOf(const std::filesystem::path& folder) { return folder / kFile; }
 
-/// A file of results by its name in a line, which may come from anywhere: it stays in the history,
-/// links followed.
+/// Returns a results file by its name in a line. Rejects untrusted names outside of the history,
+/// after following links.
 std::filesystem::path ResultsIn(const std::filesystem::path& folder, const std::string& name) {
   const std::filesystem::path path = name, whole = std::filesystem::weakly_canonical(folder);
   const std::filesystem::path end = std::filesystem::weakly_canonical(folder / path);
@@ -114,14 +114,14 @@ void Apply(const Record& line, const std::filesystem::path& folder, History* his
     entries.push_back(std::move(entry));
     return;
   }
-  if (same->mark == kAccepted) {  // measured again: what a person said of the commit stays
+  if (same->mark == kAccepted) {  // measured again: the user's mark remains
     entry.mark = same->mark;
     entry.note = same->note;
   }
   *same = std::move(entry);
 }
 
-/// A file that is not there yet: what was measured before is what an earlier line points at.
+/// Returns an unused file name, since earlier lines refer to existing files.
 std::filesystem::path NewResults(const std::filesystem::path& folder, const HistoryEntry& entry) {
   const std::string stem = FileName(entry.commit + "-" + Fnv1a(entry.machine).substr(0, 6));
   std::filesystem::path results = "results/" + stem + ".jsonl";
@@ -143,11 +143,11 @@ void RequireSomethingToFollow(const HistoryEntry& entry, const std::vector<Recor
   }
 }
 
-/// The commit that is called so, or the only one whose name begins so.
+/// Returns the commit with this name, or the only one with this prefix.
 std::string CommitNamed(const History& history, const std::string& name,
                         const std::filesystem::path& folder) {
   const auto begins_so = [&name](const std::string& commit) {
-    // not within a letter of UTF-8
+    // not within a UTF-8 character
     return !name.empty() && commit.starts_with(name) &&
            !ContinuesCharacter(commit.c_str()[name.size()]);
   };
@@ -164,7 +164,7 @@ std::string CommitNamed(const History& history, const std::string& name,
 
 using IsWanted = std::function<bool(const HistoryEntry&)>;
 
-/// The last of the entries that are wanted and marked good or accepted.
+/// Returns the last wanted entry marked good or accepted.
 std::optional<HistoryEntry> LastMarked(const History& history, const IsWanted& is_wanted) {
   std::optional<HistoryEntry> last;
   for (const HistoryEntry& entry : history.entries) {
@@ -211,7 +211,7 @@ History ReadHistory(const std::filesystem::path& folder) {
 }
 
 std::vector<Record> ReadResults(const HistoryEntry& entry, std::vector<std::string>* warnings) {
-  // whatever the file is called: names once had their ending in the middle
+  // with any file name: names once had their ending in the middle
   std::vector<Record> records;
   LineReader reader(entry.results, [&records](Record record, const LinePlace&) {
     records.push_back(std::move(record));
@@ -230,7 +230,7 @@ HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entr
   RequireSomethingToFollow(entry, records);
   entry.machine = MachineOf(records);
   if (warnings != nullptr && std::filesystem::exists(FileOf(folder))) {
-    *warnings = ReadHistory(folder).warnings;  // before the torn line is taken away
+    *warnings = ReadHistory(folder).warnings;  // before the store removes the incomplete line
   }
   ResultStore lines(FileOf(folder), /*waits=*/true);  // one writer at a time
   const History history = ReadHistory(folder);
@@ -266,7 +266,7 @@ HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entr
 
 Mark MarkInHistory(const std::filesystem::path& folder, Mark mark,
                    std::vector<std::string>* warnings) {
-  History history = ReadHistory(folder);  // throws where there is none: a mark begins none
+  History history = ReadHistory(folder);  // throws if there is no history: marks create none
   if (warnings != nullptr) *warnings = history.warnings;
   mark.commit = CommitNamed(history, mark.commit, folder);
   ResultStore lines(FileOf(folder), /*waits=*/true);

@@ -19,12 +19,12 @@ bool IsFailure(const Finding& finding) {
   return finding.judgement == Judgement::kWorse || finding.judgement == Judgement::kDifferent;
 }
 
-/// Nobody is called by an "@name" in a comment.
+/// Disables "@name" mentions in a comment.
 std::string Quiet(const std::string& markdown) {
   std::string quiet;
   for (const char c : markdown) {
     quiet += c;
-    if (c == '@') quiet += "&#8203;";  // a space without width
+    if (c == '@') quiet += "&#8203;";  // zero-width space
   }
   return quiet;
 }
@@ -51,7 +51,7 @@ std::vector<Missing> MissingCases(const ComparisonReport& report, const CompareO
   return missing;
 }
 
-/// A list of cases, named as far as one looks at them.
+/// Lists cases by name, up to a readable number.
 std::string Listed(const std::string& what, const std::vector<std::string>& cases) {
   constexpr std::size_t kMostNamed = 20;
   if (cases.empty()) return "";
@@ -158,7 +158,7 @@ svg text { font: 12px system-ui, 'DejaVu Sans', sans-serif; fill: var(--text); }
 .worse { color: var(--gap); font-weight: 600; }
 )";
 
-/// Light or dark as the system is.
+/// Chooses the light or dark theme of the system.
 constexpr const char* kThemeScript =
     "const dark = matchMedia('(prefers-color-scheme: dark)');\n"
     "const paint = () => { document.documentElement.dataset.theme = dark.matches ? 'dark' : "
@@ -174,13 +174,13 @@ struct Chart {
 
   Chart(const History& entries, const HistorySeries& one) : history(entries), series(one) {
     low = std::ranges::min_element(series.values, {}, &HistoryValue::value)->value;
-    // a single slow repetition would press all levels to the floor: its line ends at the frame
+    // clip at the frame: one slow repetition would otherwise flatten all levels
     constexpr double kRoom = 1.25;
     const double largest = std::ranges::max_element(series.values, {}, &HistoryValue::value)->value;
     high = std::min(std::ranges::max_element(series.values, {}, &HistoryValue::upper)->upper,
                     kRoom * largest);
     logarithmic = low > 0.0 && high / low > 20.0;
-    // what differs in the last bits alone is drawn as equal: an axis needs numbers between
+    // values that differ only by round-off are drawn as equal: an axis needs numbers between
     if (high - low <= 4e-12 * std::max(std::abs(low), std::abs(high))) {
       const double room = high == 0.0 ? 1.0 : 0.1 * std::abs(high);
       low -= room;
@@ -225,7 +225,7 @@ struct Chart {
         kLeft, kTop, bottom, kWidth - kRight);
     const std::size_t by = std::max<std::size_t>(1, (series.values.size() + 6) / 7);
     for (std::size_t i = 0; i < series.values.size(); i += by) {
-      constexpr double kHalfLabel = 44;  // twelve digits
+      constexpr double kHalfLabel = 44;  // width of twelve digits
       const bool is_last = X(i) + kHalfLabel > kWidth;
       svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\">{}</text>\n",
                          is_last ? kWidth - 2 : X(i), bottom + 16, is_last ? "end" : "middle",

@@ -21,19 +21,18 @@
 namespace loopbench::harness {
 namespace {
 
-/// What a change of each kind of measure must be at least, as `compare` has it (compare.h), and the
-/// noise that is assumed where a series has none: a third of it, so that one value that far off is
-/// just no outlier.
+/// Returns the minimum change for each kind of measure, as in `compare` (compare.h). The assumed
+/// noise of constant series is a third of it, so that a single such value is just no outlier.
 /// @param most  largest value of the series
 Resolution ResolutionOf(Rule rule, double most, double places) {
   switch (rule) {
     case Rule::kTime:
-      // below the 2 % that one comparison of two runs can see: many runs see more
+      // below the 2 % that one comparison of two runs can detect: many runs detect more
       return {.noise = 0.002, .least = 0.01, .places = places};
     case Rule::kInstructions:
       return {.noise = std::log(1.02) / 3.0, .least = std::log(1.02), .places = places};
     case Rule::kCount: {
-      // any: half of what one more is, as long as logarithms can tell the two apart
+      // any change: half of one count, if logarithms can resolve it
       const double least = std::max(0.5 * std::log1p(1.0 / std::max(most, 1.0)), 1e-13);
       return {.noise = least / 3.0, .least = least, .places = places};
     }
@@ -42,7 +41,7 @@ Resolution ResolutionOf(Rule rule, double most, double places) {
   }
 }
 
-/// What all cases share is taken from a series that has less noise than this share without it.
+/// The common slowdown is removed from a series if this reduces its noise to less than this share.
 constexpr double kQuieter = 0.7;
 
 /// Errors below are round-off and equal (CompareOptions::error_floor).
@@ -56,7 +55,7 @@ Rule RuleOfTracked(const std::string& measure) {
   return Rule::kNone;
 }
 
-/// NaN where none is steady.
+/// Returns NaN if no value is steady.
 double MedianOfSteady(const HistorySeries& series) {
   std::vector<double> steady;
   for (const HistoryValue& value : series.values) {
@@ -65,7 +64,7 @@ double MedianOfSteady(const HistorySeries& series) {
   return Median(steady);
 }
 
-/// @param cases  of which each has a median above 0
+/// @param cases  series with medians above 0
 HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
   HistorySeries pooled;
   pooled.machine = cases.front()->machine;
@@ -82,7 +81,7 @@ HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
   }
   for (const auto& [entry, values] : ratios) {
     const double middle = Median(values);
-    if (!(middle > 0.0)) continue;  // a clock that stood still
+    if (!(middle > 0.0)) continue;  // a clock without progress
     pooled.values.push_back({.entry = entry, .value = middle, .upper = middle});
   }
   return pooled;
@@ -108,7 +107,7 @@ void AddValues(const std::string& machine, std::size_t entry, const std::vector<
   }
 }
 
-/// Outcomes and doubts as they were last.
+/// Latest outcomes and warnings.
 class Endings {
  public:
   void Add(const std::string& machine, std::size_t entry, const std::vector<Record>& records,
@@ -117,7 +116,7 @@ class Endings {
     for (const Record& record : records) ++times_there[CaseText(record)];
     for (const Record& record : records) {
       const std::string one = CaseText(record);
-      if (times_there[one] > 1) continue;  // nobody knows which it was before
+      if (times_there[one] > 1) continue;  // ambiguous: several records of this case
       for (const char* measure : {"outcome", "warnings"}) {
         if (record.Find(measure) == nullptr) continue;
         std::string now = record.Text(measure);
@@ -134,14 +133,14 @@ class Endings {
   std::map<Key, std::string> last_;
 };
 
-/// Values below count as this one, so that there is a logarithm: NaN where there is nothing to say.
+/// Returns the lower bound of values, so that logarithms exist; NaN if the measure has no levels.
 double FloorOf(const HistorySeries& series) {
   switch (series.rule) {
     case Rule::kError:
       return kErrorFloor;
     case Rule::kCount:
     case Rule::kInstructions:
-      return 0.5;  // none is as far from one as one from two
+      return 0.5;  // the step from 0 to 1 then equals the step from 1 to 2
     default:
       break;
   }
@@ -157,7 +156,7 @@ void FindChangesOf(HistorySeries* series, double places) {
   const double floor = FloorOf(*series);
   if (std::isnan(floor)) return;
   double most = 0.0;
-  std::vector<std::size_t> steady;  // their places
+  std::vector<std::size_t> steady;  // indices of steady values
   std::vector<double> values, logarithms, without;
   for (std::size_t i = 0; i < series->values.size(); ++i) {
     const HistoryValue& one = series->values[i];
@@ -168,7 +167,7 @@ void FindChangesOf(HistorySeries* series, double places) {
     logarithms.push_back(std::log(std::max(one.value, floor)));
     without.push_back(logarithms.back() - std::log(one.common));
   }
-  // where cases vary on their own, what a few of them do would only be added to the others
+  // if cases vary independently, the common part would only add noise of a few cases
   if (NoiseOf(without).LongRun() < kQuieter * NoiseOf(logarithms).LongRun()) {
     logarithms.swap(without);
     for (std::size_t i = 0; i < steady.size(); ++i) {
@@ -190,10 +189,10 @@ void FindChangesOf(HistorySeries* series, double places) {
   for (LevelChange& change : series->changes) change.at = steady[change.at];
 }
 
-/// Marks times at which the machine had another speed than usual about then: that of the fastest
-/// quarter of the entries up to twenty before and behind, so that a machine that is slow for most
-/// of a month has its speed still, and one that was changed for good has its new one soon.
-/// @param compilers  by entry: another one may make other instructions of the yardstick
+/// Marks times measured at an unusual machine speed. The usual speed is the fastest quarter of up
+/// to twenty entries before and after. It survives a month of mostly slow runs, and soon follows a
+/// permanent change.
+/// @param compilers  by entry: compilers may generate different instructions for the yardstick
 void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<HistorySeries>* all) {
   constexpr std::size_t kAround = 20;
   using Builder = std::pair<std::string, std::string>;  ///< machine and compiler
@@ -229,7 +228,7 @@ void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<History
   }
 }
 
-/// Pools times where there are many cases of one machine, and tells the cases what they share.
+/// Pools times if a machine has many cases, and sets their common slowdown.
 std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
   constexpr std::size_t kMany = 5;
   std::map<std::pair<std::string, std::string>, std::vector<HistorySeries*>> times;
@@ -288,7 +287,7 @@ HistoryFindings FindingsOf(const History& history) {
 }
 namespace {
 
-/// A level as a cell: counts with all their digits.
+/// Returns a level as a cell: counts with all their digits.
 Value LevelOf(const HistorySeries& series, double level) {
   const bool is_whole = series.rule == Rule::kCount && level == std::floor(level) && level < 1e15;
   return is_whole ? Value(static_cast<std::int64_t>(level)) : Value(level);

@@ -12,18 +12,18 @@
 
 namespace loopbench::harness {
 
-// Measures over commits, and where they change.
+// Measures over commits and their level changes.
 
-/// A commit's value in a series.
+/// Value of a commit in a series.
 struct HistoryValue {
-  std::size_t entry = 0;            ///< of the history
-  double value = 0.0, upper = 0.0;  ///< of times the least and the 90th percentile
-  double yardstick = 0.0;           ///< of times [ns], NaN where not known
-  /// Of times: the machine was as fast as it usually is about then, or it is not known how fast it
-  /// was. What it did at another speed says nothing of levels.
+  std::size_t entry = 0;            ///< index into the history
+  double value = 0.0, upper = 0.0;  ///< for times: minimum and 90th percentile
+  double yardstick = 0.0;           ///< for times [ns], NaN if unknown
+  /// False for times measured while the machine was slower or faster than usual at that time; true
+  /// if its speed is unknown. Unsteady values are not used for levels.
   bool is_steady = true;
-  /// Of times: by what all cases of the entry were slower than usual; 1 where there are few cases,
-  /// or none that took any time.
+  /// For times: common slowdown of all cases of the entry; 1 if there are few cases or none with a
+  /// measurable time.
   double common = 1.0;
 };
 
@@ -33,45 +33,44 @@ struct HistorySeries {
   std::string measure, unit;
   Rule rule = Rule::kNone;
   std::vector<HistoryValue> values;
-  /// at: place in `values`; levels: medians of the values, of times without what all cases share
-  /// where it is without it that they are found
+  /// at: index into `values`; levels: medians of the values. For times found after removing the
+  /// common slowdown, the levels are without it too.
   std::vector<LevelChange> changes;
 
-  std::size_t Unsteady() const;  ///< values at another speed of the machine
+  std::size_t Unsteady() const;  ///< number of values at another speed of the machine
 };
 
-/// The case of the series that pools times: the median over all cases of their ratios to their own
-/// medians, for changes that all cases have and none shows by itself.
+/// Case of the pooled series of times: median over all cases of their ratios to their own medians.
+/// It shows changes that are common to all cases but too small in each.
 inline constexpr const char* kAllCases = "all cases";
 
-/// How a case ended, or why it was doubted, where that is other than at the commit before.
+/// Change of the outcome or of the warnings of a case since the previous commit.
 struct EndingChange {
   std::string machine, one, measure;  ///< measure: "outcome" or "doubts"
-  std::size_t entry = 0;              ///< of the history
+  std::size_t entry = 0;              ///< index into the history
   std::string before, after;
 };
 
 struct HistoryFindings {
   std::vector<HistorySeries> series;
   std::vector<EndingChange> endings;
-  std::vector<std::string> warnings;  ///< torn lines of results
+  std::vector<std::string> warnings;  ///< incomplete lines of results
 
-  std::size_t Steps() const;  ///< of both
+  std::size_t Steps() const;  ///< number of changes in series and endings
 };
 
-/// All series with their changes, those of times among values that are steady, times of five and
-/// more cases pooled too. What these cases have in common is then a matter of the pooled series
-/// alone: a machine that is slower for a week is one step and not one in every case. Throws
-/// std::runtime_error when a file of results cannot be read.
+/// Finds all series with their changes. Times use steady values only; those of five and more cases
+/// are also pooled. A change common to these cases appears only in the pooled series: a machine
+/// that is slow for a week is one step. Throws std::runtime_error if a results file cannot be read.
 HistoryFindings FindingsOf(const History& history);
 
-// The steps of a history as rows.
+// Steps of a history as table rows.
 
-/// A row for each step, newest first; of one commit other endings first. "ratio" is empty where the
-/// level was 0 or is a text.
+/// Returns a row for each step, newest first; in one commit changed outcomes come first. "ratio" is
+/// empty if the level was 0 or a text.
 Table StepTable(const History& history, const HistoryFindings& found);
 
-/// How many times were left out; nothing where none was.
+/// Returns the number of omitted times as a sentence; nothing if there are none.
 std::optional<std::string> UnsteadyNote(const HistoryFindings& found);
 
 }  // namespace loopbench::harness

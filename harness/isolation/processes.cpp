@@ -35,12 +35,12 @@
 namespace loopbench::harness {
 namespace {
 
-/// R, S, D, T, .. of /proc/PID/stat; '?' where there is none.
+/// Returns the state R, S, D, T, .. from /proc/PID/stat; '?' if absent.
 char StateOf(pid_t pid) {
   std::ifstream file(fmt::format("/proc/{}/stat", pid));
   std::string line;
   std::getline(file, line);
-  // "pid (name) state ..": the name may hold anything, parentheses too
+  // "pid (name) state ..": the name may contain any character, even parentheses
   const std::size_t name_end = line.rfind(") ");
   return name_end == std::string::npos || name_end + 2 >= line.size() ? '?' : line[name_end + 2];
 }
@@ -58,7 +58,7 @@ void ChildWatch::Look(bool unread) {
   const Clock::time_point now = Clock::now();
   const double since = std::chrono::duration<double>(now - looked_).count();
   if (since < kLook_s) return;
-  constexpr double kComputes = 0.01;  // of the time: one that naps between glances does not
+  constexpr double kComputes = 0.01;  // minimum CPU share of computing; naps use less
   const double used = cpu_s();
   const bool computed = used - cpu_before_ > kComputes * since;
   if (computed || unread) {
@@ -88,8 +88,7 @@ Interruption::Interruption() {
     if (before_[i].sa_handler == SIG_IGN) continue;
     struct sigaction remember = {};
     remember.sa_handler = &Remember;
-    // what is being written is written to its end; waiting for processes is interrupted all the
-    // same
+    // SA_RESTART: writes in progress complete; waiting for processes is still interrupted
     remember.sa_flags = static_cast<int>(SA_RESTART | SA_RESETHAND);
     ::sigaction(kSignals[i], &remember, nullptr);
   }
@@ -122,7 +121,7 @@ std::optional<std::string> PlantedFault(const Record& keys) {
   if (fault == "garbage") return "{\"kind\": \"accu\x01\xff";
   if (fault == "memory") {
     std::vector<std::unique_ptr<char[]>> hoard;
-    for (;;) hoard.emplace_back(new char[1 << 26]);  // asked for, not touched: quick
+    for (;;) hoard.emplace_back(new char[1 << 26]);  // requested but not touched: fast
   }
   while (fault == "hang") ::pause();
   return std::nullopt;
@@ -146,7 +145,7 @@ double Seconds(const timeval& time) {
   throw std::runtime_error(fmt::format("cannot {}: {}", what, std::strerror(errno)));
 }
 
-/// Address space in use [bytes].
+/// Returns the address space in use [bytes].
 rlim_t AddressSpace() {
   std::ifstream statm("/proc/self/statm");
   rlim_t pages = 0;
@@ -159,7 +158,7 @@ void SetLimits(const ProcessLimits& limits) {
   ::setrlimit(RLIMIT_CORE, &no_core);
   if (limits.memory_mb <= 0.0 || !LimitsMemory()) return;
   const double allowed = limits.memory_mb * 1024.0 * 1024.0;
-  constexpr double kNoLimit = 1e18;  // beyond any machine, and soon beyond the integer
+  constexpr double kNoLimit = 1e18;  // beyond any machine, and below the integer overflow
   if (allowed >= kNoLimit) return;
   const rlim_t bytes = AddressSpace() + static_cast<rlim_t>(allowed);
   const rlimit memory = {bytes, bytes};
@@ -175,12 +174,12 @@ void WriteAll(int descriptor, std::string_view text) {
   }
 }
 
-/// The child's life. It never returns: destructors and exit handlers belong to the parent.
+/// Runs the child. Never returns: destructors and exit handlers belong to the parent.
 [[noreturn]] void Work(int answer, pid_t parent, const ProcessLimits& limits,
                        const std::function<std::string()>& work) {
   Interruption::LeaveToParent();
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // it died before the line above
+  if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // the parent died before the line above
   SetLimits(limits);
   ExitWithoutMemory(kMemoryExit, "");
   try {
@@ -208,9 +207,9 @@ struct Child {
   Clock::time_point begin;
   ChildWatch watch;
   std::string text;
-  std::string killed;  ///< why, in words
+  std::string killed;  ///< reason, as text
 
-  /// No sooner than in this time can it be over its limits or be worth a look [s].
+  /// Returns the time before which no limit can be exceeded and no check is needed [s].
   double Wait() const {
     if (!killed.empty() || limits.cpu_s <= 0.0) return kLook_s;
     return std::clamp(limits.cpu_s - watch.cpu_s(), 0.01, kLook_s);
@@ -225,11 +224,11 @@ struct Child {
     } else {
       return;
     }
-    ::kill(pid, SIGKILL);  // its pipe closes, which the next wait sees
+    ::kill(pid, SIGKILL);  // its pipe closes, which the next Wait() detects
   }
 };
 
-/// The children under way; kills them when it goes.
+/// Running children; the destructor kills them.
 class Children {
  public:
   ~Children() {
@@ -246,7 +245,7 @@ class Children {
              const std::function<std::string()>& work) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) Fail("open a pipe");
-    std::fflush(nullptr);  // or the child would hold a copy of what waits to be printed
+    std::fflush(nullptr);  // otherwise the child would copy pending output
     const pid_t parent = ::getpid();
     const pid_t pid = ::fork();
     if (pid == 0) {
@@ -262,7 +261,7 @@ class Children {
     running_.push_back({piece, pid, ends[0], limits, Clock::now(), ChildWatch(pid), {}, {}});
   }
 
-  /// Waits until something happens and returns the children that ended.
+  /// Waits for an event and returns the children that ended.
   std::vector<Child> Wait() {
     std::vector<pollfd> waiting;
     double wait_s = kLook_s;
@@ -288,7 +287,7 @@ class Children {
   }
 
  private:
-  /// Takes what the pipe has; false at its end.
+  /// Reads available bytes from the pipe; returns false at its end.
   static bool Read(Child& child) {
     char buffer[1 << 16];
     const ssize_t count = ::read(child.answer, buffer, sizeof buffer);
@@ -389,7 +388,7 @@ void RunInProcesses(std::size_t count, int jobs,
 }
 namespace {
 
-/// @param deliver  takes what was printed, before anything is thrown
+/// @param deliver  receives the printed text, before any exception
 int FromChild(const std::string& name, const ProcessLimits& limits,
               const std::function<int()>& work,
               const std::function<void(const std::string&)>& deliver) {
@@ -399,7 +398,7 @@ int FromChild(const std::string& name, const ProcessLimits& limits,
     RunInProcesses(
         1, 1,
         [&](std::size_t) {
-          // line by line, so that a killed child loses no line
+          // line by line, so that a killed child loses no complete line
           ::dup2(output.descriptor(), STDOUT_FILENO);
           ::setlinebuf(stdout);
           return std::to_string(FinishOutput(work()));
@@ -430,16 +429,16 @@ int TextFromChild(const std::string& name, const ProcessLimits& limits,
 }
 namespace {
 
-constexpr double kBusy_s = 0.1;     ///< of a process: starting it (some 5 ms) is then little
-constexpr std::size_t kMost = 500;  ///< tasks in one process: what a crash costs again
-constexpr std::size_t kGrowth = 4;  ///< from one process to the next, while times are a guess
-constexpr std::size_t kLongestHead = 100;  ///< of an answer: three numbers
+constexpr double kBusy_s = 0.1;     ///< duration of a process; its start takes about 5 ms
+constexpr std::size_t kMost = 500;  ///< maximum tasks of a process: all repeat after a crash
+constexpr std::size_t kGrowth = 4;  ///< from one process to the next, while times are estimates
+constexpr std::size_t kLongestHead = 100;  ///< maximum size of an answer's header: three numbers
 
 double WallSecondsSince(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// "LENGTH CPU_S WALL_S\n" and the answer, for each task.
+/// Returns "LENGTH CPU_S WALL_S\n" and the answer, for each task.
 std::string AnswersOf(const std::vector<std::size_t>& tasks,
                       const std::function<std::string(std::size_t)>& work) {
   std::string answers;
@@ -454,7 +453,7 @@ std::string AnswersOf(const std::vector<std::size_t>& tasks,
   return answers;
 }
 
-/// Empty unless there is an answer to every task.
+/// Returns an empty list unless each task has an answer.
 std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
                                     const std::string& text) {
   std::vector<TaskResult> results;
@@ -477,19 +476,19 @@ std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
   return at == text.size() ? results : std::vector<TaskResult>();
 }
 
-/// Which tasks go into the next process.
+/// Distributes tasks to processes.
 class Batches {
  public:
   Batches(std::size_t count, int jobs) : count_(count), jobs_(static_cast<std::size_t>(jobs)) {}
 
-  /// Nothing when all are under way or done.
+  /// Returns nothing if all tasks are running or done.
   std::vector<std::size_t> Next() {
     if (!alone_.empty()) {
       const std::size_t task = alone_.front();
       alone_.pop_front();
       return {task};
     }
-    // so that the last processes end together
+    // smaller batches at the end, so that the last processes end together
     const std::size_t fair = std::max<std::size_t>(1, (count_ - next_) / (2 * jobs_));
     const std::size_t size = std::min({size_, fair, count_ - next_});
     std::vector<std::size_t> tasks(size);
@@ -510,7 +509,7 @@ class Batches {
 
  private:
   std::size_t count_, jobs_, next_ = 0, size_ = 1;
-  std::deque<std::size_t> alone_;  ///< whose process did not answer
+  std::deque<std::size_t> alone_;  ///< tasks of failed processes
 };
 
 }  // namespace
@@ -521,8 +520,8 @@ std::size_t RunInSharedProcesses(std::size_t count, int jobs,
                                  const std::function<void(const std::vector<TaskResult>&)>& done,
                                  const SharedNews& news) {
   Batches batches(count, jobs);
-  std::deque<std::vector<std::size_t>> processes;  // by number; those that ended are empty
-  std::size_t begun = 0;  // tasks are started in order, but for a second time
+  std::deque<std::vector<std::size_t>> processes;  // by number; finished ones are empty
+  std::size_t begun = 0;                           // tasks start in order, except for repetitions
   const auto next = [&]() -> std::optional<std::size_t> {
     std::vector<std::size_t> tasks = batches.Next();
     if (tasks.empty()) return std::nullopt;
@@ -555,7 +554,7 @@ std::size_t RunInSharedProcesses(std::size_t count, int jobs,
       return;
     }
     if (results.empty())
-      results = {{tasks.front(), result}};  // who reads it will say what is wrong
+      results = {{tasks.front(), result}};  // the reader of the records reports the error
     batches.Answered(tasks.size(), result.cpu_s);
     done(results);
   };

@@ -1,4 +1,4 @@
-// Child processes with limits: their watch, interruption, faults and prints.
+// Child processes with limits: supervision, interruption, injected faults and output.
 #pragma once
 
 #include <sys/types.h>
@@ -18,34 +18,34 @@
 
 namespace loopbench::harness {
 
-// What a child process does with its time, seen from its parent.
+// Supervision of a child process by its parent.
 //
-// Wall time says nothing about a piece of work: sixty-four pieces on two processors take
-// thirty-two times as long, and a machine that sleeps for a night takes a night. So a child is
-// judged by two clocks that other work does not move:
+// Wall time is unsuitable as a limit: sixty-four pieces on two processors take thirty-two times as
+// long, and suspend time must not count. A child is therefore limited by two clocks that do not
+// depend on other work:
 //   - its CPU time, which the kernel counts;
-//   - how long it has been asleep of its own accord. Work that computes has no reason to sleep: it
-//     reads nothing, waits for nobody, and its answer is taken from it as it comes.
-// Asleep is what the kernel calls so (state S). A child that is ready to run but gets no processor
-// (R), is stopped or traced (T, t) or waits for a disk or for swapped memory (D) is held up by the
-// machine; that time counts neither for nor against it. Since the parent may be stopped too, one
-// look adds no more than the time that should lie between two looks, however long it was.
+//   - its time asleep by itself. Computing work has no reason to sleep: it reads nothing, waits for
+//     no other process, and its answer is read at once.
+// Asleep is the kernel's state S. Time in other states without computing is ignored, because the
+// machine causes it: ready without a processor (R), stopped or traced (T, t), waiting for a disk or
+// swapped memory (D). Since the parent may be stopped too, a check adds at most the nominal time
+// between two checks.
 
-/// Time between two looks at a child [s].
+/// Time between two checks of a child [s].
 inline constexpr double kLook_s = 0.25;
 
 class ChildWatch {
  public:
-  /// `pid` is a child that has not been waited for.
+  /// `pid` must be a child that has not been waited for.
   explicit ChildWatch(pid_t pid) : pid_(pid) {}
 
-  /// Looks at the child, unless the last look is less than kLook_s ago. `unread`: its answer waits
-  /// to be read, which is not its fault.
+  /// Checks the child, unless the last check was less than kLook_s ago. `unread`: its answer is
+  /// waiting to be read, which does not count as sleep.
   void Look(bool unread);
 
-  /// CPU time used so far, all threads [s].
+  /// Returns the CPU time used so far by all threads [s].
   double cpu_s() const;
-  /// Time asleep on end, as far as looks have found, since it last computed [s].
+  /// Returns the continuous time asleep since it last computed, as seen by the checks [s].
   double idle_s() const { return idle_s_; }
 
  private:
@@ -53,25 +53,24 @@ class ChildWatch {
 
   pid_t pid_;
   Clock::time_point looked_ = Clock::now();
-  double cpu_before_ = 0.0;  ///< at the last look
+  double cpu_before_ = 0.0;  ///< at the last check
   double idle_s_ = 0.0;
 };
 
-// Ctrl-C (SIGINT), SIGTERM and SIGHUP while processes work for this one: they end nothing by
-// themselves.
+// Ctrl-C (SIGINT), SIGTERM and SIGHUP while child processes work: handled without immediate exit.
 
-/// Thrown by RunInProcesses() when the user or the system wants this process to end.
+/// Error of RunInProcesses() when a signal requests the end of this process.
 class Interrupted : public std::runtime_error {
  public:
   explicit Interrupted(int signal);
-  int exit_code() const { return 128 + signal_; }  ///< as a shell has it: 130 for Ctrl-C
+  int exit_code() const { return 128 + signal_; }  ///< shell convention: 130 for Ctrl-C
 
  private:
   int signal_;
 };
 
-/// While it lives the first of these signals is remembered, and RunInProcesses() throws; a second
-/// one ends this process at once. A signal that was ignored before (nohup) still is. One at a time.
+/// Guard that stores the first of these signals, on which RunInProcesses() throws; a second one
+/// ends this process at once. Signals ignored before (nohup) stay ignored. At most one instance.
 class Interruption {
  public:
   Interruption();
@@ -81,122 +80,119 @@ class Interruption {
 
   /// Throws Interrupted if there was a signal.
   static void Check();
-  /// In a child process: its parent decides, and a terminal sends Ctrl-C to both.
+  /// For a child process: the parent decides, since a terminal sends Ctrl-C to both.
   static void LeaveToParent();
 
  private:
   std::array<struct sigaction, 3> before_;
 };
 
-// Planted faults, so that the tests can see what a misbehaving case does to a run.
+// Injected faults for tests of misbehaving cases.
 //
 // The environment variable LOOPBENCH_FAULT = "<fault>:<key>=<value>[,<value>]" makes every accuracy
-// case that meets the condition crash, hang, exhaust memory, throw, or answer garbage. It is read
-// in the child process of the case, and has no other effect.
+// case that meets the condition crash, hang, exhaust memory, throw, or return invalid text. It is
+// read only in the child process of the case.
 
-/// Does what LOOPBENCH_FAULT says about the case with these keys: may not return. The answer to
-/// send in place of the record's when the fault is garbage, else nothing.
+/// Executes the fault of LOOPBENCH_FAULT for the case with these keys; may not return. Returns the
+/// invalid text to send instead of the record, if any.
 std::optional<std::string> PlantedFault(const Record& keys);
 
-// Work in child processes: whatever a piece of work does, the parent gets an answer and goes on.
+// Work in child processes: however a piece of work ends, the parent gets a result and continues.
 //
-// Each piece runs in a fork of this program, under limits of its own, and answers with text through
-// a pipe. A crash, an overrun of time or memory, or silence is an ending with a name. Time is CPU
-// time: neither other work on the processor nor a pause of the machine decides anything
-// (processes.h).
-// The caller must have a single thread: a fork copies only the thread that calls it.
+// Each piece runs in a fork of this program under its own limits, and returns text through a pipe.
+// A crash, a time or memory overrun, and silence are named endings. Time is CPU time: other work on
+// the processor and pauses of the machine have no effect (processes.h).
+// The caller must have a single thread: a fork copies only the calling thread.
 
 enum class ProcessEnding {
   kAnswered,    ///< returned a text
-  kThrew,       ///< an exception left the work; the message is its text
+  kThrew,       ///< an exception left the work; `text` is its message
   kCrashed,     ///< ended by a signal, or left through exit()
-  kOverTime,    ///< killed: it used up its CPU time, or slept for long
-  kOverMemory,  ///< asked for more memory than allowed
+  kOverTime,    ///< killed after its CPU time or a long sleep
+  kOverMemory,  ///< requested more memory than allowed
 };
 
 struct ProcessLimits {
-  double cpu_s = 0.0;      ///< killed after so much CPU time [s]; 0: no limit
-  double memory_mb = 0.0;  ///< address space beyond what the parent has [MiB]; 0: no limit
-  /// Killed after so much time asleep on end [s]: work that computes does not sleep at all.
+  double cpu_s = 0.0;      ///< maximum CPU time [s]; 0: no limit
+  double memory_mb = 0.0;  ///< address space beyond the parent's [MiB]; 0: no limit
+  /// Maximum continuous time asleep [s]: computing work does not sleep at all.
   double idle_s = 5.0;
 };
 
 struct ProcessResult {
   ProcessEnding ending = ProcessEnding::kAnswered;
-  std::string text;  ///< the answer, or what is known about the failure
+  std::string text;  ///< the answer, or the reason of the failure
   double wall_s = 0.0, cpu_s = 0.0;
 };
 
-/// What the parent may want to know while pieces work.
+/// Callbacks in the parent while pieces work.
 struct ProcessNews {
   std::function<void(std::size_t)> started = {};
-  std::function<void()> waited = {};  ///< four times a second at least
+  std::function<void()> waited = {};  ///< at least four times a second
 };
 
-/// Runs work(i) for each i that `next` gives, at most `jobs` at once, started in order. `next`
-/// gives nothing while there is nothing to start, and is called again whenever a piece has ended.
-/// If it gives nothing and no piece is under way, all is done. `done` is called here in the parent
-/// as pieces end, one at a time. No piece outlives this process. Throws std::runtime_error when a
-/// process cannot be started, any exception of `done`, and Interrupted (processes.h) when all
-/// pieces that have ended are done. It rethrows a SystemFault (files.h) of a piece. Pieces still
-/// under way are killed then.
+/// Runs work(i) for each i returned by `next`, at most `jobs` at once, started in order. `next`
+/// returns nothing while there is nothing to start, and is called again after each ending. All is
+/// done if it returns nothing and no piece is running. `done` is called in the parent as pieces
+/// end, one at a time. No piece outlives this process. Throws std::runtime_error if a process
+/// cannot be started, any exception of `done`, the SystemFault (files.h) of a piece, and
+/// Interrupted (processes.h) after `done` for all ended pieces. Running pieces are then killed.
 ///
-/// Sanitizers reserve the whole address space, so memory limits are not set under them.
+/// Sanitizers reserve the whole address space, so memory limits are not set with them.
 void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int jobs,
                     const std::function<std::string(std::size_t)>& work,
                     const std::function<ProcessLimits(std::size_t)>& limits,
                     const std::function<void(std::size_t, const ProcessResult&)>& done,
                     const ProcessNews& news = {});
 
-/// The same with work(0) .. work(count - 1).
+/// Runs work(0) .. work(count - 1) in the same way.
 void RunInProcesses(std::size_t count, int jobs,
                     const std::function<std::string(std::size_t)>& work,
                     const std::function<ProcessLimits(std::size_t)>& limits,
                     const std::function<void(std::size_t, const ProcessResult&)>& done,
                     const ProcessNews& news = {});
 
-/// The outcome in tables of a piece that ended without an answer: "crashed", "process-time-limit"
-/// or "memory-limit".
+/// Returns the table outcome of a piece without an answer: "crashed", "process-time-limit" or
+/// "memory-limit".
 std::string_view OutcomeOf(ProcessEnding ending);
 
-/// Whether memory limits are set in this build.
+/// Returns true if memory limits are set in this build.
 bool LimitsMemory();
 
-// A command's work in a child process: what it prints comes out here, whatever becomes of it.
+// Work of a command in a child process; the parent prints its output, however it ends.
 
-/// Runs `work` in a child process under `limits`. What it prints on standard output is printed here
-/// when it has ended, complete lines also of work that was cut off. Returns its exit code; of work
-/// that was cut off 2, after a line on standard error with `name` and the reason. What it throws is
-/// thrown here, as std::runtime_error with its message.
+/// Runs `work` in a child process under `limits`, then prints its standard output; after a limit or
+/// crash, only complete lines. Returns its exit code. After a limit or crash returns 2 and prints
+/// `name` and the reason on standard error. Exceptions are rethrown as std::runtime_error with
+/// their message.
 int PrintFromChild(const std::string& name, const ProcessLimits& limits,
                    const std::function<int()>& work);
 
-/// The same with what it prints in `text`.
+/// Runs `work` as above, but stores its output in `text`.
 int TextFromChild(const std::string& name, const ProcessLimits& limits,
                   const std::function<int()>& work, std::string* text);
 
-// Short tasks that share processes: starting one costs more than many a case takes.
+// Short tasks share processes, because starting a process costs more than many a case.
 //
-// How many tasks go into one process is measured as they run: about as many as keep it busy for a
-// tenth of a second. Isolation is kept where it matters: a process that does not answer (crash,
-// exception, limits) counts for nothing, and its tasks are run again, each in a process of its own,
-// whose ending is then the task's.
+// The number of tasks per process follows from their measured times: enough for a tenth of a
+// second. Isolation is kept: results of a failed process (crash, exception, limits) are discarded.
+// Its tasks run again, each in its own process, which determines the ending of the task.
 
 struct SharedNews {
-  std::function<void(std::size_t)> started = {};  ///< when a task is started first
+  std::function<void(std::size_t)> started = {};  ///< at the first start of a task
   std::function<void()> waited = {};
 };
 
-/// A task that has ended.
+/// A finished task.
 struct TaskResult {
   std::size_t task = 0;
   ProcessResult result;
 };
 
-/// Runs work(0) .. work(count - 1) as RunInProcesses() does, tasks that follow each other together
-/// in a process. A process has the least of its tasks' limits. `done` gets the tasks of a process
-/// at once, in order.
-/// @returns  how many processes there were
+/// Runs work(0) .. work(count - 1) as RunInProcesses(), with consecutive tasks sharing a process. A
+/// process has the lowest limits of its tasks. `done` receives all tasks of a process at once, in
+/// order.
+/// @returns  number of processes
 std::size_t RunInSharedProcesses(std::size_t count, int jobs,
                                  const std::function<std::string(std::size_t)>& work,
                                  const std::function<ProcessLimits(std::size_t)>& limits,

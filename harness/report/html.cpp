@@ -19,18 +19,18 @@
 namespace loopbench::harness {
 namespace {
 
-/// JSON knows no number that is not finite: such is a gap.
+/// Returns a JSON number; null (a gap) if not finite, since JSON has no such numbers.
 std::string Exact(double value) { return std::isfinite(value) ? fmt::format("{}", value) : "null"; }
 std::string Drawn(double value) {
   return std::isfinite(value) ? fmt::format("{:.5g}", value) : "null";
 }
 
-/// Times of one curve stay apart.
+/// Returns a time with enough digits to keep the times of a curve distinct.
 std::string Moment(double value) {
   return std::isfinite(value) ? fmt::format("{:.9g}", value) : "null";
 }
 
-/// Cells as the tables print them, each text once; numbers besides, for sorting and conditions.
+/// Returns the cells as printed in tables, each text once, plus numbers for sorting and filters.
 std::string ColumnText(const ReportTable& table, const TableColumn& column, bool is_brief) {
   std::map<std::string, std::size_t> numbers;
   std::vector<std::string> words;
@@ -49,7 +49,7 @@ std::string ColumnText(const ReportTable& table, const TableColumn& column, bool
                      column.format == Format::kText ? "" : ",\"numbers\":" + values + "]");
 }
 
-/// Which columns are shown first: those that fit a terminal, and what rows differ in.
+/// Returns true for initially visible columns: those of terminal tables, warnings and errors.
 bool IsBrief(const ReportTable& table, const std::string& key) {
   const std::vector<TableColumn>& few = table.kind == "timing"      ? CompactTimingColumns()
                                         : table.kind == "precision" ? CompactPrecisionColumns()
@@ -79,8 +79,8 @@ std::string TableText(const ReportTable& table) {
       ListOf(table.rows, text("message")), ListOf(table.columns, column));
 }
 
-/// The CSS variables of each formulation's colours in joint and in absolute coordinates
-/// (LookStyle() in html.cpp).
+/// Returns CSS variables of the colours of each formulation in joint and in absolute coordinates
+/// (LookStyle()).
 std::string LooksText() {
   std::string text;
   std::size_t number = 0;
@@ -207,7 +207,7 @@ Rgb Parsed(const std::string& color) {
   return rgb;
 }
 
-/// Contrast of two colours, from 1 to 21 (WCAG 2.1).
+/// Returns the contrast of two colours, from 1 to 21 (WCAG 2.1).
 double Contrast(const Rgb& one, const Rgb& other) {
   const auto luminance = [](const Rgb& rgb) {
     constexpr std::array kWeights = {0.2126, 0.7152, 0.0722};
@@ -222,8 +222,8 @@ double Contrast(const Rgb& one, const Rgb& other) {
   return std::max(a, b) / std::min(a, b);
 }
 
-/// From `color` in small steps towards `end`, to the first or the last colour whose contrast to
-/// `paper` is at least `least`.
+/// Moves from `color` in small steps towards `end`: returns the first or last colour with a
+/// contrast to `paper` of at least `least`.
 Rgb Towards(const Rgb& end, const Rgb& color, const Rgb& paper, double least, bool first) {
   constexpr int kSteps = 64;
   Rgb found = color;
@@ -239,13 +239,13 @@ Rgb Towards(const Rgb& end, const Rgb& color, const Rgb& paper, double least, bo
   return found;
 }
 
-/// Colours of formulations on light and on dark paper: --look-N in joint coordinates and, nearer to
-/// the paper, --look-N-weak in absolute ones. Graphics need a contrast of 3.
+/// Returns colours of formulations on light and dark paper: --look-N in joint coordinates and the
+/// paler --look-N-weak in absolute ones. Graphics need a contrast of 3.
 std::string LookStyle() {
   constexpr double kStrong = 5.0, kWeak = 3.0;
   struct Theme {
     const char* selector;
-    Rgb paper, end;  ///< --paper of web/scene.css, and the end of the scale of greys opposite to it
+    Rgb paper, end;  ///< --paper of web/scene.css, and black or white opposite to it
   };
   const Theme themes[] = {{":root", {0xff, 0xff, 0xff}, {0, 0, 0}},
                           {":root[data-theme='dark']", {0x14, 0x17, 0x1c}, {0xff, 0xff, 0xff}}};
@@ -278,7 +278,7 @@ std::string Command(const std::string& command) {
   return "<p class=\"command\"><code>" + EscapeXml(command) + "</code></p>\n";
 }
 
-/// What was run and how it ended, in a sentence and in a bar.
+/// Returns numbers of runs and outcomes, as a sentence and a bar.
 std::string SummaryOf(const ReportData& data) {
   if (data.runs == 0) return "<p>The store has no accuracy runs.</p>\n";
   const std::size_t good = data.runs - data.failed - data.doubted;

@@ -1,4 +1,4 @@
-// A report as JSON, and the page that shows it.
+// Writers of a report: JSON and an HTML page.
 #pragma once
 
 #include <string>
@@ -9,26 +9,26 @@
 
 namespace loopbench::harness {
 
-// Report data as JSON for web/report/, safe inside an element of HTML.
+// Report data as JSON for web/report/, safe inside an HTML element.
 
-/// An element of the page with data: it is parsed when it is looked at for the first time.
+/// A data element of the page, which is parsed when it is first displayed.
 struct DataElement {
   std::string id;
   std::string json;
 };
 
-/// "tables", "costs", "map", "scenes" and one "curves-NAME" per plot. Numbers of tables have all
-/// digits, those of curves and poses as many as a screen shows.
+/// Returns "tables", "costs", "map", "scenes" and one "curves-NAME" per plot. Tables have numbers
+/// with all digits, curves and poses with display precision.
 std::vector<DataElement> ToJson(const ReportData& data);
 
-// Report data as one page of HTML: data, style and script in it, nothing from elsewhere.
+// Report data as one self-contained HTML page: data, style and script are embedded.
 
-/// web/report/, with uPlot and its licence before it, as they were when the program was built.
-/// Empty in a program that was built without (cmake -DLOOPBENCH_REPORT=OFF).
+/// web/report/ after uPlot and its licence, embedded when the program is built. Empty in a program
+/// built without it (cmake -DLOOPBENCH_REPORT=OFF).
 extern const std::string_view kReportScript, kReportStyle;
 
-/// What was found stands in the page as text, for readers without script and for paper; the rest is
-/// drawn from its data.
+/// Writes the findings as text, for readers without script and for print; the script draws the rest
+/// from the data.
 std::string ToHtml(const ReportData& data);
 
 }  // namespace loopbench::harness

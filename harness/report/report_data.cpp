@@ -58,7 +58,7 @@ std::vector<std::size_t> KeepEvenly(std::size_t count, std::size_t most) {
 }
 namespace {
 
-/// Where the poses of all bodies but Ground stand in a trajectory's rows.
+/// Returns the columns of the poses of all bodies except Ground.
 std::vector<PoseColumns> PosesIn(const TrajectoryReader& file, const MechanismDescription& user) {
   std::vector<PoseColumns> columns;
   for (std::size_t body = 1; body < user.bodies.size(); ++body) {
@@ -72,8 +72,8 @@ std::vector<PoseColumns> PosesIn(const TrajectoryReader& file, const MechanismDe
   return columns;
 }
 
-/// Poses in those rows of a trajectory that a page can show, of `rows` as its record says; a file
-/// of any length is read in memory of a fixed size.
+/// Reads the poses of at most `most` displayed rows of a trajectory with `rows` rows in its record;
+/// memory does not grow with the file.
 ReportPath PathOf(const std::filesystem::path& path, const MechanismDescription& user,
                   std::size_t rows, std::size_t most) {
   TrajectoryReader file(path);
@@ -112,16 +112,16 @@ ReportPath PathOf(const Reference& reference, std::size_t most) {
   return path;
 }
 
-/// One scene, with the rows that belong to it.
+/// One problem and its rows.
 struct Work {
   const std::vector<Record>& records;
   const std::vector<std::string>& names;
   const std::filesystem::path& store_file;
   std::vector<std::size_t> rows;
-  std::size_t most_places = 0;  ///< of bodies, in all motions of the scene
+  std::size_t most_places = 0;  ///< body poses in all motions of the problem
 };
 
-/// The files that rows name, each once: of references rows share one.
+/// Returns the reference files of the rows, each once; rows may share a reference.
 std::vector<std::string> ReferencesOf(const Work& work) {
   std::vector<std::string> ids;
   for (const std::size_t row : work.rows) {
@@ -198,7 +198,7 @@ void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remark
   try {
     const MechanismDescription user = ReadKeptMechanism(file);
     scene->picture = MakePicture(user, "mechanisms/" + file.filename().string());
-    scene->picture->motions.clear();  // those of degrees of freedom are for `view`
+    scene->picture->motions.clear();  // only `view` shows degrees of freedom
     AddPaths(work, user, scene, remarks, changed);
   } catch (const ChangedFile& error) {
     changed->emplace_back(error.what());
@@ -252,7 +252,7 @@ namespace {
 
 constexpr std::size_t kRowsNamed = 5;
 
-/// A command as it is typed, whatever its words hold.
+/// Returns a command as typed in a shell, with quoting.
 std::string Typed(const std::vector<std::string>& words) {
   std::vector<const char*> pointers = {"loopbench"};
   for (const std::string& word : words) pointers.push_back(word.c_str());
@@ -268,7 +268,7 @@ bool IsAlike(const std::vector<Record>& rows, const std::string& key) {
       rows, [&](const Record& row) { return row.Text(key) == rows.front().Text(key); });
 }
 
-/// The table's columns, and what else the records have that has words.
+/// Returns the table's columns and all other record keys with a heading.
 std::vector<TableColumn> AllColumns(const Table& table) {
   std::vector<TableColumn> columns = table.columns;
   std::set<std::string> there;
@@ -280,7 +280,7 @@ std::vector<TableColumn> AllColumns(const Table& table) {
   return columns;
 }
 
-// Keys that are the same in all rows of a scene and not in all rows: those of the scene.
+// Returns the keys of problems: equal in all rows of a problem, but not in all rows.
 std::vector<std::string> KeysOfScenes(const std::vector<Record>& rows,
                                       const std::vector<std::string>& telling) {
   std::vector<std::string> keys;
@@ -314,7 +314,7 @@ void NameRows(ReportTable* table) {
     return key == "mechanism" || key == "horizon" ||
            std::ranges::find(of_scenes, key) != of_scenes.end();
   });
-  std::map<std::string, std::string> ids;  // of scenes, by name
+  std::map<std::string, std::string> ids;  // ids of problems, by name
   for (const Record& row : table->rows) {
     std::string name = SceneName(row, of_scenes);
     const std::string id = row.Text("problem_id");
@@ -350,7 +350,7 @@ std::vector<ReportTable> MakeTables(const std::vector<Record>& records, const st
   return tables;
 }
 
-/// A finding for each ending other than "finished", and one for each note of doubts.
+/// Returns a finding for each outcome other than "finished", and one for each warning note.
 std::vector<ReportFinding> FindingsOf(const ReportTable& table,
                                       const std::vector<std::string>& doubts) {
   std::map<std::string, std::vector<std::size_t>> endings;
@@ -405,7 +405,7 @@ std::vector<ReportCost> MakeCosts(const std::vector<Record>& records, const std:
   return costs;
 }
 
-/// Who made the records, how many of them each.
+/// Returns the origins of the records, with the number of records of each.
 std::vector<std::string> OriginsOf(const std::vector<Record>& records) {
   std::map<std::string, std::size_t> counts;
   for (const Record& record : records) {

@@ -17,27 +17,26 @@
 
 namespace loopbench::harness {
 
-// Fewer points of a curve, without losing its extremes.
+// Decimation of curves that keeps their extremes.
 
-/// Which of the points of a curve are kept, ascending: the first and the last, and of each of equal
-/// buckets of points in between the least and the largest value. All of them where there are at
-/// most `most` (at least 4). What is not finite is kept only where a bucket has nothing else: one
-/// point, so that the curve has its gap.
+/// Returns ascending indices of the points to keep: the first, the last, and the minimum and
+/// maximum of each of equal buckets in between. Keeps all points if there are at most `most` (at
+/// least 4). A bucket without finite values keeps one point, so that the curve has its gap.
 std::vector<std::size_t> KeepExtremes(std::span<const double> values, std::size_t most);
 
-/// At most `most` (at least 2) of `count` places, evenly, with the first and the last.
+/// Returns at most `most` (at least 2) of `count` indices, evenly spaced, with the first and last.
 std::vector<std::size_t> KeepEvenly(std::size_t count, std::size_t most);
 
-// Where the bodies of a store's scenes are over time: from trajectories and references that are
-// kept beside it. Nothing is integrated here.
+// Motions of the bodies of a store's problems, from stored trajectories and references. Nothing is
+// integrated here.
 
-/// The motion of one run, or of a reference.
+/// The motion of one run or of a reference.
 struct ReportPath {
   std::string label = {};
-  std::optional<std::size_t> row = {};  ///< of the run; none for a reference
+  std::optional<std::size_t> row = {};  ///< row of the run; none for a reference
   std::vector<double> times = {};       ///< [s], ascending
   std::vector<Poses> poses = {};        ///< by time
-  std::size_t stored = 0;               ///< times that the file has
+  std::size_t stored = 0;               ///< number of times in the file
 };
 
 /// One mechanism with its motions.
@@ -46,11 +45,11 @@ struct ReportScene {
   std::optional<Picture> picture = {};  ///< none: see `missing`
   std::vector<ReportPath> paths = {};
   std::string missing =
-      {};  ///< why there is no motion, and what to write into the experiment; or empty
+      {};  ///< reason for a missing motion, and the setting that stores it; or empty
 };
 
-/// Scenes in the order of the rows, whose names and scenes are given beside them. `changed` gets
-/// the messages of files that are not as their run wrote them.
+/// Returns problems in the order of the rows, whose names and problems are given. `changed`
+/// receives the messages about files that have changed since their run.
 std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
                                     const std::vector<std::string>& names,
                                     const std::vector<std::string>& scenes,
@@ -58,34 +57,32 @@ std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
                                     std::vector<std::string>* remarks,
                                     std::vector<std::string>* changed);
 
-/// Above so many scenes none is drawn any more, above so many motions none of a scene; and places
-/// of bodies in all motions of a page.
+/// Maximum number of drawn problems of a report, of motions of a problem, and of body poses in all
+/// motions of a page.
 inline constexpr std::size_t kMostScenes = 12, kMostPaths = 60, kMostPlaces = 120'000;
 
-// What the page of a whole run shows: plain data, computed from records by the same judges, tables
-// and words as the other commands, and no word of HTML. The page (web/report/) shows it and judges
-// nothing.
+// Data of the page of a store: computed from records with the rules, tables and texts of the other
+// commands, and free of HTML. The page (web/report/) displays them and evaluates nothing.
 
-/// A sentence of the page, the rows of the first table that it is about, and the command that
-/// prints what it follows from.
+/// A sentence of the page, a filter for its rows of the first table, and a command that prints its
+/// basis.
 struct ReportFinding {
-  bool failed = false;  ///< else doubtful
+  bool failed = false;  ///< failure; else a warning
   std::string text = {};
   std::string filter = {};  ///< "outcome=singular", a condition on that table
 };
 
-/// All records of one kind, as `loopbench table` has them. Columns in which no row has a value are
-/// left out; those in which all rows are alike are words above the table, once there are several
-/// rows.
+/// All records of one kind, as in `loopbench table`. Columns without values are omitted. If there
+/// are several rows, columns with one common value become text above the table.
 struct ReportTable {
   std::string kind = {};  ///< "drift", "timing", ...
   std::string title = {};
   std::vector<TableColumn> columns = {};
   std::vector<std::string> alike = {};  ///< "solver: rank-revealing"
   std::vector<Record> rows = {};
-  std::vector<std::string> names = {};  ///< of the rows, by what tells them apart
+  std::vector<std::string> names = {};  ///< labels of the rows, from their distinguishing keys
   std::vector<std::string> scenes =
-      {};  ///< of the rows: mechanism, horizon and what else is one scene
+      {};  ///< problems of the rows: mechanism, horizon and other problem keys
   std::string command = {};
 };
 
@@ -101,14 +98,14 @@ struct ReportPlot {
   std::string title = {};  ///< "Drift"
   std::string unit = {};   ///< of y
   std::vector<ReportCurve> curves = {};
-  std::size_t points = 0, shown = 0;  ///< of the store, and of the page
+  std::size_t points = 0, shown = 0;  ///< number of points in the store and on the page
 };
 
-/// Work and precision by one error.
+/// Work-precision data for one error measure.
 struct ReportCost {
   Tradeoff tradeoff = {};
   std::string error = {}, cost = {};       ///< with units
-  std::vector<std::string> fairness = {};  ///< what was equal among the compared rows
+  std::vector<std::string> fairness = {};  ///< settings common to all compared rows
   std::string command = {};
 };
 
@@ -118,16 +115,18 @@ struct ReportData {
   std::vector<ClaimResult> claims = {};
   std::vector<ReportFinding> findings = {};
   std::vector<std::string> doubts = {};    ///< DoubtNotes()
-  std::vector<std::string> warnings = {};  ///< of noise
+  std::vector<std::string> warnings = {};  ///< warnings about noise
   std::vector<ReportTable> tables = {};
   std::vector<ReportPlot> plots = {};
   std::vector<ReportCost> costs = {};
   std::optional<FailureMap> map = {};
   std::vector<ReportScene> scenes = {};
-  std::vector<std::string> remarks = {};     ///< what was decimated or left out
-  std::vector<std::string> changed = {};     ///< files of the store that no run wrote so
-  std::vector<std::string> origins = {};     ///< of the records: machine, compiler, commit, ...
-  std::vector<std::string> provenance = {};  ///< of the page
+  std::vector<std::string> remarks = {};     ///< decimated or omitted data
+  std::vector<std::string> changed = {};     ///< files of the store that differ from the output of
+                                             ///< their run
+  std::vector<std::string> origins = {};     ///< origin of the records: machine, compiler, commit,
+                                             ///< ...
+  std::vector<std::string> provenance = {};  ///< origin of the page
   std::string map_command = {}, claims_command = {}, plot_command = {};
 };
 
@@ -137,17 +136,17 @@ struct ReportOptions {
   std::filesystem::path rules_file = {};
   std::vector<ClaimRule> claims = {};
   std::filesystem::path claims_file = {};
-  std::size_t most_points = 1'000'000;  ///< of all curves together
+  std::size_t most_points = 1'000'000;  ///< maximum number of points of all curves together
 };
 
-/// `records` as LoadRecords() gives them, at least one. Trajectories, mechanisms and references are
-/// read from beside the store.
+/// Makes a report from `records` as returned by LoadRecords(), at least one. Reads trajectories,
+/// mechanisms and references next to the store.
 ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& options);
 
-// The series of records as curves against time.
+// Time series of records as curves.
 
-/// Drift, energy error and true error of the rows that have them; together at most `most` points,
-/// shared evenly among the curves, with the extremes of each.
+/// Returns curves of drift, energy error and true error of the rows that have them. All curves
+/// share at most `most` points evenly and keep their extremes.
 std::vector<ReportPlot> MakePlots(const std::vector<Record>& rows, std::size_t most);
 
 }  // namespace loopbench::harness

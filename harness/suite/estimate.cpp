@@ -25,23 +25,23 @@
 
 namespace loopbench::harness {
 
-/// Of one pilot.
+/// Result of a pilot.
 struct Estimate::Spent {
-  double all_s = 0.0, running_s = 0.0;  ///< CPU time, and what of it grows with the horizon
-  double reached = 1.0;                 ///< of the horizon
-  double members_s = 0.0;               ///< CPU time of members of its ensemble beside
-  double member = 1.0;                  ///< as of Rate
-  bool failed = false;                  ///< it went no further, and nor will the piece
-  double most_s = std::numeric_limits<double>::infinity();  ///< when its limit of steps ends it
+  double all_s = 0.0, running_s = 0.0;  ///< CPU time, total and proportional to the horizon
+  double reached = 1.0;                 ///< part reached [of the horizon]
+  double members_s = 0.0;               ///< CPU time of the ensemble members in addition
+  double member = 1.0;                  ///< as in Rate
+  bool failed = false;                  ///< true: it stopped here, and the piece will too
+  double most_s = std::numeric_limits<double>::infinity();  ///< CPU time at the step limit
 };
 
 namespace {
 
-constexpr double kFirst = 0.02, kGrowth = 3.0;  ///< of the horizon
-constexpr double kLeastSlope = 0.2;             ///< of the mean
-constexpr std::size_t kCombinations = 8;        ///< of a sweep; others take the nearest one's
-constexpr double kNearlyAll = 0.999;            ///< what a reference reached that is not certified
-constexpr int kMembers = 16;                    ///< of an ensemble
+constexpr double kFirst = 0.02, kGrowth = 3.0;  ///< first part of the horizon, and its growth
+constexpr double kLeastSlope = 0.2;             ///< minimum slope, relative to the mean
+constexpr std::size_t kCombinations = 8;        ///< pilots of a sweep; others use the nearest
+constexpr double kNearlyAll = 0.999;            ///< part reached by a reference without certificate
+constexpr int kMembers = 16;                    ///< pilot members of an ensemble
 constexpr double kShort_s = 0.1;                ///< too short for a pilot at each tolerance
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -55,7 +55,7 @@ template <class Spent>
 Rate Next(const Rate& before, const Spent& spent) {
   const double reached = std::max(spent.reached, 1e-9), mean = spent.running_s / reached;
   const double grown = reached - before.reached;
-  // clocks are coarse, and one step more or less is much in a short run
+  // clocks are coarse, and a single step matters in a short run
   const double slope = grown > 0.0 ? (spent.running_s - before.running_s) / grown : mean;
   return {.fixed_s = std::max(0.0, spent.all_s - spent.running_s),
           .member = spent.member,
@@ -82,7 +82,7 @@ std::size_t Estimate::Nearest(std::size_t experiment) const {
       std::round(std::round(static_cast<double>(experiment) / step) * step));
 }
 
-/// The finest and the loosest tolerance of the cases that pass the filter; {1, 0} without any.
+/// Returns the finest and loosest tolerance of the cases that pass the filter; {1, 0} without any.
 const std::pair<double, double>& Estimate::Tolerances(std::size_t experiment) {
   const auto [known, is_new] = tolerances_.try_emplace(experiment, 1.0, 0.0);
   if (!is_new) return known->second;
@@ -95,13 +95,13 @@ const std::pair<double, double>& Estimate::Tolerances(std::size_t experiment) {
   return known->second;
 }
 
-/// @param times  how often the piece does what the pilot does once
+/// @param times  number of repetitions of the pilot's work in the piece
 const Rate* Estimate::Known(const std::string& key, const std::string& name,
                             const ProcessLimits& limits, double times,
                             const std::function<Spent(double fraction)>& work) {
   if (const auto known = rates_.find(key); known != rates_.end()) return &known->second;
   if (spent_s_ >= budget_.all_s) return nullptr;
-  // of hundreds of pilots the first tell nearly all: the sum takes a minute or two, not many
+  // later pilots are shorter: hundreds of them then take a minute or two in total
   const double shorter = budget_.usual_s / (budget_.usual_s + spent_s_);
   const double most_s = std::max(budget_.least_s, budget_.most_s * shorter * shorter);
   const auto pilot = [&](std::size_t) {
@@ -130,7 +130,7 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
             std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
                         &rate.member, &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at,
                         &rate.most_s, &worked) == 8) {
-          // a process costs its parent and itself something before it works
+          // starting a process costs CPU time of its parent and of itself
           rate.process_s = std::max(0.0, result.cpu_s - worked) + ThreadCpuSeconds() - before;
           return;
         }
@@ -140,7 +140,7 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
   return &rate;
 }
 
-/// Empty where there is none: an estimate without what rows take is better than none.
+/// Returns a folder, or "" on errors: an estimate without output costs is better than none.
 std::filesystem::path Estimate::PlaceForRows() {
   try {
     if (written_ == nullptr) written_ = std::make_unique<TemporaryFolder>("loopbench-plan");
@@ -150,7 +150,7 @@ std::filesystem::path Estimate::PlaceForRows() {
   }
 }
 
-/// @param rtol  0 with fixed steps, of which the longest is tried
+/// @param rtol  0 for fixed steps, where the longest step is used
 const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double rtol) {
   const Experiment& like = experiments_[experiment];
   const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);  // a sweep's may differ
@@ -169,7 +169,7 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     const double reached = record.Number("t_reached"), running = record.Number("cpu_s");
     const bool ended = record.Text("outcome") != ToString(Outcome::kFinished);
     Spent spent = {.all_s = all.cpu_s(), .running_s = std::isnan(running) ? 0.0 : running};
-    // rows of a fixed distance are more in a longer run, of a fixed number they are not
+    // longer runs have more rows at a fixed distance, but not at a fixed number
     if (like.output && like.output->number == 0) spent.running_s = spent.all_s;
     spent.reached = std::isnan(reached) ? 0.0 : fraction * reached / pilot.horizon;
     const double steps = record.Number("steps");
@@ -208,18 +208,18 @@ double Estimate::OfCase(std::size_t experiment, const Case& one, double simulati
     return rate == nullptr ? kUnknown : total(*rate, std::ranges::max(like.fixed_steps) / one.step);
   }
   const auto& range = Tolerances(near);
-  const auto [fine, loose] = range.first > range.second  // then it is the tolerance of the timings
+  const auto [fine, loose] = range.first > range.second  // otherwise the tolerance of the timings
                                  ? std::pair(one.rtol, one.rtol)
                                  : range;
   const Rate* at_loose = RateOfCase(near, one, loose);
   if (at_loose == nullptr) return kUnknown;
-  const double usual = std::pow(one.rtol / loose, -0.2);  // of methods of order 5
+  const double usual = std::pow(one.rtol / loose, -0.2);  // for methods of order 5
   if (NumberOfRuns(one) * at_loose->Running(1.0) * std::pow(fine / loose, -0.2) < kShort_s) {
     return total(*at_loose, usual);
   }
   const Rate* at_fine = RateOfCase(near, one, fine);
   if (at_fine == nullptr) return total(*at_loose, usual);
-  // the nearer one decides where a run fails
+  // the nearer tolerance determines where a run fails
   const double share = fine < loose ? std::log(one.rtol / loose) / std::log(fine / loose) : 0.0;
   const Rate& rate = share < 0.5 ? *at_loose : *at_fine;
   const double ratio = at_fine->Running(part) / at_loose->Running(part);
@@ -227,11 +227,11 @@ double Estimate::OfCase(std::size_t experiment, const Case& one, double simulati
   return total(rate, known ? std::pow(ratio, share < 0.5 ? share : share - 1.0) : 1.0);
 }
 
-/// What decides is whether the cheapest way is certified to the end: it is tried over the whole
-/// horizon, if that is short work, and the one for all others over a part.
+/// Estimates a reference. The cheapest method is tried over the whole horizon if that is short
+/// work; if it is not certified to the end, the furthest-reaching method is tried over a part.
 double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
   const Experiment& own = experiments_[experiment];
-  if (!own.reference) return 0.0;  // a published series is read
+  if (!own.reference) return 0.0;  // a published series is only read
 #ifdef LOOPBENCH_PRECISIONS
   const MechanismDescription& user = own.scenes[one.scene].mechanism.description;
   const auto known = [&](WaysTried tried, const char* name, double times) {
@@ -281,18 +281,18 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
                          : rate->fixed_s + std::min(rate->Running(1.0), runs * own.limits.cpu_s);
 }
 
-/// Simulations take as long as the accuracy runs; right-hand sides of families have pilots of one
-/// batch.
+/// Estimates timings: simulations take as long as accuracy runs; right-hand sides of families have
+/// pilots of one batch.
 double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
   const Experiment& own = experiments_[experiment];
   const auto sum = [](const auto& rows, const auto& seconds) {
-    double all = seconds(rows.front());  // the first column is timed twice (noise.h)
+    double all = seconds(rows.front());  // the first method is timed twice (noise.h)
     for (const auto& row : rows) all += seconds(row);
     return all;
   };
   if (group.simulate) {
     return sum(group.cases, [&](const Case& one) {
-      const double runs = own.timing.repeats + 1.0;  // the first one warms up
+      const double runs = own.timing.repeats + 1.0;  // plus the warm-up run
       return OfCase(experiment, one, runs) + kBatches * kBatchSeconds;
     });
   }
@@ -315,7 +315,7 @@ double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
 }
 namespace {
 
-/// An answer of a child process: lines of warnings, or one line behind this letter.
+/// Prefix of a fault in an answer; other answers are lines of warnings.
 constexpr char kFault = '!';
 
 template <class Space>
@@ -330,7 +330,7 @@ std::string AnswerIn(const MechanismDescription& description) {
   return lines;
 }
 
-/// A locked start is assembled; that nothing moves is a result.
+/// Returns faults and warnings of a start. A locked start is assembled: immobility is a result.
 std::string Answer(const MechanismDescription& description) {
   return description.space == SpaceKind::kPlanar ? AnswerIn<Planar>(description)
                                                  : AnswerIn<Spatial>(description);

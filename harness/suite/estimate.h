@@ -1,4 +1,4 @@
-// Before a run: its time, and the starts of its mechanisms.
+// Before a run: its estimated time, and checks of the start states.
 #pragma once
 
 #include <algorithm>
@@ -18,23 +18,23 @@
 
 namespace loopbench::harness {
 
-// About how long the pieces of a suite take, from pilots: the same work over a part of its horizon.
+// Estimates the time of the pieces of a suite from pilots: the same work over a shorter horizon.
 
 class TemporaryFolder;
 
-/// What pilots over a part of the horizon took, and with it the whole.
+/// CPU times measured by pilots, and the extrapolation to the full horizon.
 struct Rate {
-  double process_s = 0.0;  ///< CPU time of a process that does nothing [s]
-  double fixed_s = 0.0;    ///< of each run, whatever the horizon [s]
-  double member = 1.0;     ///< what a member of an ensemble takes [of the unperturbed run]
-  double running_s = 0.0;  ///< of the longest pilot, at its tolerance [s]
-  double reached = 1.0;    ///< by it [of the horizon]
-  double slope_s = 0.0;    ///< beyond it: CPU time of a whole horizon [s]
-  double ends_at = 1.0;    ///< where a run failed; it will fail there again [of the horizon]
-  /// When its limit of steps ends it [s].
+  double process_s = 0.0;  ///< CPU time of an empty process [s]
+  double fixed_s = 0.0;    ///< per run, independent of the horizon [s]
+  double member = 1.0;     ///< CPU time of an ensemble member [relative to the unperturbed run]
+  double running_s = 0.0;  ///< CPU time of the longest pilot, at its tolerance [s]
+  double reached = 1.0;    ///< part covered by this pilot [of the horizon]
+  double slope_s = 0.0;    ///< slope beyond it: CPU time of a whole horizon [s]
+  double ends_at = 1.0;    ///< part at which a run failed, and will again [of the horizon]
+  /// CPU time at which the step limit ends the run [s].
   double most_s = std::numeric_limits<double>::infinity();
 
-  /// CPU time that grows with the horizon, of this part of it [s].
+  /// Returns the CPU time that grows with the horizon, for this part of it [s].
   double Running(double part) const {
     const double to = std::min(part, ends_at);
     return std::min(
@@ -42,33 +42,33 @@ struct Rate {
   }
 };
 
-/// Pilots begin with 2 % of the horizon and grow until they have taken `share` of what the piece
-/// would take, within bounds; the last two tell how it goes on, since many runs begin with short
-/// steps. Runs that share scene, column and integrator share pilots at the loosest and, unless they
-/// are short, at the finest tolerance, and the power of the tolerance between them; of a long sweep
-/// eight combinations are tried. Each pilot runs in a process of its own under the limits of its
-/// case; what these cut off is taken to end so as well.
+/// Pilots begin with 2 % of the horizon and grow until they have used `share` of the estimated time
+/// of the piece, within bounds. The last two give the slope, since many runs begin with short
+/// steps. Runs with equal problem, method and integrator share pilots at the loosest tolerance and,
+/// unless they are short, at the finest. A power law interpolates between them. For a long sweep
+/// eight combinations are tried. Each pilot runs in its own process under the limits of its case.
+/// If these stop it, the case is assumed to end in the same way.
 class Estimate {
  public:
   struct Budget {
-    double share = 0.1, least_s = 0.003, most_s = 2.0;  ///< of one pilot
-    double usual_s = 4.0;  ///< of all pilots [s]: beyond it each may take less than most_s
-    double all_s = 1e9;    ///< wall time of all pilots [s]; what is asked for later is not known
+    double share = 0.1, least_s = 0.003, most_s = 2.0;  ///< per pilot
+    double usual_s = 4.0;  ///< all pilots [s]: beyond it each may use less than most_s
+    double all_s = 1e9;    ///< wall time of all pilots [s]; later requests remain unknown
   };
-  /// `experiments` must outlive this. Pilots are of tolerances at which a case passes `filter`.
+  /// `experiments` must outlive this. Pilots use tolerances of cases that pass `filter`.
   Estimate(const std::vector<Experiment>& experiments, const Budget& budget,
            const Selection& filter = {});
   ~Estimate();
 
-  /// CPU time of a piece of the experiment [s], NaN where it is not known. Of a case: of its
-  /// unperturbed run and its ensemble; or, if it is to be timed, of `simulations` in one process.
+  /// Returns the CPU time of a piece of the experiment [s], NaN if unknown. A case includes its
+  /// unperturbed run and its ensemble, or, if timed, `simulations` runs in one process.
   double OfCase(std::size_t experiment, const Case& one, double simulations = 0.0);
   double OfReference(std::size_t experiment, const ReferenceCase& one);
   double OfLadder(std::size_t experiment, const LadderGroup& group);
   double OfTiming(std::size_t experiment, const TimingGroup& group);
 
   std::size_t pilots() const { return rates_.size(); }
-  /// A sentence for each pilot that its limits cut off.
+  /// Returns a sentence for each pilot stopped by its limits.
   const std::vector<std::string>& cut_off() const { return cut_off_; }
 
  private:
@@ -83,27 +83,27 @@ class Estimate {
   const std::vector<Experiment>& experiments_;
   Budget budget_;
   Selection filter_;
-  std::map<std::size_t, std::pair<double, double>> tolerances_;  ///< the finest and the loosest
+  std::map<std::size_t, std::pair<double, double>> tolerances_;  ///< finest and loosest
   double spent_s_ = 0.0;
   std::unique_ptr<TemporaryFolder> written_;  ///< for trajectories of pilots
   std::map<std::string, Rate> rates_;
   std::vector<std::string> cut_off_;
 };
 
-// Whether starts can be assembled, asked before anything is run.
+// Checks before any run that the start states can be assembled.
 
-/// Sentences about starts: faults of starts that cannot be assembled, values found and expected,
-/// and guesses that are missed.
+/// Sentences about starts: faults (not assembled, with found and expected values) and warnings
+/// (initial guesses that are not met).
 struct StartReport {
   std::vector<std::string> faults, warnings;
 };
 
-/// Assembles the mechanism in a child process; limits that cut it off are a fault.
+/// Assembles the mechanism in a child process; exceeding the limits is a fault.
 StartReport CheckStart(const MechanismDescription& description, const ProcessLimits& limits);
 
-/// The same for the scenes of an experiment's combinations as they are run, under the limits of
-/// their cases, up to the first combination that has any fault. Scenes that combinations share are
-/// assembled once; members of ensembles are not looked at.
+/// Checks the problems of an experiment's combinations as they are run, under the limits of their
+/// cases, up to the first combination with a fault. Shared problems are assembled once; members of
+/// ensembles are not checked.
 StartReport CheckStarts(const std::vector<Experiment>& experiments);
 
 }  // namespace loopbench::harness

@@ -24,7 +24,7 @@ namespace loopbench::harness {
 
 namespace {
 
-/// What the ladder runs of a scene, in one piece.
+/// Returns the planar mechanism of a problem for the ladder, in one piece.
 MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentScene& scene) {
   CompileOptions options = experiment.compile;
   options.islands = false;
@@ -52,7 +52,7 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
   return description;
 }
 
-/// Throws ConfigError for a column whose formulation or level is compiled in double alone.
+/// Throws ConfigError for a method whose formulation or projection level exists only in double.
 void RequireScalars(const Experiment& experiment, const Column& column) {
   const auto refuse = [&](const std::string& expected) {
     throw ConfigError(fmt::format("{}: /precision: found {}, expected columns {}",

@@ -24,7 +24,7 @@ namespace loopbench::harness {
 
 namespace {
 
-constexpr const char* kClear = "\r\033[K";  // the line that is there
+constexpr const char* kClear = "\r\033[K";  // clears the present line
 
 double SecondsSince(std::chrono::steady_clock::time_point begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -83,7 +83,7 @@ void Progress::Look() {
 double Progress::SecondsToGo() const {
   if (foreseen_s_ + waiting_s_ + (running_.empty() ? 0.0 : pieces_[running_[0].piece].estimate_s) <=
       0.0) {
-    // nothing was foreseen: all pieces are taken to be alike
+    // without estimates all pieces are assumed equal
     if (done_ == 0) return -1.0;
     return SecondsSince(begin_) * static_cast<double>(pieces_.size() - done_) /
            static_cast<double>(done_);
@@ -109,18 +109,18 @@ void Progress::Draw() {
         fmt::format("  now {} ({:.0f} s)", pieces_[oldest.piece].label, SecondsSince(oldest.begin));
     if (running_.size() > 1) line += fmt::format(" and {} more", running_.size() - 1);
   }
-  // in one line, whose last cell some terminals do not write without beginning the next
+  // one line; some terminals begin a new line after writing the last cell
   const std::size_t room = std::max<std::size_t>(ErrorScreen().width, 3) - 1;
   PrintErrorText(kClear + std::string(Beginning(EscapeTerminal(line), room)));
 }
 namespace {
 
-/// Costly cases go first, so that none is left to run alone at the end.
+/// Returns the expected cost: expensive cases run first, so that none runs alone at the end.
 double CostOf(const Case& one) { return one.ensemble * ExpectedSteps(one); }
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
-/// A piece that waits for the compiler of generated code sleeps, and is not ended for that.
+/// Extends the idle limit for pieces that wait for the compiler of generated code.
 void AllowCompiler(const Column& column, ProcessLimits* limits) {
   if (column.execution != Execution::kLibrary) limits->idle_s += generate::kCompilerSeconds;
 }
@@ -170,12 +170,12 @@ Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one) {
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   Piece piece;
   for (const Case& one : group.cases) piece.owed.push_back(one.keys);
-  // the first column is timed twice (noise.h)
+  // the first method is timed twice (noise.h)
   const int columns = static_cast<int>(group.cases.size()) + 1;
   int threads = 1;
   for (const Case& one : group.cases) threads = std::max(threads, one.column.threads);
   const int runs = columns * (experiment.timing.repeats + 1) * threads;
-  // right-hand sides have no limit of their own; a minute per column is far beyond any
+  // right-hand sides have no limit; a minute per method is ample
   constexpr double kDerivatives_s = 60.0;
   piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns * threads,
                   experiment.limits.memory_mb};
@@ -244,7 +244,7 @@ std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
 }
 namespace {
 
-/// Pilots run only where somebody sees what they are for.
+/// Estimates run times only if a progress display is visible.
 std::vector<Progress::Piece> Foreseen(const std::vector<Piece>& pieces, Estimate* estimate) {
   std::vector<Progress::Piece> foreseen;
   for (const Piece& piece : pieces) {
@@ -258,7 +258,7 @@ std::vector<Progress::Piece> Foreseen(const std::vector<Piece>& pieces, Estimate
 }  // namespace
 
 std::vector<Piece> Runner::NotAsked(std::vector<Piece> pieces) {
-  // a case that two files share is one case
+  // a case of two files runs once
   std::erase_if(pieces, [this](const Piece& piece) {
     bool asked_before = true;
     for (const Record& owed : piece.owed) {
@@ -296,7 +296,7 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
     return true;
   });
   if (pieces.empty()) return failed;
-  // jobs that no piece is left for share the ensembles
+  // spare jobs become threads of the ensembles
   const int free = std::max(1, jobs / static_cast<int>(pieces.size()));
   for (Piece& piece : pieces) piece.threads = free;
   Progress progress(what, Foreseen(pieces, estimate), jobs);
@@ -328,7 +328,7 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
   } else {
     count.processes += pieces.size();
     const auto before_fork = [&](std::size_t i) {
-      YardstickNs();  // timings know by it how fast the machine has been
+      YardstickNs();  // calibrates the machine speed for timings
       return limits(i);
     };
     RunInProcesses(pieces.size(), jobs, work, before_fork,

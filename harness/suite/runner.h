@@ -1,4 +1,4 @@
-// Pieces of work, their processes, and the line that shows progress.
+// Pieces of work, their processes, and the progress line.
 #pragma once
 
 #include <chrono>
@@ -15,19 +15,19 @@
 
 namespace loopbench::harness {
 
-// A progress line with the time still to go, on standard error when that is a terminal.
+// Progress line with the remaining time, on standard error if it is a terminal.
 
-/// Shows what is under way from the first moment on. Silent when standard error is no terminal.
+/// Shows the running pieces from the start. Silent if standard error is no terminal.
 class Progress {
  public:
-  /// A piece of work: what people call it, and how long it will take about [s], NaN where nobody
-  /// knows: then as long as the others.
+  /// A piece of work: label and estimated duration [s]. NaN if unknown: the average of the other
+  /// pieces is used.
   struct Piece {
     std::string label;
     double estimate_s;
   };
 
-  /// `jobs` pieces are under way at once.
+  /// Runs `jobs` pieces at once.
   Progress(std::string what, std::vector<Piece> pieces, int jobs);
   ~Progress();  ///< clears the line
   Progress(const Progress&) = delete;
@@ -37,7 +37,7 @@ class Progress {
 
   void Start(std::size_t piece);
   void Done(std::size_t piece);
-  /// Draws the line anew if a second has passed.
+  /// Redraws the line if a second has passed.
   void Look();
 
  private:
@@ -47,7 +47,7 @@ class Progress {
     Clock::time_point begin;
   };
 
-  /// Estimates are corrected by what the pieces that are done have taken. Negative: not known.
+  /// Returns the remaining time, corrected by the durations of finished pieces. Negative: unknown.
   double SecondsToGo() const;
   void Draw();
 
@@ -56,60 +56,60 @@ class Progress {
   int jobs_;
   bool is_seen_;
   std::size_t done_ = 0;
-  double taken_s_ = 0.0, foreseen_s_ = 0.0;  ///< of the pieces that are done
-  double waiting_s_ = 0.0;                   ///< foreseen for those that have not begun
+  double taken_s_ = 0.0, foreseen_s_ = 0.0;  ///< of the finished pieces
+  double waiting_s_ = 0.0;                   ///< estimate for the pieces that have not begun
   std::vector<Running> running_;
   Clock::time_point begin_, drawn_;
 };
 
-// One process of a run: the records it owes, and how to make them.
+// One process of a run: its expected records and the function that makes them.
 
 struct Piece {
-  std::vector<Record> owed;     ///< keys, case_id and content: known but for their results
-  std::int64_t experiment = 0;  ///< which of the command's
+  std::vector<Record> owed;     ///< keys, case_id and content: complete except for results
+  std::int64_t experiment = 0;  ///< index among the experiments of the command
   std::function<std::vector<Record>(int threads)> work;
   ProcessLimits limits;
   std::string label;
-  double cost = 0.0;                      ///< costly ones go first
-  int threads = 1;                        ///< of `work`, which may need fewer
-  std::filesystem::path product = {};     ///< a file without which the piece is not done
-  std::filesystem::path trajectory = {};  ///< one that its process may leave unfinished
+  double cost = 0.0;                      ///< expensive pieces run first
+  int threads = 1;                        ///< threads of `work`, which may need fewer
+  std::filesystem::path product = {};     ///< file that must exist for the piece to be done
+  std::filesystem::path trajectory = {};  ///< file that its process may leave incomplete
   std::function<double(Estimate&)> seconds = {};
 };
 
-/// What experiments run, which must outlive the pieces.
-/// @param one    with its id
-/// @param store  the file beside which references are kept
+/// Pieces of an experiment, which must outlive them.
+/// @param one    case with its id
+/// @param store  the store file; references lie in its folder
 Piece AccuracyPiece(const Experiment& experiment, const Case& one,
                     const std::filesystem::path& store);
 Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one);
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group);
 Piece LadderPiece(const Experiment& experiment, const LadderGroup& group);
 
-/// The child's side: all records, one a line.
+/// Returns all records, one per line (child process).
 std::string AnswerOf(const Piece& piece);
 
-/// The parent's side: what the piece owes, filled from the answer or with the reason why not.
-/// @param set  what --set changed
+/// Returns the expected records, filled from the answer or with the reason (parent process).
+/// @param set  changes by --set
 std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
                               const std::string& set);
 
-// Runs pieces that a store does not have yet, and puts their records into it.
+// Runs the pieces that a store does not contain yet, and stores their records.
 
 class Runner {
  public:
-  /// `finished` is what the store has when the run begins.
+  /// `finished`: records in the store when the run begins.
   Runner(const SuiteOptions& options, FinishedRuns& finished, ResultStore& store)
       : options_(options), finished_(finished), store_(store) {}
 
-  /// What is not done yet of `pieces`, which stand in the order of the experiments.
-  /// @param estimate  of their experiments
-  /// @param shared    short ones may share a process
-  /// @returns  how many of their records have another outcome than "finished"
+  /// Runs the unfinished pieces of `pieces`, which are in the order of the experiments.
+  /// @param estimate  time estimates of their experiments
+  /// @param shared    short pieces may share a process
+  /// @returns  number of their records with an outcome other than "finished"
   std::size_t Run(const std::string& what, std::vector<Piece> pieces, int jobs, bool shared,
                   Estimate* estimate);
 
-  /// What was asked for so far: cases of a long sweep are told from those of their group alone.
+  /// Forgets all requests so far: cases of a long sweep are distinguished within their group only.
   void Forget() {
     asked_.clear();
     count.ids.clear();

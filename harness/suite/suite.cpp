@@ -27,8 +27,8 @@ namespace loopbench::harness {
 
 namespace {
 
-/// A person waits for the pilots before the first case begins; the groups of a long sweep are told
-/// from the first one.
+/// Small budget, because the user waits for the pilots before the first case. Groups of a long
+/// sweep are extrapolated from the first one.
 constexpr Estimate::Budget kForProgress = {
     .share = 0.01, .least_s = 0.003, .most_s = 0.25, .all_s = 2.0};
 
@@ -38,7 +38,7 @@ Estimate::Budget ForProgress(double pilots_s) {
   return budget;
 }
 
-/// Limits of time are of CPU time, so that too many jobs change no outcome. They gain nothing.
+/// Warns about more jobs than processors: time limits count CPU time, so outcomes do not change.
 void WarnOfJobs(int jobs, const std::vector<Experiment>& experiments) {
   const int processors = ReadMachineState().processors;
   int threads = 1;
@@ -57,7 +57,7 @@ void WarnOfJobs(int jobs, const std::vector<Experiment>& experiments) {
       jobs, processors, processors == 1 ? "" : "s", jobs);
 }
 
-/// The pieces of one group, of one kind after the other.
+/// Pieces of one group, kind by kind.
 class Group {
  public:
   Group(const ExperimentGroup& group, const SuiteOptions& options, double pilots_s, Runner* runner,
@@ -69,8 +69,7 @@ class Group {
         store_(store),
         estimate_(experiments_, ForProgress(pilots_s), options.filter) {}
 
-  /// Each runs all of its kind and returns how many of their records are of runs that did not
-  /// finish.
+  /// Run all pieces of a kind; return the number of records of runs that did not finish.
   std::size_t Accuracy() {
     KeepMechanisms(experiments_, store_.file());
     std::vector<Piece> references;
@@ -123,7 +122,7 @@ class Group {
   }
 
  private:
-  /// Whether the piece is this shard's. One whose cases two files share is one piece, of one shard.
+  /// Returns true if the piece belongs to this shard. Duplicate pieces of two files count once.
   template <class Seconds>
   bool Add(std::size_t e, Piece piece, Seconds seconds) {
     if (!group_.is_sharded) {
@@ -153,8 +152,8 @@ class Group {
   ResultStore& store_;
   Estimate estimate_;
   std::vector<Piece> pieces_;
-  std::size_t number_ = 0;                 ///< of the next piece, for the shard
-  std::unordered_set<std::string> dealt_;  ///< ids of those that some shard has
+  std::size_t number_ = 0;                 ///< number of the next piece, for sharding
+  std::unordered_set<std::string> dealt_;  ///< ids of the pieces of all shards
 };
 
 }  // namespace
@@ -211,9 +210,9 @@ SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRun
 }
 namespace {
 
-constexpr std::uintmax_t kLast = 512;  ///< bytes, of a record with its checksum
+constexpr std::uintmax_t kLast = 512;  ///< bytes, within a record with its checksum
 
-/// Of the bytes before `end`, "" when they cannot be read.
+/// Returns the hash of the bytes before `end`, "" if they cannot be read.
 std::string HashBefore(std::ifstream& store, std::uintmax_t end) {
   const std::uintmax_t begin = end - std::min(end, kLast);
   std::string bytes(static_cast<std::size_t>(end - begin), '\0');
@@ -240,7 +239,7 @@ GroupMarks::GroupMarks(const std::filesystem::path& store, std::string content)
     std::uintmax_t length = 0;
     GroupMark mark;
     words >> of >> kind >> group >> mark.records >> mark.failed >> length >> hash >> end;
-    // a torn line has no end
+    // an incomplete line has no end mark
     if (of != content_ || end != "." || length > size) continue;
     if (HashBefore(bytes, length) == hash) marks_[{kind, group}] = mark;
   }
@@ -263,7 +262,7 @@ void GroupMarks::Add(const std::string& kind, std::size_t group, const GroupMark
 }
 namespace {
 
-/// Records may have been written by anybody: only what a run calls its files is a name.
+/// Returns true for file names as written by runs; records from other sources are not trusted.
 bool IsId(const std::string& text) {
   return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
@@ -273,12 +272,12 @@ std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
   return store_file.parent_path() / "mechanisms" / (scene_id + ".json");
 }
 
-/// The comment of a file holds the hash of all its bytes, with zeros instead of the hash.
+/// Comment with the hash of all bytes of the file, computed with zeros in place of the hash.
 constexpr std::string_view kChecksum = "Kept by a run; checksum ", kZeros = "0000000000000000";
 
 std::string WithOwnHash(std::string text) {
   const std::size_t at = text.find(kChecksum);
-  if (at == std::string::npos) return text;  // of version 1.0
+  if (at == std::string::npos) return text;  // format version 1.0
   text.replace(at + kChecksum.size(), kZeros.size(), kZeros);
   return text.replace(at + kChecksum.size(), kZeros.size(), Fnv1a(text));
 }

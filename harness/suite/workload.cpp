@@ -34,17 +34,17 @@ Shard ParseShard(const std::string& text) {
 }
 namespace {
 
-constexpr std::size_t kSome = 64;             ///< combinations that stand for all
-constexpr std::size_t kEachValue = 2000;      ///< values of an axis that are tried
-constexpr std::size_t kMostBodies = 200'000;  ///< of a group: some 100 MB
-constexpr std::size_t kMostCases = 100'000;   ///< of a group: some 100 MB of records, too
+constexpr std::size_t kSome = 64;             ///< combinations of the sample
+constexpr std::size_t kEachValue = 2000;      ///< maximum number of tested values of an axis
+constexpr std::size_t kMostBodies = 200'000;  ///< per group: about 100 MB
+constexpr std::size_t kMostCases = 100'000;   ///< per group: about 100 MB of records
 
 bool IsOn(const Condition& condition,
           const std::vector<std::pair<std::string, std::size_t>>& axes) {
   return std::ranges::any_of(axes, [&](const auto& axis) { return axis.first == condition.key; });
 }
 
-/// What all combinations have in common when they are alike.
+/// Returns the common content of combinations that are alike.
 std::string KeysWithoutParameters(const Experiment& experiment) {
   Experiment bare = experiment;
   bare.parameters = Record();
@@ -55,8 +55,8 @@ std::string KeysWithoutParameters(const Experiment& experiment) {
   return text;
 }
 
-/// A rule or filter over combinations that are alike: the conditions on parameters, and which cases
-/// meet the others.
+/// A rule or filter for combinations that are alike: conditions on parameters, and the cases that
+/// meet the other conditions.
 struct SplitSelection {
   Selection on_axes;
   std::vector<bool> cases;
@@ -148,7 +148,7 @@ LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
       some_.push_back(std::move(one));
     }
   }
-  // a filter may choose what lies between them
+  // a filter may select combinations between the samples
   for (std::size_t i = 0; i < count() && some_.empty(); ++i) some_ = ReadOne(i);
   if (some_.empty()) {
     throw ConfigError(
@@ -193,7 +193,7 @@ std::vector<CaseLine> LongSweep::CountAlike(const Experiment& first) const {
   const SplitSelection filter = Split(filter_, cases, axes);
   std::vector<SplitSelection> rules;
   for (const Selection& rule : first.exclusions) rules.push_back(Split(rule, cases, axes));
-  // few combinations of rules occur: how often each does
+  // few combinations of rules occur: count each
   std::map<std::vector<bool>, std::size_t> times;
   std::vector<bool> met(rules.size());
   if (filter.on_axes.empty() && rules.empty()) {
@@ -238,7 +238,7 @@ std::vector<CaseLine> LongSweep::CountCases() {
 }
 namespace {
 
-/// Of the sweep and what its first and last combinations are made of.
+/// Returns a text that identifies the sweep, from its source and its first and last combinations.
 std::string ContentOf(const LongSweep& sweep) {
   std::string text = sweep.source().Text();
   for (const Experiment* one : {&sweep.some().front(), &sweep.some().back()}) {
@@ -247,7 +247,7 @@ std::string ContentOf(const LongSweep& sweep) {
   return Fnv1a(text);
 }
 
-/// Those that pass.
+/// Returns the experiments that pass.
 std::vector<Experiment> ReadWhole(ExperimentSource source, const ExperimentFiles& files) {
   std::vector<Experiment> experiments = source.ReadAll();
   if (files.threads > 0) {
@@ -265,7 +265,7 @@ std::vector<Experiment> ReadWhole(ExperimentSource source, const ExperimentFiles
 }  // namespace
 
 Workload::Workload(const ExperimentFiles& files, const Shard& shard) : shard_(shard) {
-  std::int64_t number = 0;  // of the next experiment
+  std::int64_t number = 0;  // number of the next experiment
   std::string contents;
   const auto parts = static_cast<std::size_t>(shard.count);
   for (const auto& path : files.paths) {

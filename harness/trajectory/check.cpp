@@ -12,14 +12,14 @@
 namespace loopbench::harness {
 namespace {
 
-/// A position and its speed in a row.
+/// Columns of a position and its speed.
 struct Pair {
   std::size_t position, speed;
   bool turns;
   SpeedCheck check;
 };
 
-/// The name of the speed of a component, or "".
+/// Returns the name of the speed of a component, or "".
 std::string SpeedOf(const TrajectoryColumn& column) {
   if (column.kind == "joint") return column.unit == "1" ? "" : column.component + " speed";
   if (column.kind != "body" && column.kind != "point") return "";
@@ -227,12 +227,12 @@ std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory
 double ValueAt(const Trajectory& ours, std::size_t column, double t) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const std::size_t rows = ours.rows();
-  std::size_t low = 0, high = rows;  // the first row that is not before t
+  std::size_t low = 0, high = rows;  // first row not before t
   while (low < high) {
     const std::size_t middle = (low + high) / 2;
     (ours.At(middle, ours.time) < t ? low : high) = middle + (ours.At(middle, ours.time) < t);
   }
-  // a time that was written with fewer digits is the same time
+  // times written with fewer digits count as equal
   constexpr double kSame = 1e-12;
   for (const std::size_t row : {low, low - 1}) {
     const bool is_there = row < rows;

@@ -1,4 +1,4 @@
-// Trajectories held against the equations, and against each other.
+// Checks of trajectories against the equations and against each other.
 #pragma once
 
 #include <optional>
@@ -10,15 +10,15 @@
 
 namespace loopbench::harness {
 
-// Holds a trajectory, of whatever program, against a mechanism: are its constraints kept, its
-// energy, and do its speeds belong to its positions?
+// Checks a trajectory of any program against a mechanism: constraint violation, energy, and
+// consistency of speeds with positions.
 
-/// The largest of some number, and when.
+/// Largest value of a quantity and its time.
 struct LargestAt {
   double value = 0.0, t = 0.0;
   bool is_known = false;
 
-  /// The first that is no number stays.
+  /// Adds a value; the first NaN stays.
   void Add(double other, double time) {
     if (is_known && (other <= value || value != value)) return;
     value = other, t = time, is_known = true;
@@ -27,15 +27,14 @@ struct LargestAt {
 
 struct JointCheck {
   std::string joint;
-  LargestAt shift = {}, rotation = {};             ///< of what it constrains [m], [rad]
+  LargestAt shift = {}, rotation = {};             ///< constraint violation [m], [rad]
   LargestAt velocity = {}, angular_velocity = {};  ///< [m/s], [rad/s]
-  LargestAt coordinates =
-      {};  ///< given coordinates from those that the bodies' poses have [rad], [m]
+  LargestAt coordinates = {};  ///< given coordinates minus those from body poses [rad], [m]
 };
 
 struct SpeedCheck {
-  std::string label;  ///< of the speed
-  LargestAt apart;    ///< from what the positions say, in its unit
+  std::string label;  ///< label of the speed
+  LargestAt apart;    ///< difference from the positions, in its unit
 };
 
 struct TrajectoryCheck {
@@ -43,30 +42,29 @@ struct TrajectoryCheck {
   double from = 0.0, to = 0.0;  ///< [s]
   std::string source;           ///< "body poses" or "joint coordinates"
   bool has_speeds = false;
-  std::vector<JointCheck> joints;  ///< of the mechanism, but free ones
-  LargestAt shift, rotation;       ///< of all
+  std::vector<JointCheck> joints;  ///< joints of the mechanism, except free ones
+  LargestAt shift, rotation;       ///< largest of all joints
   LargestAt energy;                ///< change of kinetic + potential - supplied + dissipated [J]
   double kinetic = 0.0;            ///< largest [J]
-  std::string no_energy;           ///< why there is none; or empty
-  /// The mean speed of two steps by the parabola through three speeds (Simpson's rule), against the
-  /// difference of positions: they differ by (h^4 / 90) times the fourth derivative of the speed.
+  std::string no_energy;           ///< reason why the energy is unknown; or empty
+  /// Mean speed over two steps by the parabola through three speeds (Simpson's rule), minus the
+  /// difference of positions. They differ by (h^4 / 90) times the fourth derivative of the speed.
   std::vector<SpeedCheck> speeds;
-  std::vector<std::string> unknown;  ///< labels that the mechanism has not
+  std::vector<std::string> unknown;  ///< labels that do not exist in the mechanism
 };
 
-/// Where every body is, row by row: from the poses of all bodies, or from the coordinates of joints
-/// that lead to each of them (`explain` lists which close loops); speeds where all of them are
-/// there.
+/// Poses of all bodies, row by row. They come from body columns, or from the coordinates of joints
+/// that lead to each body (`explain` lists joints that close loops). Speeds are read if complete.
 class MotionReader {
  public:
-  /// Throws std::runtime_error that names the columns that are missing for either.
+  /// Throws std::runtime_error with the missing columns.
   MotionReader(const MechanismDescription& user, const std::vector<TrajectoryColumn>& columns,
                const std::string& file);
   ~MotionReader();
 
   bool from_joints() const;
   bool has_speeds() const;
-  /// By the user's body, at rest where there are no speeds.
+  /// Returns motions by the user's body; speeds are zero if they are not given.
   const std::vector<BodyMotion>& Read(double t, const std::vector<double>& row);
 
  private:
@@ -74,27 +72,28 @@ class MotionReader {
   std::unique_ptr<Work> work_;
 };
 
-/// Row by row, in memory of a fixed size. Throws as TrajectoryReader and MotionReader do, and
-/// std::runtime_error for no row, or one without a finite number in a column of the motion.
+/// Checks row by row, with fixed memory. Throws as TrajectoryReader and MotionReader, and
+/// std::runtime_error for no rows or a row with a non-finite number in a motion column.
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user);
 
-// Two trajectories of one mechanism beside each other.
+// Comparison of two trajectories of one mechanism.
 
-/// A column that both have.
+/// A column of both trajectories.
 struct SharedColumn {
   std::string label, unit;
   std::size_t in_ours = 0, in_theirs = 0;
 };
 
-/// Columns with the same label, but for the time, in our order.
+/// Returns the columns with equal labels, except the time, in the order of `ours`.
 std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory& theirs);
 
-/// Ours at a time, by the cubic through the four rows around it, or the row itself where it has
-/// that time; NaN outside.
+/// Returns the value of `ours` at a time: of that row, or of the cubic through the four rows around
+/// it. NaN outside.
 double ValueAt(const Trajectory& ours, std::size_t column, double t);
 
-/// Theirs minus ours at their times, angles without whole turns; NaN where ours has none.
+/// Returns `theirs` minus `ours` at the times of `theirs`, angles modulo full turns; NaN outside
+/// `ours`.
 std::vector<double> Differences(const Trajectory& ours, const Trajectory& theirs,
                                 const SharedColumn& column);
 

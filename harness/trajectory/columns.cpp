@@ -14,7 +14,7 @@ namespace {
 
 using Columns = std::vector<TrajectoryColumn>;
 
-/// "x y z" or "x y".
+/// Adds columns "x y z" or "x y".
 void AddVector(const std::string& kind, const std::string& name, const std::string& prefix,
                const std::string& unit, bool planar, Columns* columns) {
   for (const char* axis : {"x", "y", "z"}) {
@@ -23,7 +23,7 @@ void AddVector(const std::string& kind, const std::string& name, const std::stri
   }
 }
 
-/// The unit of an effort along a coordinate.
+/// Returns the unit of an effort along a coordinate.
 std::string EffortUnit(bool is_length) { return is_length ? "N" : "N m"; }
 
 bool IsLength(const MechanismDescription& user, int joint) {
@@ -86,7 +86,7 @@ std::optional<TrajectoryColumn> ParseLabel(std::string_view label) {
   TrajectoryColumn column;
   column.unit = label.substr(bracket + 2, label.size() - bracket - 3);
   label = label.substr(0, bracket);
-  // components have no colon; a name's have a backslash before them
+  // components have no colon; colons in names follow a backslash
   const std::size_t first = label.find(':'), last = label.rfind(':');
   column.kind = label.substr(0, first);
   column.component = first == std::string_view::npos ? label : label.substr(last + 1);
@@ -105,7 +105,7 @@ std::vector<TrajectoryColumn> JointColumns(const MechanismDescription& user, std
         {"joint", name, std::string(word.name), word.unit.empty() ? "1" : std::string(word.unit)});
   }
   for (const ValueWord& word : ValueWords(joint.type, user.space, true)) {
-    // those of rotations without coordinates of their own are called so already
+    // speeds of rotations without coordinates of their own already have such names
     const bool is_speed = word.name.starts_with('w');
     columns.push_back({"joint", name, std::string(word.name) + (is_speed ? "" : " speed"),
                        std::string(word.unit)});
@@ -166,12 +166,12 @@ std::vector<TrajectoryColumn> TrajectoryColumns(const MechanismDescription& user
 }
 namespace {
 
-/// `angle` with the whole turns that bring it next to `near`.
+/// Returns `angle` plus the full turns that bring it closest to `near`.
 double Unwrapped(double angle, double near) {
   return near + std::remainder(angle - near, 2 * std::numbers::pi);
 }
 
-/// q or -q, which say the same, whichever is nearer to `last`.
+/// Chooses the sign of q, which has no influence on the rotation, closest to `last`.
 void KeepSign(const double* last, double* q) {
   double product = 0.0;
   for (int i = 0; i < 4; ++i) product += last[i] * q[i];
@@ -241,13 +241,13 @@ class RowOf final : public RowWriter {
     }
   }
 
-  /// Angles and quaternions of a joint in space go on from the last row.
+  /// Makes angles and quaternions of a spatial joint continuous with the last row.
   void Continue(const std::vector<ValueWord>& words, const JointKind<Space, double>& kind,
                 double followed, double* q) const {
     const double* last = last_.empty() ? nullptr : last_.data() + row_->size();
     if (kind.has_quaternion() && last != nullptr) KeepSign(last, q);
     for (std::size_t i = 0; i < words.size(); ++i) {
-      // a helix tells its turns
+      // a helical joint contains its full turns
       if (words[i].unit != "rad" || kind.parameter != 0.0) continue;
       if (words.size() == 1 && std::isfinite(followed)) {
         q[i] = Unwrapped(q[i], followed);
@@ -303,14 +303,14 @@ class RowOf final : public RowWriter {
     }
   }
 
-  /// A number of a reaction, counted where there is none.
+  /// Appends a component of a reaction; counts missing values.
   void PushOrOpen(double value) {
     if (open_.size() <= row_->size()) open_.resize(row_->size() + 1, 0);
     open_[row_->size()] += std::isnan(value);
     row_->push_back(value);
   }
 
-  /// Each force by itself. Only the bodies that it names are touched.
+  /// Appends each force separately, from the bodies that it acts on.
   void Forces() {
     std::size_t f = 0;
     std::ranges::fill(applied_, Wrench<Space, double>::Zero());
@@ -339,7 +339,7 @@ class RowOf final : public RowWriter {
     });
   }
 
-  /// With which a force on the second point pulls it to the first; 0 where the points meet.
+  /// Returns the pull of a force on the second point towards the first; 0 for coincident points.
   double Tension(const BodyPoint& first, const BodyPoint& second,
                  const Linear<Space, double>& on_second) const {
     const auto at = [&](const BodyPoint& point) {
@@ -358,7 +358,7 @@ class RowOf final : public RowWriter {
   std::vector<Wrench<Space, double>> applied_;
   std::vector<double>* row_ = nullptr;
   std::vector<double> last_;        ///< row
-  std::vector<std::int64_t> open_;  ///< by column, how often there was no number
+  std::vector<std::int64_t> open_;  ///< by column: number of rows without a value
 };
 
 }  // namespace

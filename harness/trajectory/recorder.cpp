@@ -114,7 +114,7 @@ template <class Space>
 void Recorder<Space>::Finish(Record& record) {
   if (!file_) Open();
   const std::int64_t rows = file_->rows();
-  // columns that are open in equally many rows share a line
+  // columns without a value in equally many rows share a line
   std::vector<std::string> notes;
   std::int64_t open = 0;
   const auto columns = rows_->Open();

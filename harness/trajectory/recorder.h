@@ -1,4 +1,4 @@
-// Writes the trajectory of a run: what the integrator shows becomes rows of the user's mechanism.
+// Recorder of a run: converts integrator states into trajectory rows of the user's mechanism.
 #pragma once
 
 #include <filesystem>
@@ -16,32 +16,32 @@
 
 namespace loopbench::harness {
 
-/// Where and why a trajectory is written.
+/// Output file and options of a trajectory.
 struct TrajectoryTask {
   const OutputOptions& output;
   std::filesystem::path path;
-  std::string title;  ///< which case it is of
+  std::string title;  ///< title of the case
 };
 
-/// Of a mechanism that runs as one part. None of its functions is called in a right-hand side.
+/// Recorder for a mechanism that runs as one part; never used inside a right-hand side.
 template <class Space>
 class Recorder {
  public:
-  /// `user`, `compiled`, `mechanism` and what the task refers to outlive it.
+  /// `user`, `compiled`, `mechanism` and the references in `task` must outlive it.
   Recorder(const MechanismDescription& user, const Compiled& compiled,
            const Mechanism<Space, double>& mechanism, const TrajectoryTask& task);
 
-  /// A row at a time between steps, or at the end of one, of the integrator's state: positions,
-  /// speeds, and where they are integrated the works. `lower` has more of the interpolation's error
-  /// in it; it may be the same state.
+  /// Writes a row for an integrator state at a step end or between steps. The state contains
+  /// positions, speeds, and works if integrated. `lower` has a larger interpolation error, or is
+  /// the same state.
   void TakeAt(double t, System<Space, double>& system, std::span<const double> y,
               std::span<const double> lower);
-  /// A row of what `system` has examined: its accelerations, if they are known, are its udot().
-  /// `work` is what has been supplied and dissipated; empty where that is not integrated.
+  /// Writes a row from the evaluated state of `system`; known accelerations are its udot(). `work`
+  /// contains supplied and dissipated work; empty if not integrated.
   void Take(double t, const System<Space, double>& system, bool has_accelerations,
             std::span<const double> work);
 
-  /// The file and its keys. Where nothing was taken the file has no rows.
+  /// Completes the file and sets its record keys. Without recorded states the file has no rows.
   void Finish(Record& record);
 
  private:
@@ -54,9 +54,9 @@ class Recorder {
   TreeDynamics<Space, double> dynamics_;
   std::vector<Acceleration<Space, double>> A_;
   MomentOfRun moment_;
-  std::optional<std::vector<BodyMotion>> lower_;  ///< of the state with more error
+  std::optional<std::vector<BodyMotion>> lower_;  ///< motions of the state with the larger error
   std::vector<double> ydot_;
-  std::vector<MeasuredPoint> points_;  ///< at which degrees are compared
+  std::vector<MeasuredPoint> points_;  ///< points for comparing interpolation degrees
   double interpolation_ = 0.0;         ///< [m]
   std::unique_ptr<RowWriter> rows_;
   std::optional<TrajectoryWriter> file_;  ///< opened with the first row

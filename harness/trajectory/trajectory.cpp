@@ -26,8 +26,8 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// The next cell of a line from `*at`, which goes behind its comma; beyond the line at the end.
-/// Nothing where a quotation mark is not closed or has something behind it.
+/// Returns the next cell of a line from `*at` and moves `*at` after its comma; past the line at the
+/// end. Returns nothing for an unclosed quotation mark, or one followed by other text.
 std::optional<std::string_view> NextCell(std::string_view line, std::size_t* at,
                                          std::string* room) {
   if (*at >= line.size() || line[*at] != '"') {
@@ -64,7 +64,7 @@ std::optional<double> NumberIn(std::string_view cell) {
   if (cell.front() == '+') cell.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  // what lies beyond doubles is as good as zero or infinity, which says nothing
+  // values beyond the range of doubles are rejected
   if (end != cell.data() + cell.size() || error != std::errc()) return std::nullopt;
   return value;
 }
@@ -108,7 +108,7 @@ bool TrajectoryReader::NextLine() {
     if (line_.empty()) continue;
     if (line_.front() != '#') return true;
     std::vector<std::string>& notes = columns_.empty() ? notes_ : later_notes_;
-    constexpr std::size_t kMostNotes = 1000;  // more are no notes
+    constexpr std::size_t kMostNotes = 1000;  // ignore further notes
     if (notes.size() < kMostNotes) notes.push_back(line_.substr(line_.starts_with("# ") ? 2 : 1));
   }
   return false;
@@ -213,12 +213,12 @@ std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
 }
 namespace {
 
-/// Where columns stand in a file, and which of them do not.
+/// Indices of columns in a file, and the missing columns.
 class Places {
  public:
   explicit Places(const std::vector<TrajectoryColumn>& columns) : columns_(columns) {}
 
-  /// The places of all of `wanted`; those that are not there go to `missing`.
+  /// Returns the indices of all of `wanted`; adds absent ones to `missing`.
   std::vector<std::size_t> Of(const std::vector<TrajectoryColumn>& wanted,
                               std::vector<std::string>* missing) const {
     std::vector<std::size_t> places;
@@ -244,7 +244,7 @@ std::string Listed(const std::vector<std::string>& labels) {
   return text;
 }
 
-/// A mechanism that joint coordinates put in place.
+/// Mechanism in a position given by joint coordinates.
 struct ByJoints {
   virtual ~ByJoints() = default;
   virtual void Set(double t, const std::vector<double>& row, bool has_speeds,
@@ -263,12 +263,12 @@ struct ByJointsIn final : ByJoints {
     for (const TreeStep& step : mechanism.tree()) {
       const Joint<Space, double>& joint = mechanism.joints()[step.joint];
       if (joint.description < 0) {
-        // nothing but a virtual joint leads there
+        // only a virtual joint leads there
         missing->push_back("a joint of body " + mechanism.body_names()[step.child]);
         continue;
       }
       const auto columns = JointColumns(user, static_cast<std::size_t>(joint.description));
-      // prescribed coordinates follow their function, whatever a file says
+      // prescribed coordinates follow their function; file values are ignored
       std::vector<TrajectoryColumn> q_of, u_of;
       for (int i = 0; i < joint.kind->num_q; ++i) {
         if (mechanism.DriveOf(joint, i) < 0) q_of.push_back(columns[i]);
@@ -310,7 +310,7 @@ struct ByJointsIn final : ByJoints {
 struct MotionReader::Work {
   const MechanismDescription& user;
   std::vector<BodyMotion> bodies;
-  std::vector<std::vector<std::size_t>> of_body;  ///< pose and speeds; empty: by joints
+  std::vector<std::vector<std::size_t>> of_body;  ///< pose and speeds; empty: from joints
   std::unique_ptr<ByJoints> joints;
   bool has_speeds = false;
 };

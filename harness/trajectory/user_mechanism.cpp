@@ -27,7 +27,7 @@ Eigen::Vector3d AngularOf(const SpatialVector<Space, double, Kind>& V) {
   return w;
 }
 
-/// At the centre of mass, in the part's ground axes.
+/// Returns the motion of the centre of mass, in the part's ground axes.
 template <class Space>
 BodyMotion AtCentre(const Pose<Space, double>& pose, const Velocity<Space, double>& V) {
   BodyMotion motion;
@@ -70,7 +70,7 @@ void EnterPart(const Compiled& compiled, int part, const Kinematics<Space, doubl
     }
     Eigen::Vector3d com = own.description.bodies[b].com;
     if (Space::kRot == 1) com.z() = 0.0;
-    // the user's origin seen from the carrier's centre of mass, in carrier axes
+    // the user's origin relative to the carrier's centre of mass, in carrier axes
     const Eigen::Vector3d at = image.X.p - com;
     BodyMotion& body = (*bodies)[i];
     body.pose = {own.R_WC * carrier.pose.R * image.X.R, own.R_WC * carrier.PointAt(at)};
@@ -101,7 +101,7 @@ UserMechanism<Space>::UserMechanism(const MechanismDescription& user)
 template <class Space>
 void UserMechanism<Space>::Set(double t, std::span<const BodyMotion> bodies) {
   for (const TreeStep& step : mechanism_.tree()) {
-    // a virtual free joint from Ground to the centre of mass
+    // virtual free joint from Ground to the centre of mass
     const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
     const auto b = static_cast<std::size_t>(step.child);
     const BodyMotion& body = bodies[b];
@@ -180,19 +180,19 @@ template class UserMechanism<Spatial>;
 namespace {
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-/// Unknowns below which dense QR is the faster, and up to which it may take its time.
+/// Number of unknowns up to which dense QR is faster, and up to which its cost is acceptable.
 constexpr Eigen::Index kFew = 60, kMost = 900;
-/// Singular directions that positions off by e leave open: below some multiple of e.
+/// Singular directions are free if below this multiple of a relative violation e of the positions.
 constexpr double kOfMismatch = 10.0;
 
-/// Solutions of G x = w: one, and the columns that lead from it to all others.
+/// Solutions of G x = w: a particular one, and columns that span the homogeneous ones.
 struct Solution {
   Eigen::VectorXd x;
-  Eigen::MatrixXd open;  ///< empty where x is the only one
-  bool is_known = true;  ///< else nothing is
+  Eigen::MatrixXd open;  ///< empty if x is unique
+  bool is_known = true;  ///< false: no component is known
 };
 
-/// With column pivoting, Q R P^T = G; columns whose pivot is below `limit` of the first are open.
+/// Solves by Q R P^T = G with column pivoting; pivots below `limit` of the first are free.
 Solution SolveDense(const Eigen::MatrixXd& G, const Eigen::VectorXd& w, double limit) {
   Eigen::ColPivHouseholderQR<MatrixX<double>> qr(G);
   const auto& R = qr.matrixR();
@@ -243,7 +243,7 @@ struct Reactions<Space>::Work {
   const JointState<Space, double>& State(int j) const { return user.kinematics().joints()[j]; }
   const Joint<Space, double>& At(int j) const { return user.mechanism().joints()[j]; }
 
-  /// Takes the joint's wrench from what its bodies still need.
+  /// Subtracts the joint's wrench from the wrenches that its bodies still need.
   void Give(int j) {
     w[At(j).to] -= ShiftForce<Space, double>(total[j], State(j).r_Q);
     w[At(j).from] += ShiftForce<Space, double>(total[j], State(j).r_P);
@@ -251,7 +251,7 @@ struct Reactions<Space>::Work {
     is_done[j] = true;
   }
 
-  /// Bodies with one joint left, as long as there are some.
+  /// Solves bodies with one joint left, repeatedly.
   void Leaves() {
     std::vector<int> queue;
     for (int b = 1; b < static_cast<int>(left.size()); ++b) {
@@ -276,7 +276,7 @@ struct Reactions<Space>::Work {
     }
   }
 
-  /// Joints that are not done and hang together without Ground, from one of them.
+  /// Returns the unsolved joints connected to `start` without passing Ground.
   std::vector<int> PartOf(int start) {
     std::vector<int> part = {start};
     is_done[start] = true;
@@ -293,7 +293,7 @@ struct Reactions<Space>::Work {
     return part;
   }
 
-  /// Size of a direction in (*), moments over the mechanism's length.
+  /// Returns the norm of a direction in (*), with moments over the mechanism's length.
   double SizeOf(const Direction<Space, double>& D) const {
     return std::sqrt(D.angular.squaredNorm() / (length() * length()) + D.linear.squaredNorm());
   }
@@ -339,7 +339,7 @@ struct Reactions<Space>::Work {
     if (columns > kFew) {
       G.makeCompressed();
       Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> qr;
-      qr.setPivotThreshold(limit);  // columns are of some length one
+      qr.setPivotThreshold(limit);  // columns have a norm near one
       qr.compute(G);
       if (qr.info() == Eigen::Success && qr.rank() == columns) return {qr.solve(needed), {}, true};
     }
@@ -363,7 +363,7 @@ struct Reactions<Space>::Work {
     }
   }
 
-  /// Whether no open solution changes the product of the joint's wrench with a motion.
+  /// Returns true if no homogeneous solution changes the power of the joint's wrench for a motion.
   bool IsKnown(int j, const Velocity<Space, double>& along) const {
     const double size = along.angular.norm() * length() + along.linear.norm();
     return std::ranges::all_of(open[j], [&](const Wrench<Space, double>& change) {
@@ -372,13 +372,13 @@ struct Reactions<Space>::Work {
   }
 
   const UserMechanism<Space>& user;
-  std::vector<Wrench<Space, double>> w;      ///< what bodies still need
-  std::vector<Wrench<Space, double>> total;  ///< of joints on their second body, drives included
-  std::vector<std::vector<Wrench<Space, double>>> open;  ///< by which it may differ
-  std::vector<int> left;                                 ///< joints of a body that are not done
+  std::vector<Wrench<Space, double>> w;      ///< wrenches that bodies still need
+  std::vector<Wrench<Space, double>> total;  ///< wrenches on second bodies, including drives
+  std::vector<std::vector<Wrench<Space, double>>> open;  ///< homogeneous solutions
+  std::vector<int> left;                                 ///< number of unsolved joints of a body
   std::vector<Eigen::Index> first;                       ///< column of a joint's first direction
   std::vector<std::vector<int>> joints_of;
-  std::vector<int> bearing;  ///< the user's joints that hold something
+  std::vector<int> bearing;  ///< the user's joints with constrained directions
   std::vector<bool> is_done;
   double negligible = 0.0;
 };
@@ -403,7 +403,7 @@ void Reactions<Space>::Solve(std::span<const Acceleration<Space, double>> A,
   work.Leaves();
   const double limit = std::max(100 * kEpsilon * static_cast<double>(work.bearing.size()),
                                 kOfMismatch * work.user.RelativeMismatch());
-  // between what rounding leaves, some multiple of the limit, and a share of the load
+  // geometric mean of round-off (a multiple of the limit) and a share of the load
   work.negligible = std::sqrt(limit);
   for (const int j : work.bearing) {
     if (!work.is_done[j]) work.SolvePart(work.PartOf(j), limit);

@@ -11,18 +11,19 @@
 
 namespace loopbench::harness {
 
-// Where a user's body is and how it moves, whatever the mechanism was compiled to.
+// Poses and motions of the user's bodies, however the mechanism was compiled.
 
-/// In the user's ground axes, at the body's origin; accelerations are those of its points.
+/// Motion in the user's ground axes, at the body's origin; accelerations are of material points.
 struct BodyMotion {
   Frame pose;
-  double angle = 0.0;                                  ///< of planar scenes, with whole turns [rad]
+  double angle = 0.0;                                  ///< of planar problems, with full turns
+                                                       ///< [rad]
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< [m/s^2]
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< [rad/s^2]
 
-  /// A point given in body axes, its velocity and its acceleration, in ground axes.
+  /// Returns the position, velocity or acceleration, in ground axes, of a point in body axes.
   Eigen::Vector3d PointAt(const Eigen::Vector3d& at) const { return pose.p + pose.R * at; }
   Eigen::Vector3d VelocityAt(const Eigen::Vector3d& at) const {
     return velocity + angular_velocity.cross(pose.R * at);
@@ -34,23 +35,23 @@ struct BodyMotion {
   }
 };
 
-/// All bodies at rest at the origin, but those that were made part of Ground, where they are.
+/// Returns all bodies at rest at the origin; bodies merged with Ground have their fixed pose.
 std::vector<BodyMotion> AtRest(const Compiled& compiled);
 
-/// Enters all bodies of one part. `accelerations` are those of its centres of mass by the part's
-/// body; empty where they are not known, which leaves NaN.
+/// Sets all bodies of one part. `accelerations` are given at the centres of mass, by the part's
+/// body. If empty, accelerations become NaN.
 template <class Space>
 void EnterPart(const Compiled& compiled, int part, const Kinematics<Space, double>& kinematics,
                std::span<const Acceleration<Space, double>> accelerations,
                std::vector<BodyMotion>* bodies);
 
-// The user's own mechanism, nothing compiled away, put where its bodies are.
+// The user's original mechanism, with nothing compiled away, at given body motions.
 //
-// What a trajectory says of joints, forces and energies is measured here, from the motion of bodies
-// alone: the same functions serve a run of ours, whatever it was compiled to and integrated in, and
-// the motion that another program says its bodies have.
+// Joint values, forces and energies of a trajectory are computed here from body motions alone. The
+// same functions serve Loopbench runs, however they were compiled and integrated, and body motions
+// from other programs.
 
-/// Largest mismatch of one joint: in the directions that it constrains.
+/// Largest constraint violation of one joint.
 struct JointMismatch {
   double shift = 0.0;             ///< [m]
   double rotation = 0.0;          ///< [rad]
@@ -63,21 +64,21 @@ class UserMechanism {
  public:
   explicit UserMechanism(const MechanismDescription& user);
 
-  /// `bodies` by the user's body, Ground included.
+  /// Sets the state from `bodies`, indexed by the user's body, Ground included.
   void Set(double t, std::span<const BodyMotion> bodies);
 
   const Mechanism<Space, double>& mechanism() const { return mechanism_; }
   const Kinematics<Space, double>& kinematics() const { return kinematics_; }
 
-  /// Coordinates (an angle in space as the principal one) and speeds of a joint, prescribed ones
-  /// among them, as many as its kind has; at most seven and six.
+  /// Computes coordinates (a spatial angle as the principal value) and speeds of a joint, including
+  /// prescribed ones; at most seven and six.
   void Measure(int joint, double* q, double* u) const;
-  /// Direction of the i-th speed of a joint's kind, prescribed or not, at the joint's point.
+  /// Returns the direction of the i-th speed of a joint, prescribed or not, at the joint's point.
   const Direction<Space, double>& DirectionOfSpeed(int joint, int i) const;
 
-  /// Of a joint of the user's.
+  /// Returns the constraint violation of a joint of the user.
   JointMismatch MismatchOf(int joint) const;
-  /// Largest mismatch of all joints: the rotation [rad], or the shift over the mechanism's length.
+  /// Returns the largest of all rotations [rad] and of all shifts over the mechanism's length.
   double RelativeMismatch() const;
 
  private:
@@ -87,25 +88,24 @@ class UserMechanism {
   VectorX<double> q_, u_;
 };
 
-// What joints bear: the forces and moments that hold the user's bodies together.
+// Joint reactions: forces and moments that hold the user's bodies together.
 //
-// With the accelerations of all bodies known, each body needs the wrench w = M A + c - f_applied,
-// and its joints must give it. With D lambda the wrench of a joint on its second body, at its point
-// Mo, and its opposite on the first,
+// Each body needs the wrench w = M A + c - f_applied, which follows from all body accelerations.
+// The joints must supply it. The wrench of a joint is D lambda on its second body, at its point Mo,
+// and the opposite on the first:
 //
 //   sum over joints of S(r) D lambda = w        body by body                                (*)
 //
-// That asks for no formulation's multipliers: those of O-DCA, of the Lagrange equations and of
-// reduction solve the same equations in fewer unknowns, and agree as far as their accelerations do.
-// It holds for every joint of the user's, those between bodies that the compile step has merged,
-// and out of the plane that a run was simplified to.
+// This needs no multipliers of a formulation. O-DCA, the Lagrange equations and reduction solve the
+// same equations in fewer unknowns, and agree to the accuracy of their accelerations. It holds for
+// all joints of the user: also between merged bodies, and out of the plane of a problem simplified
+// to planar.
 //
-// Bodies with one joint left are solved one after the other from the leaves inwards; what stays are
-// loops, part by part: sparse QR where there are many unknowns, dense with pivoting where there are
-// few or where the sparse one finds them dependent. Redundant constraints share a load as their
-// stiffness says, which rigid bodies do not have. So a component of a reaction is known where no
-// solution of (*) with w = 0 changes it, and NaN where one does. Positions that miss each other by
-// a share e of a length leave directions open that (*) holds by less than 10 e.
+// Bodies with one joint left are solved in turn from the leaves inwards. The remaining loops are
+// solved part by part: by sparse QR for many unknowns, by dense QR with pivoting for few or
+// dependent ones. Rigid bodies do not determine how redundant constraints share a load. A reaction
+// component is known if no solution of (*) with w = 0 changes it, else NaN. Positions with a
+// relative violation e leave directions free in which (*) holds to less than 10 e.
 
 template <class Space>
 class Reactions {
@@ -114,17 +114,17 @@ class Reactions {
   explicit Reactions(const UserMechanism<Space>& user);
   ~Reactions();
 
-  /// At the present state of the mechanism. `A` are accelerations of the centres of mass by body,
-  /// `applied` all other forces there.
+  /// Solves at the present state of the mechanism. `A`: accelerations of the centres of mass by
+  /// body; `applied`: all other forces there.
   void Solve(std::span<const Acceleration<Space, double>> A,
              std::span<const Wrench<Space, double>> applied);
 
-  /// Components of the wrench on the joint's second body at the joint's point: [moment; force]
-  /// along the columns of `axes`, in ground axes. Without what drives give; NaN where not unique.
+  /// Returns the wrench on the joint's second body at the joint's point: [moment; force] along the
+  /// columns of `axes`, in ground axes. Excludes drives; NaN if not unique.
   Wrench<Space, double> Of(int joint, const Rotation<Space, double>& axes) const;
 
-  /// What a prescribed motion takes along its coordinate, so that its power is this times the speed
-  /// [N m or N]; NaN where not unique.
+  /// Returns the effort of a prescribed motion along its coordinate: its power is effort times
+  /// speed [N m or N]. NaN if not unique.
   double DriveOf(int joint, int coordinate) const;
 
  private:

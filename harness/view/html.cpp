@@ -31,7 +31,7 @@ std::string_view NameOf(ItemKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-/// JSON knows no number that is not finite.
+/// Returns a JSON number; non-finite numbers become 0, since JSON has none.
 std::string Number(double value, int digits = 10) {
   return std::isfinite(value) ? fmt::format("{:.{}g}", value + 0.0, digits) : "0";
 }
@@ -129,7 +129,7 @@ std::string ToJson(const Picture& picture) {
 }
 namespace {
 
-// 0 title, 1 subtitle, 2 failure, 3 whether the ghost is shown
+// 0 title, 1 subtitle, 2 failure, 3 flag: outline of the given poses is shown
 constexpr const char* kBody = R"(<header>
 <h1>{0}</h1>
 <p class="soft">{1}</p>
@@ -214,7 +214,7 @@ TableColumn Words(const char* key, const char* header) {
   return {.key = key, .header = header, .format = Format::kText};
 }
 
-/// Six digits; what is round-off of the picture's size is zero.
+/// Returns six digits; zero below `round_off`.
 std::string Number(double value, double round_off) {
   return fmt::format("{:.6g}", std::abs(value) < round_off ? 0.0 : value);
 }
@@ -226,7 +226,7 @@ class Writer {
   std::vector<Table> Write() const { return {Bodies(), Joints(), Forces(), Loops(), Motions()}; }
 
  private:
-  /// Columns x, y and in space z.
+  /// Adds columns x, y and, in space, z.
   void AddPlace(const std::string& prefix, const std::string& what, Table* table) const {
     for (const char axis : {'x', 'y', 'z'}) {
       if (axis == 'z' && picture_.planar) continue;
@@ -259,7 +259,7 @@ class Writer {
     return table;
   }
 
-  /// The angle, or the rotation vector.
+  /// Returns the angle, or the rotation vector.
   std::string TurnText(const Eigen::Matrix3d& R) const {
     if (picture_.planar) return Number(std::atan2(R(1, 0), R(0, 0)), 1e-12);
     const Eigen::AngleAxisd turn(R);

@@ -1,4 +1,4 @@
-// A picture as JSON, as the page that shows it, and as tables.
+// Writers of a picture: JSON, an HTML page, and tables.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 
 namespace loopbench::harness {
 
-// A picture as JSON, and the page that shows it.
+// JSON of a picture.
 
-// A picture as JSON for web/scene.js, safe inside an element of HTML.
+// JSON for web/scene.js that is safe inside an HTML element.
 
-/// A JSON string without <, >, & and separators of lines, so that no text ends the element or the
-/// line that it stands in. Control characters and bytes that are no UTF-8 are shown (escape.h).
+/// Returns a JSON string without <, >, & and line separators, so that no text ends the element or
+/// line that contains it. Control characters and invalid UTF-8 are made visible (escape.h).
 std::string ScriptString(std::string_view text);
 
-/// "[a,b]" of what `write` makes of each.
+/// Returns "[a,b]", where `write` converts each element.
 template <class List, class Write>
 std::string ListOf(const List& list, Write write) {
   std::string text = "[";
@@ -33,28 +33,28 @@ inline std::string Strings(const std::vector<std::string>& list) {
   return ListOf(list, [](const std::string& one) { return ScriptString(one); });
 }
 
-/// Numbers have ten digits, poses are as scene.js describes them.
+/// Writes numbers with ten digits and poses as described in scene.js.
 std::string ToJson(const Picture& picture);
 
-/// Poses alone, for what is drawn with the picture of the same mechanism, in so many digits.
+/// Returns only the poses, with `digits` digits, for drawing with a picture of the same mechanism.
 std::string PosesJson(const Poses& poses, bool planar, int digits = 10);
 
-// A picture as one page of HTML: data, style and script in it, nothing from elsewhere.
+// A picture as one self-contained HTML page: data, style and script are embedded.
 
-/// web/scene.js (draws any poses of a picture) with what it is made of, web/scene.css and
-/// web/view.js (the page of one mechanism), as they were when the program was built.
+/// web/scene.js (draws any poses of a picture) with the files that it needs, web/scene.css and
+/// web/view.js (page of one mechanism), embedded when the program is built.
 extern const std::string_view kSceneScript, kSceneStyle, kViewScript;
 
-/// A page from its first line into its style element, which is left open, with kSceneStyle in it.
-/// Nothing may be loaded or sent from there, whatever a name tries. `title` is safe for XML.
+/// Returns the start of a page, up to its open style element, which contains kSceneStyle. The page
+/// may load or send nothing, whatever a name contains. `title` is safe for XML.
 std::string PageHead(std::string_view title);
 
 std::string ToHtml(const Picture& picture);
 
-// A picture as tables of places, for terminals and readers of screens.
+// A picture as tables of positions, for terminals and screen readers.
 
-/// Bodies, joints, forces, loops and motions, each with what `explain` does not say: where they are
-/// in ground axes [m, rad].
+/// Returns tables of bodies, joints, forces, loops and motions with their positions in ground axes
+/// [m, rad], which `explain` does not print.
 std::vector<Table> ToTables(const Picture& picture);
 
 }  // namespace loopbench::harness

@@ -18,14 +18,14 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of the largest coordinate along a swing, in rad or lengths of the mechanism; and its frames to
-/// either side.
+/// Limit of the largest coordinate along a swing, in rad or lengths of the mechanism; and number of
+/// frames to either side.
 constexpr double kSwing = 0.7;
 constexpr int kFramesAside = 14, kFramesOfPass = 49;
-/// Where a motion leads nowhere.
+/// Amplitude of a motion without a finite path.
 constexpr double kSmall = 0.05;
 
-/// One position of a mechanism that is moved about.
+/// Moves a mechanism through its positions.
 template <class Space>
 class Follower {
  public:
@@ -51,18 +51,18 @@ class Follower {
     kinematics_.UpdatePosition(q_);
   }
 
-  /// At another time of the prescribed motions, from the coordinates here: whether the loops close.
+  /// Sets the time of the prescribed motions, from the present coordinates; returns true if closed.
   bool SetTime(double t) {
     kinematics_.SetTime(t);
     kinematics_.UpdatePosition(q_);
     return Close();
   }
 
-  /// Without regard to loops.
+  /// Moves along u, ignoring the loops.
   void Shift(const VectorXd& u) { Place(Moved(u)); }
 
-  /// Along what the constraints leave of `u`, which becomes the direction taken; whether the loops
-  /// close there and it is another position.
+  /// Moves along the projection of `u` onto the constraints, which becomes the new direction.
+  /// Returns true if the loops close at a different position.
   bool Step(double distance, VectorXd* u) {
     if (mechanism_.num_rows() == 0) {
       Shift(*u * (distance / Size(*u)));
@@ -78,7 +78,7 @@ class Follower {
     *u = here.mass.matrixU().solve(y);
     *u *= distance / Size(*u);
     Shift(*u);
-    // one that comes back to where it was has led nowhere
+    // a step that returns to its start leads nowhere
     const bool moved = Close() && (q_ - before).norm() > 0.3 * (Moved(*u, before) - before).norm();
     if (!moved) Place(before);
     return moved;
@@ -97,7 +97,7 @@ class Follower {
   }
   VectorX<double> Moved(const VectorXd& u) const { return Moved(u, q_); }
 
-  /// Newton's method to the nearest position whose loops are closed.
+  /// Runs Newton's method to the nearest closed position.
   bool Close() {
     constexpr int kMostIterations = 12;
     const double goal = 1e-10 * mechanism_.length();
@@ -122,13 +122,13 @@ class Follower {
   VectorXd units_;
 };
 
-/// One of the directions in which a mechanism can begin to move.
+/// Direction of an initially possible motion.
 struct MotionStart {
-  int speed = 0;  ///< the one that is one unit in it, and zero in the others
+  int speed = 0;  ///< its leading speed: 1 here, 0 in the other directions
   VectorXd u;
 };
 
-/// By speed: one where its joint has no other, less where it has.
+/// Returns weights by speed: 1 for joints with one speed, less for others.
 template <class Space>
 VectorXd Clearness(const Mechanism<Space, double>& mechanism) {
   VectorXd clearness(mechanism.num_u());
@@ -141,7 +141,7 @@ VectorXd Clearness(const Mechanism<Space, double>& mechanism) {
   return clearness;
 }
 
-/// The permitted speeds, each called by one of them; the first `most`.
+/// Returns the first `most` admissible directions, each with its leading speed.
 template <class Space>
 std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t most) {
   const Mechanism<Space, double>& mechanism = start.kinematics().mechanism();
@@ -155,7 +155,7 @@ std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t 
   const Eigen::Index count = permitted.cols();
   if (count == 0) return all;
   const MatrixXd scaled = start.units().cwiseInverse().asDiagonal() * permitted;
-  // speeds that the user calls independent, if they are, else those that are so the most
+  // use the user's independent speeds if they are independent, else the most independent ones
   std::vector<int> chosen = mechanism.independent();
   MatrixXd own(count, count);
   const auto take = [&] {
@@ -170,7 +170,7 @@ std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t 
     good = values.sigma()[count - 1] > kIndependent * values.sigma()[0];
   }
   if (!good) {
-    // a motion is better called by a pin than by one of the three speeds of a ball
+    // prefer the name of a pin to one of the three speeds of a ball
     const MatrixXd clear = scaled.transpose() * Clearness(mechanism).asDiagonal();
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(clear);
     const auto& order = qr.colsPermutation().indices();
@@ -185,7 +185,7 @@ std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t 
   return all;
 }
 
-/// How far a swing went, in the speed that it is called by.
+/// Returns the range of a swing in its leading speed.
 std::string SwingText(double from, double to, bool is_length, bool whole) {
   return fmt::format("{:+.3g} to {:+.3g} {}{}; loops closed again in every frame", from, to,
                      is_length ? "m" : "rad", whole ? "" : ", where it cannot be followed further");
@@ -234,7 +234,7 @@ PictureMotion Swing(const MechanismDescription& description, Follower<Space>* fo
   return motion;
 }
 
-/// A time in which a given motion shows itself: a period, all of a table, a turn or a length.
+/// Returns a time that shows a prescribed motion: a period, a whole table, a turn or a length.
 double TimeToShow(const TimeFunctionDescription& function, double unit) {
   constexpr double kTurn = 2 * std::numbers::pi;
   if (const auto* harmonic = std::get_if<Harmonic>(&function)) {
@@ -306,7 +306,7 @@ std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
     return motions;
   }
   Follower<Space> follower(mechanism, q);
-  // few frames rather than few motions
+  // reduce frames rather than motions
   const auto bodies = description.bodies.size();
   const std::size_t fit = kMostFrames / bodies;
   const auto frames_of = [&](std::size_t count, int wanted) {

@@ -1,13 +1,13 @@
-// Motions for a picture: each degree of freedom followed to and fro, with all loops closed again at
-// every frame; and the pass of prescribed motions.
+// Motions for a picture: each degree of freedom swings to and fro with all loops closed in every
+// frame. Prescribed motions run once.
 //
-// A basis of the permitted speeds is chosen in which each motion moves one joint by one unit and
-// stops those that the others begin with, so that each can be called by the name of a joint. A
-// motion is then followed in small steps: a step along what the constraints leave of its last
-// direction, and back onto the loops (excursion.h does the same to look for rank). Links keep their
-// lengths to round-off. Where loops close no further the swing is shorter; where not even a first
-// step is possible (speeds of a singular position that lead nowhere) bodies are moved along the
-// speed itself by a small angle, and the text says so.
+// In the chosen basis of admissible speeds each motion moves one joint by one unit and stops the
+// leading joints of the other motions. Each motion is therefore named after a joint. A motion is
+// followed in small steps: a step along the projection of its last direction, then a position
+// projection onto the loops (excursion.h finds ranks in the same way). Links keep their lengths to
+// round-off. The swing ends early if the loops cannot close. If even the first step fails (speeds
+// of a singular configuration without a finite motion), bodies move along the speed itself by a
+// small angle, and the text states this.
 #pragma once
 
 #include "harness/view/picture.h"
@@ -15,12 +15,12 @@
 
 namespace loopbench::harness {
 
-/// Of the bodies of a mechanism that was compiled from `description` as it is.
+/// Returns the poses of the bodies of a mechanism that was compiled from `description` unchanged.
 template <class Space>
 Poses PosesOf(const MechanismDescription& description, const Kinematics<Space, double>& kinematics);
 
-/// From the closed position q of a mechanism in joint coordinates. At most kMostMotions, and none
-/// where the loops have more than kMostFollowed speeds; `left_out` says so in a sentence.
+/// Finds at most kMostMotions motions from the closed position q in joint coordinates; none for
+/// loops with more than kMostFollowed speeds. `left_out` gives the reason.
 template <class Space>
 std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
                                        const Mechanism<Space, double>& mechanism,

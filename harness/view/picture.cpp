@@ -49,7 +49,7 @@ std::string ForceText(const MechanismDescription& description, ForceDescription 
   return fmt::format("{}", fmt::join(words, ", "));
 }
 
-/// What of a mechanism stands in no position: names and numbers.
+/// Adds data of a mechanism that do not depend on the position: names and numbers.
 void AddItems(const MechanismDescription& description, Picture* picture) {
   const bool detailed = description.bodies.size() <= kMostDetailed;
   for (const BodyDescription& body : description.bodies) {
@@ -74,7 +74,7 @@ void AddItems(const MechanismDescription& description, Picture* picture) {
   }
 }
 
-/// What a run leaves out or takes together, by the images of bodies and joints.
+/// Marks parts that the compile step removes or merges, from the images of bodies and joints.
 void MarkGone(const MechanismDescription& description, Picture* picture) {
   const Compiled compiled = Compile(description);
   picture->notes = compiled.report;
@@ -97,14 +97,14 @@ void MarkGone(const MechanismDescription& description, Picture* picture) {
   }
 }
 
-/// How open a cut joint is: about [rad] and along [m] what it should hold, in ground axes.
+/// Returns the opening of a cut joint in ground axes: rotation [rad] and shift [m].
 template <class Space>
 Direction<Space, double> OpennessOf(const Kinematics<Space, double>& kinematics, int joint) {
   const JointState<Space, double>& state = kinematics.joints()[static_cast<std::size_t>(joint)];
   return state.Sum(state.Along(kinematics.ConstraintMismatch(joint), state.rows()), state.rows());
 }
 
-/// Symbols as large as suits the links, and no larger than suits the picture.
+/// Chooses the symbol size from the link lengths, bounded by the picture size.
 void Measure(const MechanismDescription& description, Picture* picture) {
   const auto points = Attachments(description);
   Eigen::AlignedBox3d box;
@@ -121,7 +121,7 @@ void Measure(const MechanismDescription& description, Picture* picture) {
     }
   }
   picture->extent = box.isEmpty() ? 0.0 : box.sizes().maxCoeff();
-  // a mechanism of one point has no size: anything will do
+  // a mechanism of one point has no size: any value will do
   if (!(picture->extent > 0.0)) picture->extent = 1.0;
   double link = picture->extent;
   if (!links.empty()) {
@@ -130,7 +130,7 @@ void Measure(const MechanismDescription& description, Picture* picture) {
     link = *middle;
   }
   picture->symbol = std::min(0.016 * picture->extent, 0.08 * link);
-  // links much shorter than the whole: pins of a picture that is looked at from afar
+  // links much shorter than the whole: pins of a picture seen from a distance
   picture->symbol = std::max(picture->symbol, 1e-5 * picture->extent);
 }
 
@@ -198,7 +198,7 @@ class Maker {
   }
 
  private:
-  /// With kinematics at what the file says.
+  /// Adds loops; kinematics must be at the given poses.
   void AddLoops(const Structure& structure) {
     const auto add = [&](int joint) -> PictureLoop& {
       const JointDescription& cut = description_.joints[static_cast<std::size_t>(joint)];
@@ -288,11 +288,11 @@ const std::vector<std::string>& ViewNames() {
 
 Eigen::Matrix3d ViewNamed(const Picture& picture, const std::string& name) {
   if (picture.planar) return Eigen::Matrix3d::Identity();
-  // azimuth and elevation of the viewer [degrees] about what is up
+  // azimuth and elevation of the viewer [degrees] about `up`
   double azimuth = -62.0, elevation = 22.0;
   if (name == "front") azimuth = -90.0, elevation = 0.0;
   if (name == "side") azimuth = 0.0, elevation = 0.0;
-  if (name == "top") azimuth = -90.0, elevation = 89.999;  // right is still known
+  if (name == "top") azimuth = -90.0, elevation = 89.999;  // right stays defined
   const Vector3d& up = picture.up;
   const Vector3d axis = std::abs(up.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
   const Vector3d a = (axis - axis.dot(up) * up).normalized(), b = up.cross(a);
@@ -316,7 +316,7 @@ Camera FitTo(const Picture& picture, const std::vector<const Poses*>& poses,
     }
   }
   if (box.isEmpty()) box.extend(Vector3d::Zero());
-  // half of a pin, of a bar
+  // half of a pin and of a bar
   const double around = 2.0 * picture.symbol;
   const Vector3d size = box.sizes() + Vector3d::Constant(2.0 * around);
   constexpr double kLowest = 90.0, kHighest = 560.0;

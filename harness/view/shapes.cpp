@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-/// Indices of points that are apart, in order.
+/// Returns the indices of distinct points, in order.
 std::vector<int> Distinct(const Points& points, double tolerance) {
   std::vector<int> kept;
   for (int i = 0; i < static_cast<int>(points.size()); ++i) {
@@ -23,13 +23,13 @@ std::vector<int> Distinct(const Points& points, double tolerance) {
   return kept;
 }
 
-/// The point of `among` for which `measure` is largest.
+/// Returns the point of `among` with the largest `measure`.
 template <class Measure>
 int Farthest(const std::vector<int>& among, Measure measure) {
   return *std::ranges::max_element(among, {}, measure);
 }
 
-/// The hull of points in a plane, counter-clockwise about `normal` (Andrew's monotone chain).
+/// Returns the planar hull, counter-clockwise about `normal` (Andrew's monotone chain).
 std::vector<int> Polygon(const Points& points, std::vector<int> order, const Vector3d& along,
                          const Vector3d& normal) {
   const Vector3d x = along.normalized(), y = normal.cross(x).normalized();
@@ -54,7 +54,7 @@ std::vector<int> Polygon(const Points& points, std::vector<int> order, const Vec
   return hull;
 }
 
-/// All triples that have every point on one side.
+/// Returns all triples with every point on one side.
 std::vector<std::vector<int>> Triangles(const Points& points, const std::vector<int>& kept,
                                         double tolerance) {
   std::vector<std::vector<int>> faces;
@@ -201,13 +201,13 @@ void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>
   for (std::size_t i = 0; star && i < points.size(); ++i) {
     pen.Add(ShapeKind::kBar, ShapeStyle::kBody, {on_body(middle), on_body(points[i])}, 0.3);
   }
-  // what is attached at one place only and slides there has the slider's box already
+  // a body with a single attachment that slides already has the slider's box
   if (faces.empty() && !star && !boxed) {
     pen.Add(ShapeKind::kDisc, ShapeStyle::kBody, {on_body(middle)}, 1.7);
   }
   item.anchor = on_body(middle);
   if (picture->bodies > kMostDetailed) return;
-  // a centre of mass off the body hangs on a line
+  // a line connects a centre of mass outside of the body
   const bool inside = std::ranges::any_of(
       points, [&](const Vector3d& p) { return (p - body.com).norm() <= 0.5 * pen.size(); });
   if (!inside && !faces.empty() && faces.front().size() == 2) {
@@ -245,12 +245,12 @@ void AddShapes(const MechanismDescription& description, Picture* picture) {
     picture->items[item].anchor = {.body = joint.to.body, .at = joint.to.position};
     AddJointShapes(joint, Pen(picture, item), *picture);
   }
-  // who draws in this order has the ground below bodies and pins above them
+  // drawing order: ground below bodies, pins above them
   std::ranges::stable_sort(picture->shapes, {},
                            [](const PictureShape& shape) { return Floor(shape.style); });
 }
 
-// Symbols of forces: springs, dashpots, arrows. Kinds of other programs have an arrow at a joint,
+// Symbols of forces: springs, dashpots, arrows. Forces of other programs have an arrow at a joint,
 // or a ring at each of their points.
 
 namespace {
@@ -258,7 +258,7 @@ namespace {
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-/// Between the frames of a joint that slides, beside its guide.
+/// Adds a shape between the frames of a sliding joint, next to its guide.
 void AddBeside(const JointDescription& joint, ShapeKind kind, ShapeStyle style, double y, Pen pen) {
   const JointPlaces X = PlacesOf(joint);
   pen.Add(kind, style,
@@ -267,7 +267,7 @@ void AddBeside(const JointDescription& joint, ShapeKind kind, ShapeStyle style, 
           0.7);
 }
 
-/// Part of a circle or spiral about z of a frame; angles in half turns.
+/// Adds part of a circle or spiral about z of a frame; angles in half turns.
 void AddArc(int body, const Frame& X, double angle, double sweep, double radius, double growth,
             ShapeStyle style, Pen pen) {
   Points arc;
@@ -333,14 +333,14 @@ PicturePlace AddForceShapes(const MechanismDescription& description, ForceDescri
   return places.empty() ? PicturePlace{} : places.front();
 }
 
-// Symbols of joints, by what they leave free. Kinds of other programs have a plain diamond.
+// Symbols of joints, by their free directions. Joints of other programs have a plain diamond.
 
 namespace {
 
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-/// Hatched ground `below` the origin of a frame whose y points down.
+/// Adds hatched ground `below` the origin of a frame whose y points down.
 void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {
   const auto line = [&](const Points& points) {
     pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On(kGround, foot, points));
@@ -354,14 +354,14 @@ void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {
   }
 }
 
-/// One joint being drawn. z is the axis it turns about, x the one it slides along.
+/// Draws one joint. z is its rotation axis, x its sliding axis.
 class JointSymbol {
  public:
   JointSymbol(const JointDescription& joint, Pen pen, const Picture& picture)
       : joint_(joint), pen_(pen), picture_(picture), places_(PlacesOf(joint)) {}
 
   void Draw() {
-    // a free joint holds nothing
+    // a free joint supports nothing
     const bool holds = joint_.type != JointType::kFree;
     if (holds && joint_.from.body == kGround) Ground(places_.F, Relative().p.x());
     if (holds && joint_.to.body == kGround) Ground(places_.M, 0.0);
@@ -425,7 +425,7 @@ class JointSymbol {
     pen_.Add(ShapeKind::kBar, style, pen_.On(body, X, {a, b}), radius);
   }
 
-  /// What turns about z: a disc where z is seen from its end.
+  /// Adds an axle about z: a disc if seen along z.
   void Axle(int body, const Frame& X, ShapeStyle style, double half, double radius) {
     if (picture_.planar) {
       pen_.Add(ShapeKind::kDisc, style, {On(body, X)}, radius);
@@ -442,7 +442,7 @@ class JointSymbol {
     Axle(from(), places_.F, ShapeStyle::kJoint, 1.1, radius);
   }
 
-  /// Along an axis of F as far as M is, and `beyond` further on both sides.
+  /// Adds a guide along an axis of F up to M, extended by `beyond` on both sides.
   void Guide(int axis, ShapeStyle style, double radius, double beyond) {
     const Frame X = Relative();
     const double reach = std::clamp(X.p[axis] / pen_.size(), -1e4, 1e4);
@@ -451,7 +451,7 @@ class JointSymbol {
     pen_.Add(ShapeKind::kBar, style, pen_.On(from(), places_.F, ends), radius);
   }
 
-  /// M in F at the start.
+  /// Returns M in F at the start.
   Frame Relative() const {
     const Frame P = picture_.start[static_cast<std::size_t>(from())],
                 Q = picture_.start[static_cast<std::size_t>(to())];
@@ -471,15 +471,15 @@ class JointSymbol {
     Axle(to(), places_.M, ShapeStyle::kJoint, 1.0, 1.1);
   }
 
-  /// What is fixed to Ground stands on a foot; in the plane a rail lies on hatched ground.
-  /// `shift` is what it slides by. [m]
+  /// Adds the support of a joint on Ground: a foot, or in the plane hatched ground for a rail.
+  /// `shift`: displacement of the slider [m].
   void Ground(const Frame& X, double shift) {
     const bool slides =
         joint_.type == JointType::kPrismatic || joint_.type == JointType::kPinInSlot;
     if (!slides || !picture_.planar) return AddFoot(X.p, pen_, picture_);
     double reach = std::clamp(shift / pen_.size(), -1e4, 1e4);
     Vector3d along = X.R.col(0), down(along.y(), -along.x(), 0.0);
-    // ground is below its rail, whichever way that is counted
+    // ground is below its rail for both directions of the axis
     if (down.dot(picture_.up) > 0.0) {
       along = -along;
       down = -down;
@@ -490,7 +490,7 @@ class JointSymbol {
     Hatch(rail, std::min(reach, 0.0) - 4.0, std::max(reach, 0.0) + 4.0, 1.7, pen_);
   }
 
-  /// An arrow about or along what follows a given motion.
+  /// Adds an arrow about or along a coordinate with a prescribed motion.
   void Driven(int coordinate) {
     const auto words =
         ValueWords(joint_.type, picture_.planar ? SpaceKind::kPlanar : SpaceKind::kSpatial, false);
@@ -516,7 +516,7 @@ void AddFoot(const Vector3d& at, Pen pen, const Picture& picture) {
             pen.On(kGround, foot, {{0, 0, 0}, {-1.6, 2.4, 0}, {1.6, 2.4, 0}}));
     return Hatch(foot, -1.6, 1.6, 2.4, pen);
   }
-  // a pyramid whose base is the ground
+  // a pyramid with its base on the ground
   const Points base = {{-1.5, 2.2, -1.5}, {1.5, 2.2, -1.5}, {1.5, 2.2, 1.5}, {-1.5, 2.2, 1.5}};
   pen.Add(ShapeKind::kArea, ShapeStyle::kGround, pen.On(kGround, foot, base));
   for (const Vector3d& corner : base) {

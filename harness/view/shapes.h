@@ -9,43 +9,42 @@
 
 namespace loopbench::harness {
 
-// Outlines of bodies: the convex hull of the points where others are attached.
+// Outlines of bodies: convex hulls of their attachment points.
 
-/// Faces of the convex hull as lists of indices into `points`: none for a single place, one of two
-/// corners where all are in line, one polygon where all are in a plane, else triangles. Points
-/// nearer than `tolerance` [m] are one. Above 24 points in space: the polygons of no volume are not
-/// sought, and there are no faces.
+/// Returns faces of the convex hull as lists of indices into `points`. One point gives none, points
+/// in line give one face with two corners, points in a plane one polygon, others triangles. Points
+/// closer than `tolerance` [m] are merged. More than 24 points that span a volume give no faces.
 std::vector<std::vector<int>> HullFaces(const std::vector<Eigen::Vector3d>& points,
                                         double tolerance);
 
-// Symbols: what stands for a body, a joint or a force, from where others are attached to it.
+// Symbols of bodies, joints and forces, built from attachment points.
 //
-// Sizes are multiples of Picture::symbol, half the size of a pin. Whatever reaches from one body to
-// another (a spring, a rod, the guide of a slider) has places on both, so that it follows them.
+// Sizes are multiples of Picture::symbol, half the size of a pin. A shape between two bodies (a
+// spring, a rod, the guide of a slider) has points on both, so that it follows them.
 
-/// Where a joint's frames are on its bodies, its axis included: in their axes, from their origins.
+/// Frames of a joint on its bodies, its axis included: in body axes, from body origins.
 struct JointPlaces {
   Frame F, M;
 };
 JointPlaces PlacesOf(const JointDescription& joint);
 
-/// Points of each body at which joints and forces between points act, in its axes; where these are
-/// fewer than two places, its named points too, and then its centre of mass.
+/// Returns the points of each body where joints and point forces act, in body axes. With fewer than
+/// two such points, the named points are added, then the centre of mass.
 std::vector<std::vector<Eigen::Vector3d>> Attachments(const MechanismDescription& description);
 
-/// Adds shapes to a picture, all of one item.
+/// Adds shapes of one item to a picture.
 class Pen {
  public:
   Pen(Picture* picture, std::size_t item) : picture_(picture), item_(static_cast<int>(item)) {}
 
   double size() const { return picture_->symbol; }
-  /// Radius and shift aside are counted in symbol sizes, too.
+  /// Adds a shape; radius and shift are given in symbol sizes.
   void Add(ShapeKind kind, ShapeStyle style, std::vector<PicturePlace> places, double radius = 0.0,
            double aside = 0.0) {
     picture_->shapes.push_back(
         {kind, style, item_, radius * size(), aside * size(), std::move(places)});
   }
-  /// Points of a frame on a body, counted in symbol sizes.
+  /// Returns points of a frame on a body, given in symbol sizes.
   std::vector<PicturePlace> On(int body, const Frame& X,
                                const std::vector<Eigen::Vector3d>& points) const {
     std::vector<PicturePlace> places;
@@ -54,7 +53,7 @@ class Pen {
     }
     return places;
   }
-  /// A box about the origin of a frame, half as large as `half` in symbol sizes; flat in the plane.
+  /// Adds a box about the origin of a frame, with half sides `half` [symbol sizes]; flat if planar.
   void Box(ShapeStyle style, int body, const Frame& X, const Eigen::Vector3d& half);
 
  private:
@@ -62,18 +61,18 @@ class Pen {
   int item_;
 };
 
-/// Of one joint; guides reach as far as the bodies are apart at the picture's start.
+/// Adds the shapes of a joint; guides span the distance of the bodies at the picture's start.
 void AddJointShapes(const JointDescription& joint, Pen pen, const Picture& picture);
-/// What holds a point of Ground: a hatched triangle, in space a pyramid.
+/// Adds the support of a point of Ground: a hatched triangle, or a pyramid in space.
 void AddFoot(const Eigen::Vector3d& at, Pen pen, const Picture& picture);
-/// An arrow along x of a joint's frame F (z of one with its axis there), or about z.
+/// Adds an arrow along x of a joint's frame F (z if its axis is z), or about z.
 void AddSweep(const JointDescription& joint, bool straight, ShapeStyle style, double radius,
               Pen pen);
-/// Of one force: where its name belongs.
+/// Adds the shapes of a force; returns the position of its name.
 PicturePlace AddForceShapes(const MechanismDescription& description, ForceDescription force,
                             Pen pen, const Picture& picture);
 
-/// Fills items' anchors and all shapes. Items, `start`, `up`, `symbol` and `extent` must be there.
+/// Sets anchors of items and all shapes. Requires items, `start`, `up`, `symbol` and `extent`.
 void AddShapes(const MechanismDescription& description, Picture* picture);
 
 }  // namespace loopbench::harness

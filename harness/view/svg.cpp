@@ -14,11 +14,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// 160 mm of paper at 96 px per inch; a font of 8 points.
+/// Page of 160 mm at 96 px per inch; a font of 8 points.
 constexpr double kWidth = 605.0, kMargin = 26.0, kFont = 10.7, kFooter = 52.0, kLine = 14.0;
 constexpr const char* kFamily = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
 
-/// Longer names are cut short: they would cover what they name.
+/// Shortens long names, which would cover their parts.
 std::string Shortened(const std::string& name, std::size_t most) {
   const std::string shown = EscapeTerminal(name);
   std::size_t characters = 0, bytes = 0;
@@ -44,7 +44,7 @@ class Document {
     if (ghost) pen.DrawGhost(picture_.given);
     pen.DrawAll(picture_.start);
     body_ += pen.Take();
-    // what is written goes last, so that nothing covers it
+    // text comes last, so that nothing covers it
     if (!options_.plain) DrawRedundant();
     if (!options_.plain) DrawGaps();
     DrawNames();
@@ -85,7 +85,7 @@ class Document {
         x, y, anchor, colour, EscapeXml(text));
   }
 
-  /// Whether the assembly moved anything by more than a symbol's size, to be seen.
+  /// Returns true if the assembly moved a part visibly, by more than a symbol's size.
   bool ShowsGhost() const {
     if (options_.plain || !picture_.assembled) return false;
     return std::ranges::any_of(picture_.items, [&](const PictureItem& item) {
@@ -94,8 +94,8 @@ class Document {
     });
   }
 
-  /// A dashed ring about joints that impose what others impose, and a line through the joints of
-  /// the loops that these are in.
+  /// Draws a dashed ring about joints with redundant constraints, and a line through the joints of
+  /// their loops.
   void DrawRedundant() {
     for (const PictureLoop& loop : picture_.loops) {
       if (loop.redundant.empty()) continue;
@@ -121,7 +121,7 @@ class Document {
   }
 
   void DrawGaps() {
-    // a guess that is nearly right is no mistake
+    // a nearly correct initial guess is no mistake
     const double least = (picture_.assembled ? 3.0 : 0.1) * picture_.symbol;
     for (const PictureLoop& loop : picture_.loops) {
       if (!(loop.gap > least)) continue;
@@ -138,7 +138,7 @@ class Document {
     }
   }
 
-  /// Beside a point, where nothing is written yet; nowhere if there is no room.
+  /// Places text next to a point without overlap; omits it if there is no room.
   void PlaceText(double x, double y, const std::string& text, const char* colour, double off) {
     const double wide = 0.6 * kFont * static_cast<double>(CountCharacters(text)), high = kFont;
     constexpr double kSides[][2] = {{1, -1}, {-1, -1}, {1, 1},    {-1, 1},    {0, -1},  {0, 1},
@@ -182,7 +182,7 @@ class Document {
     }
   }
 
-  /// Scale, axes and gravity.
+  /// Draws scale, axes and gravity.
   void DrawFooter(double top) {
     const double length = RoundLength(0.25 * kWidth / camera_.scale), px = length * camera_.scale;
     const double y = top + 0.5 * kFooter;
@@ -220,7 +220,7 @@ class Document {
     Text(tx + 8.0 * (foreshortened > 0.05 ? dx : 1.0), ty + 8.0 * dy + 4.0, name, "middle", colour);
   }
 
-  /// What cannot be drawn, one thing per line.
+  /// Returns one line for each fact that cannot be drawn.
   std::vector<std::string> Legend(bool ghost) const {
     constexpr std::size_t kMostLines = 10, kMostCharacters = 98;
     std::vector<std::string> lines;
@@ -236,7 +236,7 @@ class Document {
     }
     if (ghost)
       lines.push_back("grey, dashed: as the file says it, before the assembly closed the loops");
-    // those of which the same is to say, together
+    // parts with equal text share a line
     std::vector<std::pair<std::string, std::string>> gone;
     for (const PictureItem& item : picture_.items) {
       if (item.gone.empty()) continue;
@@ -285,7 +285,7 @@ namespace {
 
 using Spots = std::vector<Spot>;
 
-/// Colours of what is drawn; a line of `width` px.
+/// Colours of a shape, and the line width [px].
 struct Ink {
   const char* stroke;
   const char* fill;
@@ -350,7 +350,7 @@ std::string Path(const std::string& d, const Ink& ink, bool filled) {
       opacity == "1" ? "" : fmt::format(" fill-opacity=\"{}\"", opacity), Stroke(ink));
 }
 
-/// A line as thick as two radii, round at its ends and with an outline; or a polygon widened so.
+/// Returns a line of width two radii with round ends and outline, or a polygon widened so.
 std::string Thick(const Spots& spots, bool closed, double radius, const Ink& ink) {
   const std::string d = PathOf(spots, closed);
   if (radius < 0.8) return Path(d, ink, closed);
@@ -365,7 +365,7 @@ std::string Thick(const Spots& spots, bool closed, double radius, const Ink& ink
          stroked(ink.fill, ink.fill, inner);
 }
 
-/// Places along the way from a to b and to its left, both in px.
+/// Points along the line from a to b and to its left, both in px.
 class Along {
  public:
   Along(const Spot& a, const Spot& b) : a_(a), length_(std::hypot(b.x - a.x, b.y - a.y)) {
@@ -424,7 +424,7 @@ std::string Disc(const Spot& c, double radius, const Ink& ink) {
                      Decimal(c.y), Decimal(radius), ink.fill, Stroke(ink));
 }
 
-/// A circle, two opposite quarters of it black.
+/// Returns a circle with two opposite quarters black.
 std::string Centre(const Spot& c, double r, const Ink& ink) {
   const std::string x = Decimal(c.x), y = Decimal(c.y), left = Decimal(c.x - r),
                     right = Decimal(c.x + r), top = Decimal(c.y - r), bottom = Decimal(c.y + r),
@@ -457,7 +457,7 @@ void SvgPen::Draw(const PictureShape& shape, const Poses& poses) {
   if (std::max(right - left, bottom - top) + 2.0 * radius < kSeen) return Dot(spots.front());
   const PictureItem& item = picture_.items[static_cast<std::size_t>(shape.item)];
   Ink ink = InkOf(item, shape.style);
-  // what is behind a plate in space shows through
+  // in space, parts behind a plate show through
   if (shape.style == ShapeStyle::kBody && !picture_.planar) ink.opacity = "0.8";
   switch (shape.kind) {
     case ShapeKind::kLine:

@@ -1,5 +1,5 @@
-// A picture as SVG: for papers. Widths are of print, fonts of 8 points, fills are light and lines
-// dark, so that nothing is lost in greyscale; no style sheet, no script, nothing from elsewhere.
+// SVG writer of a picture, for papers: line widths for print, 8-point fonts, light fills and dark
+// lines that stay visible in greyscale. The file is self-contained, without style sheet and script.
 #pragma once
 
 #include <string>
@@ -10,30 +10,30 @@
 namespace loopbench::harness {
 
 struct SvgOptions {
-  std::string view = "oblique";  ///< of ViewNames()
-  /// Only the mechanism: no ghost of what the file says, no gaps, no lines of text below.
+  std::string view = "oblique";  ///< name from ViewNames()
+  /// Draws only the mechanism: no outline of the given poses, no loop openings, no text below.
   bool plain = false;
 };
 
 std::string ToSvg(const Picture& picture, const SvgOptions& options);
 
-/// A length that is one, two or five times a power of ten, at most `longest`.
+/// Returns the largest length of 1, 2 or 5 times a power of ten that is at most `longest`.
 double RoundLength(double longest);
 
-// Shapes as elements of SVG.
+// Shapes as SVG elements.
 
-/// Draws shapes one after the other; those that are too small to be seen leave a dot, at most one
-/// per pixel, so that a picture of 10^5 shapes is not larger than its paper.
+/// Draws shapes in order. Shapes too small to be visible become dots, at most one per pixel. A
+/// picture of 10^5 shapes therefore stays small.
 class SvgPen {
  public:
   SvgPen(const Picture& picture, const Camera& camera) : picture_(picture), camera_(camera) {}
 
-  /// All shapes at `poses`, the farthest first.
+  /// Draws all shapes at `poses`, the farthest first.
   void DrawAll(const Poses& poses);
-  /// Outlines of bodies and sliders alone, dashed.
+  /// Draws only dashed outlines of bodies and sliders.
   void DrawGhost(const Poses& poses);
 
-  /// What was drawn since the last call.
+  /// Returns the elements drawn since the last call.
   std::string Take();
 
  private:

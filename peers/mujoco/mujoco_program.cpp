@@ -15,7 +15,7 @@ namespace {
 using exchange::MjcfClosure;
 using exchange::MjcfCoordinate;
 
-/// Without these two, errors end the process after a key is pressed, and warnings go to a file.
+/// By default errors end the process after a key press, and warnings go to a file.
 void Throw(const char* message) { throw std::runtime_error(message); }
 void Ignore(const char*) {}
 
@@ -80,7 +80,7 @@ class MujocoProgram final : public Program {
   void Step() override {
     mj_step(model_.get(), data_.get());
     for (const int kind : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
-      // MuJoCo has then gone back to its reference pose
+      // MuJoCo has returned to its reference pose
       if (data_->warning[kind].number > 0) Throw("unstable: numbers are not finite or too large");
     }
     ++step_;
@@ -107,7 +107,7 @@ class MujocoProgram final : public Program {
  private:
   const MjcfCoordinate& At(int j) const { return made_.coordinates[static_cast<std::size_t>(j)]; }
 
-  /// MuJoCo has put the second points where the closures hold in its reference pose.
+  /// Corrects the second points: MuJoCo sets them so that closures hold in its reference pose.
   void SetClosures() {
     for (int e = 0; e < model_->neq; ++e) {
       const MjcfClosure& closure = made_.closures[static_cast<std::size_t>(e)];
@@ -128,7 +128,7 @@ class MujocoProgram final : public Program {
     for (int e = 0; e < model_->neq; ++e) {
       double *reference = model_->eq_solref + e * mjNREF,
              *impedance = model_->eq_solimp + e * mjNIMP;
-      reference[0] = 2.0 * h;  // less is not stable; critically damped
+      reference[0] = 2.0 * h;  // smallest stable value; critically damped
       reference[1] = 1.0;
       impedance[0] = impedance[1] = mjMAXIMP;
     }
@@ -149,7 +149,7 @@ class MujocoProgram final : public Program {
       mju_normalize4(turn);
       own[0] = turn[0];
       mju_rotVecMat(own + 1, turn + 1, one.axes.data());
-      // MuJoCo's speeds are in axes of the body that moves
+      // MuJoCo's speeds are in axes of the moved body
       for (int i = 0; i < 3; ++i) w[i] = one.sign * u[one.u + i];
       if (one.sign > 0.0) {
         mju_negQuat(turn, turn);
@@ -159,8 +159,8 @@ class MujocoProgram final : public Program {
     }
   }
 
-  /// Speeds or accelerations at data_'s pose: those of a ball differ by its orientation alone, for
-  /// w x w = 0.
+  /// Converts speeds or accelerations at data_'s pose. A ball's differ only by its orientation,
+  /// since w x w = 0.
   void ToOurs(const double* own, double* ours) const {
     for (int j = 0; j < model_->njnt; ++j) {
       const MjcfCoordinate& one = At(j);
@@ -179,7 +179,7 @@ class MujocoProgram final : public Program {
     }
   }
 
-  /// Half the product of (0, w) and q, w in axes of F.
+  /// Computes half the product of (0, w) and q, w in axes of F.
   static void QuaternionRate(const double* q, const double* w, double* qdot) {
     const double half[] = {0.0, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]};
     mju_mulQuat(qdot, half, q);

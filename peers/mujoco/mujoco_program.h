@@ -8,12 +8,12 @@
 
 namespace loopbench::peers {
 
-/// The document is that of harness/exchange/export_mjcf.h, at zero, with its closures put right
-/// where they do not hold there. Throws exchange::NotThere for what MJCF does not have.
+/// Makes the program from the document of harness/exchange/export_mjcf.h at zero, and corrects
+/// closures that do not hold there. Throws exchange::NotThere for parts that MJCF does not have.
 ///
-/// MuJoCo has no error control and no projection. Steps are of one length, by its classical
-/// Runge-Kutta method: 0.1 s tolerance^(1/4), which makes an error of order four proportional to
-/// the tolerance. Closures are as stiff as these steps allow.
+/// MuJoCo has no error control and no projection. The fixed step of its classical Runge-Kutta
+/// method is 0.1 s tolerance^(1/4): its error of order four is then proportional to the tolerance.
+/// Closures are as stiff as these steps allow.
 std::unique_ptr<Program> MakeMujocoProgram(const exchange::Model& model);
 
 }  // namespace loopbench::peers

@@ -1,4 +1,4 @@
-// The parts of a model, as objects of Simbody.
+// A model as Simbody objects.
 #include "peers/simbody/simbody_model.h"
 
 namespace loopbench::peers {
@@ -8,7 +8,7 @@ using namespace SimTK;
 
 Vec3 ToVec3(const exchange::Vec& v) { return {v[0], v[1], v[2]}; }
 
-/// Exactly orthogonal to round-off already: taken as it is.
+/// Converts a frame that is already orthogonal to round-off, without changes.
 Transform ToTransform(const exchange::Frame& frame) {
   const exchange::Matrix& R = frame.R;
   const Mat33 matrix(R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7], R[8]);

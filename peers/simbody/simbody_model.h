@@ -9,11 +9,11 @@
 
 namespace loopbench::peers {
 
-/// The coordinates of a mobilizer and those of our joint.
+/// Relation between the coordinates of a mobilizer and of a joint of the Model.
 struct Mobilizer {
   SimTK::MobilizedBody body;
-  int q = 0, num_q = 0, u = 0, num_u = 0;  ///< of our joint
-  double sign = 1.0;                       ///< ours = sign * Simbody's
+  int q = 0, num_q = 0, u = 0, num_u = 0;  ///< indices of the Model's joint
+  double sign = 1.0;                       ///< Model's coordinate = sign * Simbody's
 };
 
 struct SimbodyModel {

@@ -40,14 +40,14 @@ class SimbodyProgram final : public Program {
 
   void Step() override {
     const double before = time();
-    // the first returns say that the run begins
+    // the first returns only signal the start of the run
     try {
       while (!(time() > before)) {
         const auto status = integrator_->stepTo(t_end_);
         if (status == SimTK::Integrator::EndOfSimulation) return;
       }
     } catch (const std::exception& error) {
-      // one exception for all failures of a step: the words tell them apart
+      // one exception type for all step failures: its text distinguishes them
       const std::string text = error.what();
       const std::size_t place = text.find("Unable to advance time past");
       if (place == std::string::npos) throw;

@@ -9,13 +9,13 @@
 
 namespace loopbench::peers {
 
-/// Tree joints are mobilizers with the same coordinates and speeds, joints that close loops are
-/// constraints, forces are Simbody's own elements. Throws NotThere for a helical joint that closes
-/// a loop.
+/// Makes the program: tree joints become mobilizers with the same coordinates and speeds, cut
+/// joints become constraints, forces become Simbody's own elements. Throws NotThere for a helical
+/// cut joint.
 ///
-/// Steps are those of RungeKuttaMersonIntegrator at `accuracy` = tolerance (|W yerr|_RMS, its own
-/// weights) and a constraint tolerance of a tenth of it, which is Simbody's default: positions and
-/// speeds are projected, and the error estimate too, where they miss it.
+/// RungeKuttaMersonIntegrator runs with `accuracy` = tolerance (|W yerr|_RMS, its own weights) and
+/// a tenth of it as constraint tolerance, Simbody's default. Positions, speeds and the error
+/// estimate are projected if they violate it.
 std::unique_ptr<Program> MakeSimbodyProgram(const exchange::Model& model);
 
 }  // namespace loopbench::peers

@@ -83,8 +83,8 @@ void DenseEquations<Space, S>::SetScales(const Kinematics<Space, S>& kinematics,
   }
 }
 
-/// S with the bodies' masses; where it is suspicious, directions and weights from S with unit
-/// masses, then the factors of the physical one once more (loop_solver.h).
+/// Factors S with the bodies' masses. If it is suspicious, takes directions and weights from S with
+/// unit masses, then factors the physical one again (loop_solver.h).
 template <class Space, class S>
 Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kinematics,
                                                  Conditioning& found) {

@@ -4,7 +4,7 @@
 //   [ J  0   ] [ -lambda ] = [ gamma ]                                            (1)
 //
 // As published: LU of (1) with partial pivoting; a pivot lost in round-off ends as `singular`.
-// Rank-revealing, with the softened inverse of loop_solver.h, where S in the same form with unit
+// Rank-revealing, with the regularized inverse of loop_solver.h, where S in the same form with unit
 // masses decides the rank:
 //
 //   M = L L^T,      W = L^-1 J^T,      S = W^T W
@@ -33,7 +33,7 @@ class DenseEquations {
   Outcome Factor(const Kinematics<Space, S>& kinematics, Conditioning& found);
   /// As ConstraintSolver::Solve().
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x, VectorX<S>* lambda);
-  /// Level velocity. What u misses, J u + b, by the J that is at hand.
+  /// Level velocity. Uses the violation J u + b, with the current J.
   void CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u);
 
  private:

@@ -9,9 +9,9 @@ namespace loopbench::lagrange {
 
 namespace {
 
-/// Whether sparse factors take less time. Multiply-adds of the dense ones are of M, W, S and S's
-/// own. Measured on chains and ladders: one in small blocks costs four to ten in
-/// large matrices, which take 2000 to begin with.
+/// Returns true if sparse factors take less time. The dense multiply-adds are for M, W, S and the
+/// factors of S. Measured on chains and ladders: a multiply-add in small blocks costs as much as
+/// four to ten in large matrices, which have a fixed cost of 2000.
 template <class Space>
 bool IsLessWork(const JointResponse<Space>& sparse, const Mechanism<Space, double>& mechanism) {
   const double n = mechanism.num_u(), m = mechanism.num_rows();

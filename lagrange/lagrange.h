@@ -1,10 +1,10 @@
-// Acceleration-level Lagrange multipliers: the equations of constraint_solver.h with all
-// multipliers solved at once.
+// Lagrange multipliers at acceleration level: solves the equations of constraint_solver.h for all
+// multipliers at once.
 //
-// As published they are those of the cut joints, and the equations dense (dense_equations.h).
-// Rank-revealing they are those of all joints, and the equations sparse (joint_response.h), where
-// that is less work. Where a pivot leaves rank in doubt, the dense equations decide it, and soften;
-// where these would be too large to be kept ready for that, the evaluation ends as `singular`.
+// As published, only cut joints have multipliers, and the equations are dense (dense_equations.h).
+// Rank-revealing, all joints have them, and the equations are sparse (joint_response.h), if that is
+// less work. If a pivot leaves the rank uncertain, the dense equations decide it and regularize. If
+// these would be too large to keep ready, the evaluation ends as `singular`.
 #pragma once
 
 #include <memory>
@@ -30,7 +30,7 @@ class Lagrange final : public ConstraintSolver<Space, S> {
 
   std::string WhySingular() const override;
 
-  /// Whether the last Factor() was sparse.
+  /// Returns true if the last Factor() was sparse.
   bool is_sparse() const { return is_sparse_; }
 
  private:
@@ -38,7 +38,7 @@ class Lagrange final : public ConstraintSolver<Space, S> {
   void SolveSparsely(VectorX<S>& x, VectorX<S>* lambda);
 
   const Mechanism<Space, S>& mechanism_;
-  std::unique_ptr<JointResponse<Space>> joints_;  ///< null where they are not less work
+  std::unique_ptr<JointResponse<Space>> joints_;  ///< null unless they are less work
   std::unique_ptr<DenseEquations<Space, S>> dense_;
   BodyEquations<Space, S> equations_;
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()

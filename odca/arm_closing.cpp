@@ -60,7 +60,7 @@ void Closing::Place(const ClosingSide& P, const ClosingSide& Q, Correction<doubl
   largest->shift = std::max(largest->shift, constrained.linear.norm());
 }
 
-/// What A_Q - A_P must be beside H udot, less what it is without a force in the joint.
+/// Returns A_Q - A_P besides H udot, less its value without a force in the joint.
 template <Sought kSought>
 Acceleration<Spatial, double> Closing::Missing(const ClosingSide& P, const ClosingSide& Q) const {
   if constexpr (kSought == Sought::kAccelerations) {

@@ -1,7 +1,7 @@
 // A cut joint between the ends of two arms, or of one and Ground. It is imposed at one point, the
 // origin Mo of the frame on its body Q, along axes of the frame on its body P (joint.h). Its sides
-// may have drifted apart: so both ends are given with all six components, and this is what
-// mechanism/model/kinematics.cpp and joins.cpp make of them, in axes of P.
+// may have drifted apart, so both ends have all six components. Quantities equal those of
+// mechanism/model/kinematics.cpp and joins.cpp, in axes of P.
 #pragma once
 
 #include "mechanism/formulation/constraint_solver.h"
@@ -20,18 +20,18 @@ struct ClosingSide {
 
 class Closing {
  public:
-  /// Refuses where the response across the joint has an eigenvalue below `limit` over that of its
-  /// two bodies alone.
+  /// Rejects a response across the joint with an eigenvalue below `limit` relative to the response
+  /// of its two bodies alone.
   Closing(const ArmClosing& joint, double limit) : joint_(joint), limit_(limit) {}
 
-  /// Where the sides are; the largest mismatch becomes that of this joint, if it is larger.
+  /// Sets the poses of the sides; `largest` becomes this joint's violation if that is larger.
   void Place(const ClosingSide& P, const ClosingSide& Q, Correction<double>* largest);
-  /// Forces on both sides. Less than zero where the joint may be degenerate.
+  /// Computes forces on both sides. Negative if the joint may be degenerate.
   template <Sought kSought>
   double Close(ClosingSide& P, ClosingSide& Q) const;
 
  private:
-  /// From axes and origin of a side to axes of P and Mo.
+  /// Transform from axes and origin of a side to axes of P and Mo.
   struct Way {
     Rotation<Spatial, double> R;
     Linear<Spatial, double> e;  ///< Mo from the side's origin, in axes of P

@@ -13,7 +13,7 @@ Side SideOf(const Joint<Spatial, double>& joint, int body) {
   return joint.from == body ? joint.X_PF : joint.X_QM;
 }
 
-/// Motion of a handle, in its axes and in the order of its rows, from that of the centre of mass.
+/// Maps the motion of the centre of mass to a handle, in its axes and in the order of its rows.
 Matrix6 ShiftTo(const Side& side) {
   constexpr int kComponent[kAll] = {0, 1, 3, 4, 5, 2};
   Matrix6 S;
@@ -63,8 +63,8 @@ void Measure(const Inertia<Spatial, double>& inertia, const Side& side_1, const 
                 .to_2 = side_2.R.transpose() * side_1.R};
 }
 
-/// The step of the tree by which each body carries another, -1 for none. False where one carries
-/// two.
+/// Finds the step of the tree by which each body carries another, -1 for none. Returns false if a
+/// body carries two.
 bool FindBeyond(const Mechanism<Spatial, double>& mechanism, std::vector<int>& beyond) {
   beyond.assign(mechanism.num_bodies(), -1);
   for (int step = 0; step < static_cast<int>(mechanism.tree().size()); ++step) {
@@ -76,7 +76,7 @@ bool FindBeyond(const Mechanism<Spatial, double>& mechanism, std::vector<int>& b
   return true;
 }
 
-/// Cut joints, and by body which of them holds it. False where one is not at the ends of arms.
+/// Finds cut joints, and the joint at each body. Returns false if one is not at the ends of arms.
 bool FindClosings(const Mechanism<Spatial, double>& mechanism, const std::vector<int>& beyond,
                   std::vector<int>& closing_of, Arms& arms) {
   closing_of.assign(mechanism.num_bodies(), -1);
@@ -95,7 +95,7 @@ bool FindClosings(const Mechanism<Spatial, double>& mechanism, const std::vector
   return true;
 }
 
-/// The arm whose first body is that of this step of the tree.
+/// Returns the arm whose first body belongs to this step of the tree.
 Arm FollowArm(const Mechanism<Spatial, double>& mechanism, int step, const std::vector<int>& beyond,
               const std::vector<int>& closing_of) {
   const auto joint_of = [&](int one) -> const Joint<Spatial, double>& {

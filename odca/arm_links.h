@@ -10,7 +10,7 @@ namespace loopbench::odca::arms {
 
 /// A body of an arm. The angle of its joint outwards from Ground is `sign` times its coordinate.
 struct ArmBody {
-  int u = 0;  ///< of the joint that it hangs by, in q and u
+  int u = 0;  ///< index in q and u of its inward joint
   double sign = 1.0;
   Link<double> link;
 };
@@ -48,9 +48,9 @@ struct Arms {
   Linear<Spatial, double> gravity;
 };
 
-/// None where the mechanism is more than arms of revolute joints under gravity: with a tree joint
-/// of another kind, bodies that carry two others or hang freely, other forces, prescribed or
-/// released coordinates, a cut joint anywhere but at ends of arms, or one whose directions are no
+/// Returns no arms if the mechanism is more than arms of revolute joints under gravity: with a tree
+/// joint of another kind, bodies that carry two others or hang freely, other forces, prescribed or
+/// released coordinates, a cut joint anywhere except at ends of arms, or directions that are no
 /// constant axes.
 Arms FindArms(const Mechanism<Spatial, double>& mechanism);
 

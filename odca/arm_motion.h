@@ -1,9 +1,9 @@
-// Bodies between two revolute joints as they move: angular velocities, points, and accelerations
-// without forces of joints, over T = double or Lanes (mechanism/algebra/lanes.h).
+// Motion of bodies between two revolute joints: angular velocities, points, and accelerations
+// without joint forces, over T = double or Lanes (mechanism/algebra/lanes.h).
 //
-// A body has the axes of its two joint sides, 1 and 2, of which z is the joint's axis. A joint
-// turns the axes 2 of the body before it into the axes 1 of the next one: TurnInto(). Accelerations
-// are less that of gravity: bodies have no weight then, and Ground rises.
+// A body has the axes of its two joint sides, 1 and 2; z is the joint's axis. A joint turns the
+// axes 2 of the previous body into the axes 1 of the next one: TurnInto(). Accelerations are
+// relative to gravity: bodies are weightless, and Ground accelerates upwards.
 #pragma once
 
 #include "mechanism/algebra/lanes.h"
@@ -19,7 +19,7 @@ using Vector3 = Small<T, 3>;
 template <class T>
 using Matrix3 = Small<T, 3, 3>;
 
-/// Of a joint's angle.
+/// Sine and cosine of a joint's angle.
 template <class T>
 struct Turn {
   T c, s;
@@ -75,7 +75,7 @@ LOOPBENCH_INLINE void TurnHandle(const Turn<T>& turn, Symmetric<T, kRows>& zeta2
   }
 }
 
-/// What never changes of a body's motion, in axes 1.
+/// Constants of a body's motion, in axes 1.
 template <class T>
 struct Shape {
   Matrix3<T> inertia, inverse;  ///< about the centre of mass [kg m^2]
@@ -83,7 +83,7 @@ struct Shape {
   Matrix3<T> to_2;              ///< components in axes 2 from those in axes 1
 };
 
-/// How what stands at the start of some bodies is seen at their end.
+/// Transform of quantities from the start of some bodies to their end.
 template <class T>
 struct Passage {
   Matrix3<T> R;  ///< components in axes 2 of the last one, from those in axes at the start
@@ -102,10 +102,10 @@ LOOPBENCH_INLINE Passage<T> NoPassage() {
   }
   return none;
 }
-/// What of a passage is asked for: w, also R, or all.
+/// Requested results of a passage: w, also R, or all.
 enum class Follow { kSpeeds, kAxes, kPoints };
 
-/// One body more, behind a joint of this turn and speed. Returns its angular velocity in axes 1.
+/// Adds one body, behind a joint of this turn and speed. Returns its angular velocity in axes 1.
 template <Follow kFollow, class T>
 LOOPBENCH_INLINE Vector3<T> Pass(const Shape<T>& body, const Turn<T>& turn, const T& speed,
                                  Passage<T>& along) {
@@ -124,7 +124,7 @@ LOOPBENCH_INLINE Vector3<T> Pass(const Shape<T>& body, const Turn<T>& turn, cons
   }
   return w;
 }
-/// One passage behind the other.
+/// Concatenates two passages.
 template <Follow kFollow, class T>
 LOOPBENCH_INLINE void Pass(const Passage<T>& next, Passage<T>& along) {
   if constexpr (kFollow == Follow::kPoints) {
@@ -135,18 +135,18 @@ LOOPBENCH_INLINE void Pass(const Passage<T>& next, Passage<T>& along) {
   if constexpr (kFollow != Follow::kSpeeds) along.R = next.R * along.R;
 }
 
-/// What handles do without forces on them. zeta_i3 is [angular x, y; linear x, y, z].
+/// Accelerations of handles without forces. zeta_i3 is [angular x, y; linear x, y, z].
 template <class T>
 struct Free {
   T zeta13[kRows], zeta23[kRows];
   T about1, about2;  ///< angular z
 };
 
-/// What a sweep makes.
+/// Quantity computed by a pass.
 enum class Sought {
   kAccelerations,  ///< from speeds as they are
   kSpeeds,         ///< the smallest change of speeds, in the metric of M, that closes the loops
-  kPositions,      ///< likewise of positions, as speeds in unit time
+  kPositions,      ///< position corrections, as speeds in unit time
 };
 
 /// zeta_i3 of a body (1-4): with alpha = -I^-1 (w x I w), side i has the angular acceleration alpha

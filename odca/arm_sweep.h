@@ -1,19 +1,19 @@
-// O-DCA for spatial mechanisms whose bodies form arms of revolute joints under gravity: from joint
-// coordinates and speeds to their rates at once, in the kernels of revolute_handles.h.
+// O-DCA for spatial mechanisms whose bodies form arms of revolute joints under gravity: computes
+// rates directly from joint coordinates and speeds, in the kernels of revolute_handles.h.
 //
 // An arm is a sequence of bodies that hangs from Ground by joints of the spanning tree. Its last
-// body is free, or a cut joint holds it to that of another arm, or to Ground: an open path is one
-// arm, a closed one is two, or one with both ends on Ground.
+// body is free, or a cut joint connects it to another arm's last body or to Ground: an open path is
+// one arm, a closed one is two, or one with both ends on Ground.
 //
 //   passages   arms are cut into pieces of equal length, of which kLanes are a group, side by side;
-//              what each makes of axes, speeds and points
+//              their transforms of axes, speeds and points
 //   starts     along each arm: where its pieces begin, and the few bodies that are left over
 //   up         the bodies of a piece are joined one after another, pieces of a group side by side;
 //              then the pieces of an arm and the bodies left over, one after another
 //   closings   two arms by their cut joint (arm_closing.h)
 //   down       the same the other way round
 //
-// Threads share groups. What is computed depends on the mechanism alone, never on their number.
+// Threads share groups. Results depend on the mechanism alone, never on the number of threads.
 #pragma once
 
 #include <memory>
@@ -35,9 +35,9 @@ class ArmSweep final : public ShortCut<Spatial> {
   /// Enough work for a thread to wait for the others after it.
   static constexpr int kBodiesOfGroup = 1024;
 
-  /// Null where FindArms() finds none, or loops lose rank wherever bodies stand. The mechanism need
-  /// not outlive the sweep. Up to `threads` threads work on it, one for every `bodies_of_group`
-  /// bodies.
+  /// Returns null if FindArms() finds none, or loops lose rank in every position. The mechanism
+  /// need not outlive the sweep. Up to `threads` threads work on it, one for every
+  /// `bodies_of_group` bodies.
   static std::unique_ptr<ArmSweep> Make(const Mechanism<Spatial, double>& mechanism,
                                         int threads = 1, int bodies_of_group = kBodiesOfGroup);
 
@@ -52,9 +52,9 @@ class ArmSweep final : public ShortCut<Spatial> {
  private:
   /// kLanes pieces side by side.
   struct Group {
-    int pack = 0;  ///< its first one; that of its first body has place pack * kLanes
+    int pack = 0;  ///< first pack; its first body has slot pack * kLanes
     Passage<Lanes> passage;
-    Vector3<Lanes> w;  ///< of what is before the first bodies, in axes there
+    Vector3<Lanes> w;  ///< in the body before the first ones, in its axes
     Piece<Lanes> assemblies;
     Lanes F1[kRows], F2[kRows];  ///< on these
     Lanes about2;                ///< of their last bodies
@@ -89,8 +89,8 @@ class ArmSweep final : public ShortCut<Spatial> {
   void LayInner(const Arm& arm, int& piece, std::vector<Link<Lanes>>& packs, ArmPlaces& places);
   void SetPlace(int place, const ArmBody& body);
   void LayClosings(const Arms& arms);
-  /// Whether some position, however far from being closed, is none that Evaluate() refuses. There
-  /// is none where axes of loops are parallel or meet in a point, which costs rank everywhere.
+  /// Returns true if Evaluate() accepts some position, even one far from closed. It accepts none if
+  /// axes of loops are parallel or meet in a point, which reduces rank everywhere.
   bool Serves();
 
   /// Angles and speeds by place. False for angles beyond kLargestAngle.
@@ -99,12 +99,12 @@ class ArmSweep final : public ShortCut<Spatial> {
   /// sign times these numbers by place, in the order of u.
   void PutOut(const VectorX<double>& of_places, std::span<double> to);
 
-  /// Bodies where they are, and the largest mismatch of a cut joint, if asked for.
+  /// Computes poses of bodies, and the largest violation of a cut joint if requested.
   template <Sought kSought>
   void Move(Correction<double>* largest = nullptr);
   template <Sought kSought, Follow kFollow>
   void MoveFollowing();
-  /// Then rate_. False near a degenerate position.
+  /// Computes rate_ afterwards. Returns false near a degenerate position.
   template <Sought kSought>
   bool Solve();
   /// The largest mismatch at moved_, or nothing.
@@ -112,16 +112,16 @@ class ArmSweep final : public ShortCut<Spatial> {
   /// Passages of the group's pieces.
   template <Follow kFollow>
   void Travel(Group& group) const;
-  /// Where pieces begin, free motions of single bodies, the pose and speed of the tip.
+  /// Computes the starts of pieces, free motions of single bodies, and the tip's pose and speed.
   template <Sought kSought, Follow kFollow>
   void Start(const ArmPlaces& arm);
   template <Sought kSought>
   void Up(Group& group);
-  /// Over the nodes of an arm; the least slack of all its joins.
+  /// Joins the nodes of an arm; returns the least slack of all its joins.
   double Up(const ArmPlaces& arm, bool has_weight);
   void Down(const ArmPlaces& arm);
   void Down(Group& group);
-  /// Across the first joint of each node: less what is before it.
+  /// Subtracts at the first joint of each node the motion of the body before it.
   void Finish(const ArmPlaces& arm);
 
   int place_of_piece(int piece) const { return piece / kLanes * length_ * kLanes + piece % kLanes; }

@@ -1,5 +1,5 @@
-// Where bodies of arms stand in the lists of an ArmSweep, their constants, and how numbers come to
-// their places and back.
+// Layout of an ArmSweep: slots of bodies in its lists, their constants, and gather and scatter of
+// numbers.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -41,7 +41,7 @@ Pieces ChoosePieces(const std::vector<Arm>& arms, int groups) {
   return best;
 }
 
-/// Acceleration of a side on Ground, all being less that of gravity: rows of forces.
+/// Sets the acceleration of a side on Ground relative to gravity: rows of forces.
 void SetRise(const Pose<Spatial, double>& side, const Linear<Spatial, double>& gravity,
              double* zeta23) {
   const Linear<Spatial, double> rise = -(side.R.transpose() * gravity);

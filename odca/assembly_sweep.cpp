@@ -13,8 +13,8 @@ double Moment(const Vector2<double>& arm, const Vector2<double>& F) {
   return arm.x * F.y - arm.y * F.x;
 }
 
-/// No product of Eigen's: what of it is compiled here, with products and sums as one instruction,
-/// others would be linked with.
+/// No product of Eigen's: this file compiles them with fused multiply-add, and the linker could use
+/// them elsewhere.
 double Dot(const double* a, const double* b, int n) {
   Lanes sums = {};
   int i = 0;
@@ -46,7 +46,7 @@ bool AssemblySweep::Assemble() {
   return true;
 }
 
-/// zeta of the handles that stay: what they had, less product(e, f).
+/// Computes zeta of the remaining handles: the old value less product(e, f).
 template <class Product>
 void AssemblySweep::Eliminate(const Node& node, const Product& product) {
   const Side* kept = kept_.data() + node.first_kept;
@@ -111,7 +111,7 @@ bool AssemblySweep::JoinOne(const Node& node) {
   return true;
 }
 
-/// Of the two bodies of a pin.
+/// Returns the free response of the two bodies of a pin.
 JointMatrix<double> AssemblySweep::FreeResponse(const FreeBody* bodies) const {
   JointMatrix<double> X = JointMatrix<double>::Zero(2, 2);
   for (const FreeBody* free = bodies; free != bodies + 2; ++free) {

@@ -1,19 +1,19 @@
-// O-DCA for planar mechanisms of pins whose bodies branch, trees, several loops on one body, grids,
-// and for those on which forces other than gravity act. From joint coordinates and speeds to their
-// rates at once, as path_sweep.h does it for paths, along a plan (plan.h).
+// O-DCA for planar mechanisms of revolute joints (pins) with branches: trees, several loops on one
+// body, grids, and for all with forces other than gravity. Computes rates directly from joint
+// coordinates and speeds, like path_sweep.h for paths, along an assembly tree (plan.h).
 //
 //   angles and speeds of bodies   along the spanning tree (tree_angles.h)
-//   gaps of cut joints            along the same tree
+//   violations of cut joints      along the same tree
 //   up, matrices                  zeta of each body, then X, W or V and zeta of each join
 //   up and down, vectors          zeta_i3, then forces: once, or twice where speeds are completed
 //
-// A handle is a joint side that is still open, with the two rows of a pin's D (two_handle.h), so a
-// body has as many handles as it has pins, and Y (67) is a row of blocks of zeta. A pin of the tree
-// on Ground is no joint of an assembly but a property of its body, as there.
+// A handle is a joint side that is still open, with the two rows of a pin's D (two_handle.h). A
+// body has as many handles as pins, and Y (67) is a row of blocks of zeta. A tree pin on Ground is
+// a property of its body, not a joint of an assembly, as in two_handle.h.
 //
-// A join of one pin keeps W = X^-1 Y; its rank is in doubt where that of a path's is. One of
-// several is solved by loop_solver.h and is in doubt where the general sweep (joins.h) finds it so.
-// In doubt, Evaluate() gives up, and the general sweep decides.
+// A join of one pin keeps W = X^-1 Y; its rank is uncertain under the condition for paths.
+// loop_solver.h solves joins of several pins; their rank is uncertain if the general pass (joins.h)
+// finds it so. Evaluate() then stops, and the general pass decides.
 #pragma once
 
 #include <memory>
@@ -33,8 +33,8 @@ namespace loopbench::odca::pins {
 
 class AssemblySweep final : public ShortCut<Planar> {
  public:
-  /// Along `plan`, which need not outlive it, no more than the mechanism. Null for other
-  /// mechanisms, and where the general sweep has less to multiply, as with many pins on one body.
+  /// Returns a sweep along `plan`; neither plan nor mechanism need outlive it. Null for other
+  /// mechanisms, and if the general pass has fewer multiplications, as with many pins on one body.
   static std::unique_ptr<AssemblySweep> Make(const Mechanism<Planar, double>& mechanism,
                                              const Plan& plan);
 
@@ -51,21 +51,21 @@ class AssemblySweep final : public ShortCut<Planar> {
   using Matrix = Matrix2<double>;
 
   struct Body {
-    Link<double> link;  ///< its arms are those of handles
+    Link<double> link;  ///< arms belong to handles
     int first_handle = 0, handles = 0;
     int first_block = 0;  ///< of zeta
-    Vector stand = {};    ///< where the point of reference stands still, if it does
+    Vector stand = {};    ///< position of a fixed point of reference, if any
     Vector centre = {};   ///< of mass, from the point of reference, in axes of the body
   };
-  /// What forces other than gravity do to a body alone.
+  /// Effect of forces other than gravity on a body alone.
   struct Applied {
     Vector a = {};       ///< acceleration of the point of reference
     double alpha = 0.0;  ///< sqrt(I) times angular acceleration
   };
-  /// A joint of the tree between two bodies: where the child stands.
+  /// A joint of the tree between two bodies: position of the child.
   struct Step {
     int parent = 0, child = 0;                ///< bodies
-    int parent_handle = 0, child_handle = 0;  ///< where they meet
+    int parent_handle = 0, child_handle = 0;  ///< handles at their common joint
   };
   /// A joint that is cut. On Ground there is no handle.
   struct CutJoint {
@@ -102,10 +102,10 @@ class AssemblySweep final : public ShortCut<Planar> {
     int matrix = 0;                ///< of one pin: first of W_; else first number of V_
     int factors = 0;               ///< of one pin: in factors_; else in loops_
     int first_free = 0;            ///< of several: in free_, two for each pin
-    double limit = 0.0;            ///< least response of one pin, or pivot; 0 where no loop closes
+    double limit = 0.0;            ///< least response of one pin, or pivot; 0 if no loop closes
   };
 
-  /// Which mismatch stands in CutJoint::v, as in path_sweep.h.
+  /// Type of the violation in CutJoint::v, as in path_sweep.h.
   enum class Gaps { kSpeeds, kPositions };
 
   AssemblySweep() = default;
@@ -125,7 +125,7 @@ class AssemblySweep final : public ShortCut<Planar> {
   JointMatrix<double> FreeResponse(const FreeBody* bodies) const;
   /// applied_ at the positions and speeds of `kinematics`.
   void SetApplied(const Kinematics<Planar, double>& kinematics);
-  /// alpha_, or what is to be added to speeds.
+  /// Computes alpha_, or corrections of speeds.
   template <Pass kPass>
   void Solve();
   template <Pass kPass>
@@ -144,10 +144,10 @@ class AssemblySweep final : public ShortCut<Planar> {
   std::vector<FreeBody> free_;
   std::vector<Side> kept_;
 
-  std::vector<double> angle_, speed_, alpha_;  ///< by body, Ground's last, and what fills lanes
-  std::vector<double> sine_, cosine_;          ///< likewise
-  std::vector<Vector> arm_;                    ///< of handles, in ground axes, by radius
-  std::vector<Applied> applied_;               ///< of bodies; none where only gravity acts
+  std::vector<double> angle_, speed_, alpha_;  ///< by body, Ground's last, then padding of lanes
+  std::vector<double> sine_, cosine_;          ///< as in the line above
+  std::vector<Vector> arm_;                    ///< of handles, in ground axes, over radius
+  std::vector<Applied> applied_;               ///< by body; empty if only gravity acts
   std::vector<Wrench<Planar, double>> wrenches_;
   std::vector<Point<double>> reference_;  ///< of bodies
   std::vector<Matrix> zeta_, W_, Y_;
@@ -155,7 +155,7 @@ class AssemblySweep final : public ShortCut<Planar> {
   std::vector<Factored2<double>> factors_;
   std::vector<LoopSolver<double>> loops_;
   MatrixX<double> X_;
-  std::vector<Vector> b_, F_;  ///< by slot: handles of bodies first, then those of nodes
+  std::vector<Vector> b_, F_;  ///< by slot: handles of bodies first, then of nodes
   std::vector<double> s_, phi_;
   std::vector<double> moved_, back_, speeds_;  ///< as in path_sweep.h
   TreeAngles<double> tree_;

@@ -1,5 +1,5 @@
-// How bodies of an AssemblySweep stand: turned to their angles, and, where joints are cut, with
-// points followed along the tree to what these have drifted apart.
+// Poses of the bodies of an AssemblySweep at their angles, and violations of cut joints from points
+// along the tree.
 #include <algorithm>
 #include <cmath>
 
@@ -24,7 +24,7 @@ bool AssemblySweep::Turn() {
   return true;
 }
 
-/// A cut joint is imposed at one point, that of Q, and there the arm of P ends (two_handle.h).
+/// A cut joint is imposed at a point of Q; there the arm of P ends (two_handle.h).
 template <AssemblySweep::Gaps kGaps>
 void AssemblySweep::Close() {
   const auto leads = [&](int body, int handle) {

@@ -1,4 +1,4 @@
-// Where handles, zeta and joins stand in the lists of an AssemblySweep, and their constants.
+// Layout of an AssemblySweep: slots of handles, zeta and joins in its lists, and their constants.
 #include <algorithm>
 
 #include "odca/assembly_sweep.h"
@@ -13,7 +13,7 @@ bool HoldsBody(const Joint<Planar, double>& joint) {
   return joint.in_tree() && (joint.from == kGround || joint.to == kGround);
 }
 
-/// From the centre of mass of a body, or from Ground's origin, to one of its joints.
+/// Returns the arm from a body's centre of mass, or from Ground's origin, to one of its joints.
 Vector2<double> ArmOf(const Joint<Planar, double>& joint, bool at_Q) {
   const Linear<Planar, double>& p = at_Q ? joint.X_QM.p : joint.X_PF.p;
   return {p[0], p[1]};
@@ -22,7 +22,7 @@ Vector2<double> ArmOf(const Joint<Planar, double>& joint, bool at_Q) {
 }  // namespace
 
 struct AssemblySweep::Layout {
-  /// A body or what is joined, while joins are laid out.
+  /// A body or an assembly during the layout of joins.
   struct Assembly {
     int handles = 0, first_slot = 0, first_block = 0, bodies = 1;
     bool held = false;      ///< by Ground
@@ -40,7 +40,7 @@ struct AssemblySweep::Layout {
   int slots = 0, rows = 0, W = 0, most_rows = 0, most_kept = 0;
   double blocks = 0.0, V = 0.0, work = 0.0, vectors = 0.0;
 
-  /// False where the general sweep is less work, or places are too many for an int.
+  /// Returns false if the general pass is less work, or slots exceed an int.
   bool Fits() const { return work + vectors <= most_work && blocks < 5e8 && V < 5e8; }
   bool AddBodies();
   bool AddBody(int index, const std::vector<int>& joints);
@@ -135,7 +135,7 @@ AssemblySweep::Pin AssemblySweep::Layout::MakePin(const PlanNode& planned,
           cut_of[closed.index]};
 }
 
-/// Handles that stay, those of the first child first.
+/// Keeps the remaining handles, the first child's first.
 void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& all) {
   std::vector<int> closed;
   for (const NodeJoint& joint : planned.joints) {
@@ -193,8 +193,8 @@ void AssemblySweep::Layout::AddFree(const Joint<Planar, double>& joint) {
   }
 }
 
-/// A pin closes a loop where Ground holds both its sides, or both are on one assembly. The lighter
-/// side is what answers.
+/// A pin closes a loop if Ground holds both its sides, or both are on one assembly. The lighter
+/// side determines the response.
 void AssemblySweep::Layout::SetLimit(const PlanNode& planned, int joint, Node& node) const {
   const Assembly& one = assemblies[planned.children[0]];
   const Pin& pin = sweep.pins_[node.first_pin];
@@ -221,7 +221,7 @@ bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
     joints.push_back(closed.index);
   }
   node.pins = static_cast<int>(joints.size());
-  if (node.pins == 0) {  // a body that is held already
+  if (node.pins == 0) {  // a body already held by Ground
     all = std::move(assemblies[planned.children[0]]);
     return true;
   }

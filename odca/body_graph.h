@@ -37,7 +37,7 @@ class BodyGraph {
   std::span<const End> ends(int body) const {
     return std::span(ends_).subspan(first_[body], first_[body + 1] - first_[body]);
   }
-  /// How many joints a body has: to other bodies, and to Ground those that `waiting` counts.
+  /// Returns a body's number of joints: to other bodies, and to Ground as counted by `waiting`.
   int degree(int body) const { return first_[body + 1] - first_[body] + waiting_[body]; }
 
  private:

@@ -59,7 +59,7 @@ class Cutter {
     }
   }
 
-  /// By the difference of two distances, then by their sum: on a grid row after row, each in order.
+  /// Sorts by the difference of two distances, then their sum: on a grid row after row, in order.
   static std::vector<int> OrderBetween(const std::vector<int>& from, const std::vector<int>& to) {
     std::vector<int> order(from.size());
     std::iota(order.begin(), order.end(), 0);

@@ -1,4 +1,4 @@
-// Where to cut a connected set of bodies in two (join_order.h).
+// Cut of a connected set of bodies into two (join_order.h).
 #pragma once
 
 #include <span>

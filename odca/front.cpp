@@ -37,8 +37,8 @@ class Front {
  private:
   bool InSet(int body) const { return marks_.part_of[body] >= 0; }
 
-  /// The smallest enters next. First counts how many bodies leave the boundary with it, then how
-  /// many joints it has, both negative because more is better; its number breaks the tie.
+  /// Key of a body; the smallest enters next. Order: bodies that leave the boundary with it, then
+  /// its joints, both negative because more is better; its number breaks the tie.
   std::tuple<int, int, int> KeyOf(int body) const {
     return {-marks_.closing[body], -graph_.degree(body), body};
   }

@@ -12,7 +12,7 @@ namespace loopbench::odca {
 
 namespace {
 
-/// Where no join of pairing's list has more handles than this, the other two rules are not tried.
+/// If no join of pairing's list has more handles than this, the other two rules are not tried.
 constexpr int kFewHandles = 8;
 
 class Orderer {

@@ -1,6 +1,6 @@
-// In which order assemblies are joined: the tree behind a plan, before its lists are written.
+// Order of joins: the tree behind an assembly tree's lists (plan.h).
 //
-// Three rules compete, and what a sweep would cost decides (`JoinCost`).
+// Three rules compete; the estimated cost of a pass decides (`JoinCost`).
 //
 // *Pairing* grows the tree from below (pairing.h). All pairs of neighbouring assemblies wait in a
 // queue; the next pair has the smallest boundary after its join, in classes a factor sqrt(2) apart
@@ -8,11 +8,11 @@
 // the smallest boundary. A chain becomes a balanced tree, arms are finished before their hub takes
 // them, and pairs whose boundary would grow along a hub come last.
 //
-// Where pairing makes large joins, there are two others. *Front* (front.h): one assembly takes body
-// after body; right for bodies between several hubs. *Dissection* (dissection.h) cuts from above; a
-// k x k grid is cut by O(k) bodies at the top and halves in area below, hence O(k^3) multiply-adds
-// = O(n^1.5) (George 1973; Lipton, Rose and Tarjan 1979). Its parts are ordered by the best rule
-// again.
+// If pairing makes large joins, two other rules are tried. *Front* (front.h) adds body after body
+// to one assembly; it suits bodies between several hubs. *Dissection* (dissection.h) cuts from
+// above; a k x k grid is cut by O(k) bodies at the top and halves in area below, hence O(k^3)
+// multiply-adds = O(n^1.5) (George 1973; Lipton, Rose and Tarjan 1979). The best rule orders its
+// parts in turn.
 //
 // All take O(n log n) steps per level of the dissection, of which there are O(log n).
 #pragma once

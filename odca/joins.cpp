@@ -69,7 +69,7 @@ Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   if (AssembleAll(kinematics, Pass::kPhysical)) return Outcome::kFinished;
   if (solver_ == SolverKind::kAsPublished) return Outcome::kSingular;
   if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
-  // a loop looks degenerate: let geometry say in which directions, then solve the physics
+  // a loop looks degenerate: geometry gives the directions, then the physics is solved
   softened_ = true;
   AssembleAll(kinematics, Pass::kGeometric);
   if (AssembleAll(kinematics, Pass::kSoftened)) return Outcome::kFinished;
@@ -110,7 +110,7 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
 }
 
 /// Z = M^-1 of body n + 1, at its centre of mass in ground axes. The paper's zeta_ij of the handles
-/// at r_i and r_j are S(r_i) Z S(r_j)^T: those of bodies k and k+1 (1-4) and of body 2 (45-46).
+/// at r_i and r_j are S(r_i) Z S(r_j)^T: for bodies k and k+1 (1-4) and for body 2 (45-46).
 template <class Space, class S>
 void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics,
                                const Inertia<Space, S>& inertia, int n) {
@@ -138,10 +138,10 @@ void Joins<Space, S>::FillJoints(const Kinematics<Space, S>& kinematics, Masses 
   }
 }
 
-/// Y = C Z on every handle, and X = Y C^T, both triangles. Y is the paper's D^T zeta (67) but for
-/// the sign of c_P. X is D^T [zeta + zeta] D of a series join (16), the left side of (15); it is
-/// chi where base and terminal joint close (42), with the block rows (40) and (41); and in a
-/// coupled loop it has the block rows (61) and (63), and the paper writes X for its inverse (66).
+/// Y = C Z on every handle, and X = Y C^T, both triangles. Y is the paper's D^T zeta (67) except
+/// for the sign of c_P. X is D^T [zeta + zeta] D of a series join (16), the left side of (15). It
+/// is chi at the closing of base and terminal joint (42), with the block rows (40) and (41). In a
+/// coupled loop it has the block rows (61) and (63); the paper writes X for its inverse (66).
 template <class Space, class S>
 template <class Rows>
 void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Rows rows) {
@@ -197,7 +197,7 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Row
   }
 }
 
-/// X = L L^T in place of X's lower triangle, T = L^-1: what (17) inverts. X is positive definite,
+/// X = L L^T in place of X's lower triangle, T = L^-1; (17) inverts X. X is positive definite,
 /// because one side floats.
 template <class Space, class S>
 template <class Rows>
@@ -227,7 +227,7 @@ JointMatrix<S> Joins<Space, S>::FreeResponseAt(const PlanNode& node, const NodeJ
 }
 
 /// T of a node that closes loops, with T^T T = chi^-1 of (42) or the paper's X of (66). The matrix
-/// is only semidefinite here, and its rank is decided as loop_solver.h says.
+/// is only semidefinite here, and loop_solver.h decides its rank.
 template <class Space, class S>
 bool Joins<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass pass) {
   LoopSolver<S>& loop = loops_[place.loop];

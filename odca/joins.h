@@ -1,10 +1,10 @@
-// What O-DCA knows at one position, before any force: Z of every assembly, T and V of every join.
+// O-DCA's matrices at one position, before any force: Z of every assembly, T and V of every join.
 //
-// Everything is in ground axes. What belongs to a body is taken at its centre of mass, what belongs
-// to a joint at Mo, the origin of the frame fixed on its body Q; r_P and r_Q lead from the two
-// centres of mass to Mo. Numbers in brackets are the paper's equations, README.md indexes them.
+// Everything is in ground axes. Quantities of a body are taken at its centre of mass, quantities of
+// a joint at Mo, the origin of the frame fixed on its body Q; r_P and r_Q lead from the two centres
+// of mass to Mo. Equation numbers refer to the paper; README.md indexes them.
 //
-// An assembly with boundary bodies 1..h answers the forces F of what is still outside by
+// An assembly with boundary bodies 1..h responds to the forces F of bodies outside by
 //
 //   A = Z F + b
 //
@@ -28,9 +28,9 @@
 //
 //   phi = -T^T (s + V F),      Z' = Z - V^T V,      b' = b - V^T s.
 //
-// V and T are kept for the sweep of vectors (sweep.h).
+// V and T are kept for the vector pass (sweep.h).
 //
-// All memory is taken at construction, and no matrix is larger than the plan's largest join.
+// Construction allocates all memory; no matrix is larger than the largest join of the plan.
 #pragma once
 
 #include <memory>
@@ -46,13 +46,13 @@
 
 namespace loopbench::odca {
 
-/// `call` with the rows of a node, as a constant where they are those of one pin in the plane or
-/// one revolute joint in space.
+/// Calls `call` with the rows of a node, as a constant for one pin in the plane or one revolute
+/// joint in space.
 template <class Space, class Call>
 [[gnu::always_inline]] inline auto WithRows(const PlanNode& node, const Call& call) {
   return node.joints.size() == 1 ? WithSize<Space::kDim - 1>(node.rows, call) : call(node.rows);
 }
-/// Rows of a joint of a node, given those of the node.
+/// Returns the rows of a joint of a node, given the rows of the node.
 template <class Rows>
 int RowsOf(const NodeJoint& joint, Rows) {
   constexpr int kRows = kKnownSize<Rows>;
@@ -65,12 +65,12 @@ class Joins {
   /// `mechanism` and `plan` must outlive this. Plan joints index the mechanism's joints.
   Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver);
 
-  /// From the leaves up, at the current positions.
+  /// Assembles from the leaves up, at the current positions.
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
 
-  /// How many handles of a node stay on the boundary; a leaf has one. The sweep keeps lists with an
-  /// entry per such handle and per row of all nodes: these are the places of a node's first
-  /// entries.
+  /// Returns the number of handles of a node that stay on the boundary; a leaf has one. The sweep
+  /// keeps lists with an entry per such handle and per row of all nodes; `places_` has the index of
+  /// a node's first entries.
   int kept(int n) const { return places_[n].kept; }
   int first_handle(int n) const { return places_[n].handle; }
   int first_row(int n) const { return places_[n].row; }
@@ -105,7 +105,7 @@ class Joins {
     }
   }
 
-  /// Whether Assemble() left out or softened a direction: solutions are then refined (sweep.h).
+  /// Returns true if Assemble() dropped or regularized a direction; solutions are then refined.
   bool softened() const { return softened_; }
   int dependent_rows() const { return dependent_rows_; }
   S rcond() const { return rcond_; }
@@ -114,11 +114,11 @@ class Joins {
   /// Multiply-adds of the last Assemble(), counted as they were done (an eigen-decomposition as if
   /// it were a Cholesky factorisation).
   long operations() const { return operations_; }
-  /// Entries of the largest matrix held for one join: X or one Z.
+  /// Returns the entries of the largest matrix stored for one join: X or one Z.
   int largest_matrix() const { return largest_matrix_; }
 
  private:
-  /// Where a node's numbers live. Leaves have one handle and no rows.
+  /// Storage of a node's numbers. Leaves have one handle and no rows.
   struct Place {
     int z = 0;       ///< first block of Z (kept x kept, by columns)
     int y = 0;       ///< first motion of Y: rows per handle before the join

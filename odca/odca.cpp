@@ -137,7 +137,7 @@ void Odca<Space, S>::Start([[maybe_unused]] const Kinematics<Space, S>& kinemati
   }
 }
 
-/// What the speeds miss, joint by joint: no vector of rows is needed between.
+/// Computes the velocity violation joint by joint: no vector of rows is needed between.
 template <class Space, class S>
 bool Odca<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) {
   kinematics.UpdateVelocity(u);

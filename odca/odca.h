@@ -47,15 +47,15 @@ class Odca final : public ConstraintSolver<Space, S> {
   /// arms of revolute joints in space (arm_sweep.h).
   bool RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics, std::span<const S> q,
                      std::span<const S> u, std::span<S> qdot, std::span<S> udot) override;
-  /// Likewise.
+  /// In double, unless as published, as above.
   std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal) override;
-  /// Whether the short cut is tried from now on.
+  /// Decides whether the fast path is tried from now on.
   void Start(const Kinematics<Space, S>& kinematics) override;
   /// Size of the plan, and multiply-adds since Factor() began.
   std::vector<NamedCount> Counters() const override;
 
-  /// Constraint force of a user joint after an evaluation: [moment; force] on Q at the joint's
-  /// point, ground axes. Unique only where the joint's loops carry no self-stress. Zero where the
+  /// Returns the constraint force of a user joint after an evaluation: [moment; force] on Q at the
+  /// joint's point, ground axes. Unique only if the joint's loops carry no self-stress. Zero if the
   /// coordinate set has no free speed: then nothing is evaluated.
   Wrench<Space, S> JointForce(int joint) const;
 
@@ -67,8 +67,8 @@ class Odca final : public ConstraintSolver<Space, S> {
   const Mechanism<Space, S>& mechanism_;
   Plan plan_;
   Sweep<Space, S> sweep_;
-  std::unique_ptr<ShortCut<Space>> short_cut_;        ///< null where there is none
-  std::unique_ptr<pins::PathLane> lane_;              ///< null but for paths of runs side by side
+  std::unique_ptr<ShortCut<Space>> short_cut_;        ///< null if there is none
+  std::unique_ptr<pins::PathLane> lane_;              ///< null except for paths of batched runs
   bool tries_short_cut_ = true;                       ///< since Start()
   bool by_short_cut_ = false;                         ///< the last evaluation was
   const Kinematics<Space, S>* kinematics_ = nullptr;  ///< of the last Factor()

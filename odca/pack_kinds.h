@@ -1,5 +1,5 @@
-// Constants of packs of bodies, in their order. Equal ones are held once, so that a mechanism of
-// equal bodies, however long, has them in the nearest cache.
+// Constants of packs of bodies, in their order. Equal ones are stored once, so that a mechanism of
+// equal bodies of any length has them in the nearest cache.
 #pragma once
 
 #include <algorithm>

@@ -9,7 +9,7 @@ namespace loopbench::odca {
 
 namespace {
 
-/// Boundaries up to this many bodies are as good as each other: those of chains and ladders.
+/// Boundaries up to this many bodies count as equal: boundaries of chains and ladders.
 constexpr int kFew = 4;
 /// Pairs of a part with more neighbours (a hub), and pairs with more joints, are looked at again
 /// only when their turn comes.
@@ -63,8 +63,8 @@ JoinSum Pairing::Run(std::vector<Join>* joins) {
     const Key key = queue_.top();
     queue_.pop();
     if (bonds_[key.bond].joints.empty()) continue;
-    // what was joined meanwhile may have made this pair worse; of a hub's pairs, that counts from
-    // one class to the next only, or each join would send all of them back
+    // joins made since then may have made this pair worse; for pairs of a hub only a change of
+    // class counts, or each join would return all of them
     const Key now = KeyOf(key.bond);
     const auto neighbours = [&](int part) { return parts_[part].bonds.size(); };
     const Bond& bond = bonds_[key.bond];

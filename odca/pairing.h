@@ -13,11 +13,11 @@
 
 namespace loopbench::odca {
 
-/// What a list of joins costs.
+/// Cost of a list of joins.
 struct JoinSum {
   double cost = 0.0;  ///< multiply-adds
   int handles = 0;    ///< of the largest join
-  long looks = 0;     ///< how often a joint was looked at: what finding the list costs
+  long looks = 0;     ///< number of joint evaluations: the cost of finding the list
 };
 
 /// Counts for every body of the graph; allocated once and reused for one set of bodies at a time.
@@ -31,8 +31,8 @@ struct BodyMarks {
 /// Joins the assemblies of one connected set of bodies. An object of one use.
 class Pairing {
  public:
-  /// `marks->part_of` of each body in `bodies` is 0, 1, .. of the assembly that it is in; these are
-  /// numbered `names`.
+  /// `marks->part_of` of each body in `bodies` is the index 0, 1, .. of its assembly; assemblies
+  /// have the numbers `names`.
   Pairing(const BodyGraph& graph, std::span<const int> bodies, std::span<const int> names, int dim,
           BodyMarks* marks);
 

@@ -10,7 +10,7 @@ namespace loopbench::odca::pins {
 
 namespace {
 
-/// What a run waits for.
+/// Pending evaluation of a run.
 struct Wanted {
   SpeedsUsed speeds = SpeedsUsed::kGiven;
   std::span<const double> q, u;
@@ -26,15 +26,14 @@ void Scatter(const std::vector<Lanes>& all, int lane, std::span<double> one) {
 
 }  // namespace
 
-/// All lanes of mechanisms of one shape. Those that nobody has, or waits in, hold what was there
-/// before; what comes of it goes nowhere.
+/// All lanes of mechanisms of one shape. Unused lanes keep stale data; their results are discarded.
 class PathLane::All final : public Together {
  public:
   explicit All(const PathSweep& one)
       : sweep_(PathSweepOf<Lanes>::Beside(one)), q_(one.num_u()), u_(q_), qdot_(q_), udot_(q_) {}
   bool HasLanes() const { return sweep_ != nullptr; }
 
-  /// -1 where none is free, or the mechanism is another one.
+  /// Returns -1 if no lane is free or the mechanism differs.
   int Take(const PathSweep& own) {
     const auto free = std::ranges::find(taken_, false);
     const int lane = static_cast<int>(free - taken_.begin());

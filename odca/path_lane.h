@@ -1,5 +1,5 @@
-// The short cut of path_sweep.h for runs side by side: each has a lane, and the right-hand sides
-// that they wait for are evaluated at once. A run has the same bits whoever is beside it.
+// Fast path of path_sweep.h for batched runs: each has a lane, and their pending right-hand sides
+// are evaluated at once. The bits of a run do not depend on the other runs.
 #pragma once
 
 #include <memory>
@@ -13,14 +13,14 @@ namespace loopbench::odca::pins {
 
 class PathLane {
  public:
-  /// A lane for the mechanism of `own` until this is destroyed; `beside` must outlive it.
-  /// Null where `own` fills the lanes by itself.
+  /// Reserves a lane for the mechanism of `own` until destruction; `beside` must outlive it.
+  /// Returns null if `own` fills the lanes alone.
   static std::unique_ptr<PathLane> Take(SideBySide& beside, const PathSweep& own);
   ~PathLane();
   PathLane(const PathLane&) = delete;
   PathLane& operator=(const PathLane&) = delete;
 
-  /// As PathSweep::Evaluate(), when all runs have met.
+  /// Evaluates like PathSweep::Evaluate(), once all runs have met.
   bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
                 std::span<double> qdot, std::span<double> udot);
 

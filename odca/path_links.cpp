@@ -13,7 +13,7 @@ namespace {
 using Vector = Vector2<double>;
 constexpr Vector kNone = {0.0, 0.0};
 
-/// From the centre of mass of a body to one of its joints, in body axes.
+/// Returns the arm from a body's centre of mass to one of its joints, in body axes.
 Vector ArmOf(const Joint<Planar, double>& joint, int body) {
   const auto& p = (joint.from == body ? joint.X_PF : joint.X_QM).p;
   return {p[0], p[1]};

@@ -13,32 +13,32 @@ struct PathLinks {
   Path path;  ///< in one direction or the other
   std::vector<Link<double>> links;
   std::vector<Closure<double>> closures;
-  std::vector<double> axes;  ///< angle of a link's axes in those of its body [rad]
+  std::vector<double> axes;  ///< angle of a link's axes relative to its body [rad]
   bool has_loops = false;    ///< any joint is cut
-  /// The last body's joint to Ground, where it is cut: a handle 2, not the link's pin.
+  /// true if the last body's joint to Ground is cut: a handle 2, not the link's pin
   bool ends_at_ground = false, ground_is_P = false;
   Vector2<double> end = {0.0, 0.0};
   double end_limit = 0.0;
 };
 
-/// In a direction in which every cut joint of two bodies stands before one with a joint of the tree
-/// to Ground, and a cut joint to Ground is the last body's; nothing where there is none. Limits of
-/// links are zero. All joints must be pins.
+/// Measures a path in a direction in which every cut joint of two bodies precedes one with a tree
+/// joint to Ground, and a cut joint to Ground is the last body's; returns nothing if there is none.
+/// Limits of links are zero. All joints must be pins.
 std::optional<PathLinks> MeasurePath(const Mechanism<Planar, double>& mechanism, const Path& path);
 
-/// The body between the joints `before` and `after` (null: none), with or without a pin on Ground,
-/// all seen from the centre of mass; `axes`, if asked for, as in PathLinks. The limit is zero.
+/// Returns the body between the joints `before` and `after` (null: none), pinned to Ground or not,
+/// relative to the centre of mass; `axes`, if requested, as in PathLinks. The limit is zero.
 Link<double> MeasureLink(const Inertia<Planar, double>& inertia,
                          const Linear<Planar, double>& gravity, const Vector2<double>* pin,
                          const Vector2<double>* before = nullptr,
                          const Vector2<double>* after = nullptr, double* axes = nullptr);
 
-/// Whether all joints are pins with coordinates or constraints of their own: what sweeps over pins
-/// are made for.
+/// Returns true if all joints are pins with coordinates or constraints, as the passes over pins
+/// require.
 bool HasOnlyPins(const Mechanism<Planar, double>& mechanism);
 
-/// Least response of a joint that closes a loop: what loop_solver.h calls suspicious times the
-/// trace of the response of its two bodies alone. For Link::limit.
+/// Returns the smallest response of a joint that closes a loop: the suspicious pivot of
+/// loop_solver.h times the trace of the response of its two bodies alone. For Link::limit.
 double LimitOf(const Mechanism<Planar, double>& mechanism, int joint);
 
 }  // namespace loopbench::odca::pins

@@ -1,24 +1,24 @@
-// O-DCA for planar mechanisms whose bodies form paths (paths.h) of pins under gravity: from joint
-// coordinates and speeds to their rates at once, in the kernels of two_handle.h.
+// O-DCA for planar mechanisms whose bodies form paths (paths.h) of pins under gravity: computes
+// rates directly from joint coordinates and speeds, in the kernels of two_handle.h.
 //
 //   angles and speeds of bodies   along the spanning tree (tree_angles.h)
-//   gaps of cut joints            along each path
+//   violations of cut joints      along each path
 //   up                            a path is cut into groups of kLanes pieces, all of equal length;
 //                                 the pieces of a group are joined body after body, side by side,
 //                                 then all pieces, and the few bodies that are left over, one after
 //                                 another
 //   down                          the same the other way round
 //
-// A short path has no groups, a long one up to kMostGroups, which threads share. What is computed
-// depends on the mechanism alone, never on their number. The depth is that of one piece and of the
-// sequence of pieces and left-over bodies: work goes before depth here.
+// A short path has no groups, a long one up to kMostGroups, which threads share. Results depend on
+// the mechanism alone, never on the number of threads. The depth is one piece plus the sequence of
+// pieces and left-over bodies: total work has priority over depth.
 //
-// Lanes that no pieces fill can be filled by other mechanisms of the same shape: T = Lanes is
-// kLanes of them side by side, each number standing where T = double has that of one.
+// Other mechanisms of the same shape can fill unused lanes. T = Lanes holds kLanes mechanisms, one
+// per lane; T = double holds one.
 //
-// Pins that close loops must not be degenerate: where FactorsOf() sees one that may be, Evaluate()
-// gives up, and the general sweep decides. Its scale is the trace of the free response of the
-// joint's two bodies, which is at least the scale of loop_solver.h.
+// Pins that close loops must not be degenerate: if FactorsOf() finds a doubtful one, Evaluate()
+// stops, and the general pass decides. Its scale is the trace of the free response of the joint's
+// two bodies, which is at least the scale of loop_solver.h.
 #pragma once
 
 #include <memory>
@@ -48,19 +48,19 @@ class PathSweepOf final
   /// Enough work for a thread to wait for the others after it.
   static constexpr int kBodiesOfGroup = 2048;
 
-  /// For one mechanism. Null where it is none of those, or MeasurePath() has nothing for a path of
-  /// it. It need not outlive the sweep. Up to `threads` threads work on it, one for every
+  /// For one mechanism. Returns null if it is not of this type, or MeasurePath() fails for a path.
+  /// It need not outlive the sweep. Up to `threads` threads work on it, one for every
   /// `bodies_of_group` bodies.
   static std::unique_ptr<PathSweepOf> Make(const Mechanism<Planar, double>& mechanism,
                                            int threads = 1, int bodies_of_group = kBodiesOfGroup);
-  /// For lanes, of mechanisms like that of `one`, whose constants are in every lane; null where its
-  /// own pieces fill the lanes.
+  /// Returns a sweep for lanes of mechanisms like `one`, whose constants are in every lane; null if
+  /// its own pieces fill the lanes.
   static std::unique_ptr<PathSweepOf> Beside(const PathSweepOf<double>& one);
-  /// For lanes: puts the constants of `one` into one of them. False, and nothing is set, where it
-  /// has another shape.
+  /// For lanes: copies the constants of `one` into a lane. Returns false, without change, if its
+  /// shape differs.
   bool SetMechanism(int lane, const PathSweepOf<double>& one);
 
-  /// As of ShortCut, of each lane.
+  /// As ShortCut::Evaluate(), for each lane.
   TruthOf<T> Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>*, std::span<const T> q,
                       std::span<const T> u, std::span<T> qdot, std::span<T> udot);
   /// For one mechanism.
@@ -71,8 +71,8 @@ class PathSweepOf final
   std::size_t num_u() const { return moved_.size(); }
 
  private:
-  /// A path's places in the lists. Its body k stands in lane k / packs of pack k % packs of its
-  /// group; the last ones, which fill no pack, come after the packs.
+  /// Slots of a path in the lists. Its body k is in lane k / packs of pack k % packs of its group;
+  /// the last ones, which fill no pack, follow the packs.
   struct PathPlaces {
     int bodies = 0, groups = 0;
     int packs = 0;                ///< of a group
@@ -91,7 +91,7 @@ class PathSweepOf final
 
     int pieces() const { return groups * kLanes; }
     int singles() const { return bodies - packed; }
-    /// Of body k < packed.
+    /// Returns the pack of body k < packed.
     int pack(int k) const { return k / (packs * kLanes) * packs + k % packs; }
     int lane(int k) const { return k / packs % kLanes; }
     int place(int k) const { return first + (k < packed ? pack(k) * kLanes + lane(k) : k); }
@@ -99,12 +99,12 @@ class PathSweepOf final
   /// kLanes pieces of a path side by side.
   struct Group {
     int path = 0;
-    int pack = 0, place = 0;   ///< its first ones
-    Closure<Lanes> starts;     ///< of its pieces' first bodies, which those of packs leave open
-    bool cuts_starts = false;  ///< any of these joints is cut
-    Lanes leads;               ///< 1 where ends are seen from where a piece starts, 0 from its pin
-    bool in_turn = false;      ///< any piece starts and ends where the one before has put it
-    Point<Lanes> ends;         ///< of its pieces (TurnPacks())
+    int pack = 0, place = 0;      ///< its first ones
+    Closure<Lanes> starts;        ///< of its pieces' first bodies, which packs leave open
+    bool cuts_starts = false;     ///< any of these joints is cut
+    Lanes leads;                  ///< 1: ends relative to a piece's start, 0: to its pin
+    bool in_turn = false;         ///< any piece starts and ends at the previous one's end
+    Point<Lanes> ends;            ///< of its pieces (TurnPacks())
     TwoHandle<Lanes> assemblies;  ///< they are joined to these
     double room = 0.0, slack = 0.0;
     double largest = 0.0;   ///< square of the largest gap in it, of Gaps::kPositions
@@ -118,23 +118,23 @@ class PathSweepOf final
   void Add(const Mechanism<Planar, double>& mechanism, PathLinks path, int bodies_of_group);
   void AddPacks(const PathPlaces& path, const PathLinks& links);
 
-  /// Which mismatch of cut joints stands in gap_v, for Pass::kSpeeds to take it away: in each case
-  /// J is that of the bodies where they are.
+  /// Type of the violation of cut joints in gap_v, which Pass::kSpeeds removes: in each case J
+  /// belongs to the current poses.
   enum class Gaps { kSpeeds, kPositions };
 
-  /// Bodies at their angles, with what the gaps of cut joints add to them. False for angles beyond
-  /// kLargestAngle.
+  /// Computes the bodies at their angles, with the terms from violations of cut joints. Returns
+  /// false for angles beyond kLargestAngle.
   template <Gaps kGaps>
   TruthOf<T> Turn();
-  /// Sets ends of pieces, seen from where these start unless they stand alone.
+  /// Computes the end point of each piece, relative to its start unless it has its own pin.
   template <bool kLoops, Gaps kGaps>
   void TurnPacks(Group& group);
-  /// What comes after that; what is left up to kLargestAngle.
+  /// Computes the following bodies; returns the remainder up to kLargestAngle.
   T TurnSingles(const PathPlaces& path);
   template <Gaps kGaps>
   void CloseLoops(PathPlaces& path);
-  /// Along the pieces of a group, at the first bodies of which loops are closed: `at_2` leads from
-  /// the body before the group to its last one.
+  /// Closes loops along the pieces of a group at their first bodies: `at_2` leads from the body
+  /// before the group to its last one.
   template <Gaps kGaps>
   void CloseStarts(Group& group, Point<double>& at_2);
   struct At;
@@ -146,12 +146,12 @@ class PathSweepOf final
   friend PinProjection;
   bool FindChange() { return Sweep<Pass::kSpeeds>(); }
   double LargestGap() const;
-  /// alpha_, or what is to be added to speeds. False near a degenerate position.
+  /// Computes alpha_, or corrections of speeds. False near a degenerate position.
   template <Pass kPass>
   TruthOf<T> Sweep();
   template <Pass kPass>
   void UpGroup(Group& group);
-  /// Over pieces and single bodies of a path; the least slack of all its joins.
+  /// Joins pieces and single bodies of a path; returns the least slack of all its joins.
   template <Pass kPass>
   T Up(PathPlaces& path);
   template <Pass kPass>

@@ -1,5 +1,5 @@
-// How a path's bodies stand: turned to their angles, and, where joints are cut, with points
-// followed along them to what these have drifted apart.
+// Poses of a path's bodies at their angles, and violations of cut joints from points along the
+// path.
 #include <algorithm>
 
 #include "odca/path_sweep.h"
@@ -8,7 +8,7 @@ namespace loopbench::odca::pins {
 
 namespace {
 
-/// What closures say of all lanes alike.
+/// Closure flags are equal in all lanes.
 bool Says(double truth) { return truth > 0.0; }
 bool Says(const Lanes& truth) { return truth[0] > 0.0; }
 
@@ -59,7 +59,7 @@ void PathSweepOf<T>::TurnPacks(Group& group) {
   group.ends = at_2;
 }
 
-/// What a body's constants and numbers are, wherever it stands.
+/// Constants and numbers of a body, independent of their storage.
 template <class T>
 struct PathSweepOf<T>::At {
   Link<T> link;
@@ -124,8 +124,8 @@ T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
   return room;
 }
 
-/// As TurnPacks() closes the loops between; only that the body before each first one stands a lane
-/// before it, in the last pack, or ends the group before.
+/// Closes loops like TurnPacks() in between, except that the body before each first one is one lane
+/// before it, in the last pack, or ends the previous group.
 template <class T>
 template <typename PathSweepOf<T>::Gaps kGaps>
 void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
@@ -195,7 +195,7 @@ void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
   }
   for (int k = path.packed; k < path.bodies; ++k) {
     const int single = path.first_single + k - path.packed;
-    const TurnedLink<T> own = turned_singles_[single];  // before gaps move its arms
+    const TurnedLink<T> own = turned_singles_[single];  // before violations move its arms
     const Point<T> at_1 = start(k, single_closures_[single]);
     at_2 = Across(singles_[single], own, speed_[path.first + k], at_1);
   }

@@ -1,4 +1,4 @@
-// Where bodies of paths stand in the lists of a PathSweep, and their constants.
+// Layout of a PathSweep: slots of bodies in its lists, and their constants.
 #include <algorithm>
 
 #include "mechanism/loops/loop_solver.h"
@@ -15,8 +15,8 @@ constexpr int kShortestPiece = 2;
 /// Their pieces are joined one after another.
 constexpr int kMostGroups = 128;
 
-/// Whether points in each piece can be followed from its own first body on: a pinned body stands
-/// before the first cut joint in it.
+/// Returns true if points in each piece can be followed from its own first body: a pinned body
+/// precedes the first cut joint in it.
 bool PiecesStandAlone(const std::vector<Closure<double>>& closures, int pieces, int length) {
   for (int start = 0; start < pieces * length; start += length) {
     bool pinned = closures[start].follows == 0.0;
@@ -28,9 +28,9 @@ bool PiecesStandAlone(const std::vector<Closure<double>>& closures, int pieces, 
   return true;
 }
 
-/// The longest length of so many pieces that do, 0 for none. Where a sequence of bodies repeats, as
-/// crank and coupler of a ladder, pieces of whole periods do: periods of up to eight bodies are
-/// found.
+/// Returns the longest length of so many such pieces, 0 for none. If a sequence of bodies repeats,
+/// like crank and coupler of a ladder, pieces of whole periods qualify: periods of up to eight
+/// bodies are found.
 int LengthOfPieces(const std::vector<Closure<double>>& closures, int pieces) {
   constexpr int kTrials = 8;
   const int longest = static_cast<int>(closures.size()) / pieces;
@@ -40,8 +40,8 @@ int LengthOfPieces(const std::vector<Closure<double>>& closures, int pieces) {
   return 0;
 }
 
-/// Sets limits in the order of joins (PathSweep::Up): a join closes a loop where both its sides are
-/// pinned to Ground. The lighter of two sides is what answers.
+/// Sets limits in the order of joins (PathSweep::Up): a join closes a loop if both its sides are
+/// pinned to Ground. The lighter of two sides determines the response.
 void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int length,
                PathLinks& path) {
   struct Side {

@@ -1,6 +1,6 @@
-// Which bodies of a mechanism form paths: sequences in which each body has a joint to the one
-// before and to the one after it, and any of them may have a joint to Ground. A chain is a path, a
-// four-bar, a ladder (crank, coupler, crank, ...), an arm.
+// Paths of a mechanism: sequences in which each body has a joint to the previous and to the next
+// one, and any body may have a joint to Ground. Chains, four-bars, ladders (crank, coupler, crank,
+// ...) and arms are paths.
 #pragma once
 
 #include <vector>
@@ -17,8 +17,8 @@ struct PathBody {
 };
 using Path = std::vector<PathBody>;
 
-/// All bodies on paths, or none where bodies do not form paths: one has joints to three others, two
-/// to the same or two to Ground, or a ring of them hangs nowhere open.
+/// Returns all bodies on paths, or none if bodies do not form paths: a body has joints to three
+/// others, two to the same or two to Ground, or a ring is closed without an end.
 std::vector<Path> FindPaths(int num_bodies, std::span<const PlanJoint> joints);
 
 }  // namespace loopbench::odca

@@ -1,5 +1,5 @@
-// What level projection does to accepted steps of mechanisms of pins, as level_position.cpp does it
-// by parts: of PathSweep and AssemblySweep, which both are here `Sweep`.
+// Level projection of accepted steps for mechanisms of pins; level_position.cpp does it by parts.
+// `Sweep` stands for PathSweep and AssemblySweep.
 #pragma once
 
 #include <algorithm>

@@ -68,7 +68,7 @@ class Planner {
   }
 
  private:
-  /// The body that stands for each body's connected part.
+  /// Returns the representative body of each body's connected part.
   std::vector<int> PartOfBody() const {
     std::vector<int> part(assemblies_.size());
     std::iota(part.begin(), part.end(), 0);
@@ -104,8 +104,8 @@ class Planner {
 
   /// Joins two assemblies through all joints between them; the place of the result.
   int Merge(int left, int right) {
-    // the longer list of joints stays where it is, the shorter one is looked through: each joint is
-    // looked at O(log n) times
+    // the longer list of joints stays, the shorter one is searched: each joint is visited O(log n)
+    // times
     const auto size = [&](int a) { return assemblies_[a].joints.size(); };
     const int into = size(left) < size(right) ? right : left, from = into == left ? right : left;
     std::vector<int> between, leaving;
@@ -131,7 +131,7 @@ class Planner {
     return into;
   }
 
-  /// Where the assembly that holds a body stands.
+  /// Returns the index of the assembly that holds a body.
   int Find(int body) {
     while (assembly_of_[body] != body) {
       body = assembly_of_[body] = assembly_of_[assembly_of_[body]];
@@ -249,7 +249,7 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
     kept += draft.kept.size();
     closed += draft.joints.size();
   }
-  // spans stay good: the lists never grow beyond what is reserved
+  // spans stay valid: the lists never exceed their reserved size
   handles_.reserve(handles);
   kept_.reserve(kept);
   joints_.reserve(closed);

@@ -1,14 +1,14 @@
-// The symbolic half of O-DCA: in which order bodies are joined into assemblies
+// The symbolic half of O-DCA: the order in which bodies are joined into assemblies
 // (docs/decisions/004).
 //
-// The assembly tree stands over the graph of bodies and joints. Its leaves are the bodies. An inner
-// node joins two assemblies, or one assembly with itself or with Ground, through a list of joints,
-// and keeps as boundary only the bodies that a joint still to come will touch. Ground is an
-// assembly with zero response and has no handle.
+// The assembly tree covers the graph of bodies and joints. Its leaves are the bodies. An inner node
+// joins two assemblies, or one assembly with itself or with Ground, through a list of joints. It
+// keeps as boundary only the bodies of joints not yet closed. Ground is an assembly with zero
+// response and has no handle.
 //
-// Three rules make the tree, and the cheapest one wins (join_order.h). A chain or ladder of n
-// bodies gets depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
-// hence O(n^1.5) multiply-adds; a hub takes its arms one by one, each finished before, in O(n)
+// Three rules build the tree; the cheapest result is used (join_order.h). A chain or ladder of n
+// bodies has depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
+// hence O(n^1.5) multiply-adds. A hub takes its arms one by one, each finished before, in O(n)
 // multiply-adds and a depth of as many joins as it has arms.
 //
 // Properties: each body is a leaf of exactly one tree, each joint with constraints is in exactly
@@ -38,7 +38,7 @@ enum class Grounding {
             ///< would grow
 };
 
-/// How many joints a node may close at once.
+/// Number of joints that a node may close at once.
 enum class Closing {
   kTogether,  ///< all joints between two assemblies in one node (the paper's section 3.2)
   kOneByOne,  ///< the first joins, each further one is a self-join: smallest matrices
@@ -47,10 +47,10 @@ enum class Closing {
 struct PlanOptions {
   Grounding grounding = Grounding::kEager;
   Closing closing = Closing::kTogether;
-  int dim = 6;  ///< directions of a body: 3 in the plane, 6 in space; weighs what joins cost
+  int dim = 6;  ///< directions of a body: 3 in the plane, 6 in space; weight of join costs
 };
 
-/// A body of a node's boundary: which child brings it (0 or 1), and where it stands there.
+/// A body of a node's boundary: its child (0 or 1), and its index there.
 struct Handle {
   int body = 0;
   int child = 0;
@@ -91,8 +91,8 @@ class Plan {
   int largest_join() const;  ///< rows of the largest X
   int most_handles() const;  ///< largest number of bodies of any node before its join
   int loop_joins() const;    ///< nodes that close loops
-  /// Multiply-adds of one assembly and one sweep of vectors with `dim` directions per body, as
-  /// Sweep::operations() counts them where no direction is softened.
+  /// Multiply-adds of one assembly and one vector pass with `dim` directions per body, as
+  /// Sweep::operations() counts them without regularized directions.
   long operations(int dim) const;
 
  private:

@@ -2,17 +2,17 @@
 // per printed formula, over T = double or Lanes (mechanism/algebra/lanes.h).
 //
 // A handle is a joint side that is still open, its rows projected on the joint's D: moments about
-// the two axes across its own, and the three forces. Everything at a handle is in axes of its joint
-// side, of which z is the joint's axis. So zeta_ij, here D_i^T zeta_ij D_j, is 5 x 5 and constant
-// for a body, and what a joint's angle does is to turn the pairs of rows x, y of what stands before
-// it (TurnInto()). Rows stand in the order
+// the two axes normal to its own, and the three forces. Everything at a handle is in axes of its
+// joint side; z is the joint's axis. So zeta_ij, here D_i^T zeta_ij D_j, is 5 x 5 and constant for
+// a body. A joint's angle turns the pairs of rows x, y of the bodies before it (TurnInto()). Rows
+// have the order
 //
-//   moment x, y,  force x, y, z      and where all of a handle is asked for, moment z behind them
+//   moment x, y,  force x, y, z      and, for all six components, moment z after them
 //
 //   A_1 = zeta11 F_1 + zeta12 F_2 + zeta13                                                (1)
 //   A_2 = zeta21 F_1 + zeta22 F_2 + zeta23                                                (2)
 //
-// Accelerations are less that of gravity: bodies have no weight then, and Ground rises.
+// Accelerations are relative to gravity: bodies are weightless, and Ground accelerates upwards.
 #pragma once
 
 #include "odca/arm_motion.h"
@@ -27,7 +27,7 @@ struct Response {
   T zeta12[kRows][k];
 };
 
-/// What never changes of a body between two joints.
+/// Constants of a body between two joints.
 template <class T>
 struct Link {
   Shape<T> shape;
@@ -43,7 +43,7 @@ struct OneHandle {
   T zeta23[k];
 };
 
-/// X = L d L^T of a join, L having ones on its diagonal, which is where `inverse` 1 / d stands.
+/// X = L d L^T of a join; L has ones on its diagonal, which stores `inverse` 1 / d.
 template <class T, int n = kRows>
 struct Factors {
   Symmetric<T, n> L;
@@ -67,7 +67,7 @@ struct Factors {
   }
 };
 
-/// X in place (16). `slack` becomes negative where a pivot is.
+/// Factors X in place (16). `slack` becomes negative if a pivot is negative.
 template <class T, int n>
 LOOPBENCH_INLINE void Factor(Factors<T, n>& X, T& slack) {
   Symmetric<T, n>& L = X.L;
@@ -90,15 +90,15 @@ LOOPBENCH_INLINE void Factor(Factors<T, n>& X, T& slack) {
   }
 }
 
-/// What a join keeps for the way down: the force in it, on handle 1 of what came second, is
+/// Data of a join for the downward pass: the force in it, on handle 1 of the second assembly, is
 /// L^-T d^-1 (y - W F_2), with W = L^-1 zeta12 and y = L^-1 (zeta23 - zeta13) of the two (17, 21).
 template <class T, int k = kRows>
 struct EndCut {
   Factors<T> X;
   T W[kRows][k], y[kRows];
 };
-/// And L^-T d^-1 (U F_1 + y - L^-1 zeta12 F_2) where the first one has a handle 1, U = L^-1 zeta21
-/// of it. Long arms stream these through the cache, so there is no W.
+/// And L^-T d^-1 (U F_1 + y - L^-1 zeta12 F_2) if the first one has a handle 1, U = L^-1 zeta21 of
+/// it. Long arms stream these through the cache, so there is no W.
 template <class T>
 struct Cut {
   Factors<T> X;
@@ -220,7 +220,7 @@ LOOPBENCH_INLINE void Join(Piece<T>& A, const Turn<T>& turn, const Response<T, k
   }
 }
 
-/// `zeta12` is that of what came second.
+/// `zeta12` belongs to the second assembly.
 template <class T>
 LOOPBENCH_INLINE void ForceIn(const Cut<T>& cut, const T (&zeta12)[kRows][kRows], const T* F1,
                               const T* F2, T* force) {
@@ -253,7 +253,7 @@ LOOPBENCH_INLINE void OppositeBefore(const Turn<T>& turn, const T* force, T* F2)
   F2[4] = -force[4];
 }
 
-/// Acceleration about the axis of a handle, or change of speed: `free`, and what forces add (1-4).
+/// Acceleration about the axis of a handle, or change of speed: `free` plus the forces' part (1-4).
 template <class T, int k>
 LOOPBENCH_INLINE T About(const T& free, const T (&by_1)[kRows], const T (&by_2)[k], const T* F1,
                          const T* F2) {

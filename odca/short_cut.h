@@ -1,4 +1,4 @@
-// What some mechanisms' right-hand sides take instead of the general sweep.
+// Fast path of some mechanisms' right-hand sides instead of the general pass.
 #pragma once
 
 #include <optional>
@@ -12,19 +12,19 @@ template <class Space>
 class ShortCut {
  public:
   virtual ~ShortCut() = default;
-  /// As ConstraintSolver::RightHandSide(); `kinematics` may be null where no force but gravity
-  /// acts. False near a degenerate position, for angles beyond kLargestAngle, and where
+  /// Evaluates like ConstraintSolver::RightHandSide(); `kinematics` may be null if only gravity
+  /// acts. Returns false near a degenerate position, for angles beyond kLargestAngle, and if
   /// accelerations are not finite. Allocates nothing.
   virtual bool Evaluate(SpeedsUsed speeds, Kinematics<Space, double>* kinematics,
                         std::span<const double> q, std::span<const double> u,
                         std::span<double> qdot, std::span<double> udot) = 0;
-  /// As ConstraintSolver::Project(), where loops are closed; nothing where Evaluate() is false.
+  /// Projects like ConstraintSolver::Project() if loops are closed; nothing if Evaluate() is false.
   virtual std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
                                                     double goal) = 0;
-  /// Whether Evaluate() is to be tried in a run that starts at these positions: where constraints
-  /// are redundant all along, it would be refused each time.
+  /// Returns true if Evaluate() should be tried in a run that starts at these positions. It would
+  /// fail each time if constraints are redundant everywhere.
   virtual bool Serves(const Kinematics<Space, double>& /*kinematics*/) { return true; }
-  /// Multiply-adds of the last evaluation, or what it did of it.
+  /// Returns the multiply-adds of the last evaluation, or of its completed part.
   virtual long operations() const = 0;
 };
 

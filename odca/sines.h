@@ -5,8 +5,8 @@
 
 namespace loopbench::odca {
 
-/// Of `count` angles [rad], a multiple of kLanes. False where one is beyond kLargestAngle or no
-/// number.
+/// Computes sines and cosines of `count` angles [rad], a multiple of kLanes. Returns false if an
+/// angle is beyond kLargestAngle or NaN.
 LOOPBENCH_INLINE bool SinesAndCosines(const double* angles, int count, double* sines,
                                       double* cosines) {
   Lanes room = Lanes{} + kLargestAngle;

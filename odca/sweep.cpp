@@ -38,7 +38,7 @@ void Sweep<Space, S>::Solve(std::span<const Acceleration<Space, S>> b,
   Correct(residual_, A);
 }
 
-/// At the leaves A = Z F + b (1-4, 45-46) with all forces known, those of joints included.
+/// At the leaves A = Z F + b (1-4, 45-46) with all forces known, including the joints' own.
 template <class Space, class S>
 void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
                               std::span<Acceleration<Space, S>> A) {
@@ -113,9 +113,9 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows,
 }
 
 /// phi = -T^T (s + V F) are the measure numbers of a series join (17), of the base and terminal
-/// joint, the solution of (42), and of a coupled loop (64). The force on a handle of a child is
-/// what comes from outside, F^ext of (47-48), and c phi, the D phi of (13, 18, 39, 59, 65) moved
-/// from Mo to the centre of mass.
+/// joint, the solution of (42), and of a coupled loop (64). The force on a handle of a child is the
+/// external force F^ext of (47-48) plus c phi, the D phi of (13, 18, 39, 59, 65) moved from Mo to
+/// the centre of mass.
 template <class Space, class S>
 template <class Rows>
 void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows) {

@@ -1,5 +1,5 @@
-// O-DCA's sweep of vectors over assembled joins (joins.h): free accelerations go up, forces come
-// down. Where rank was lost, a second sweep corrects the first.
+// O-DCA's vector pass over assembled joins (joins.h): free accelerations go up, forces come down.
+// If rank was lost, a second pass corrects the first.
 //
 //   up     s   = T (C b + c0)             from the children's b                (21, 68)
 //          b'  = b - V^T s                to the parent                        (29-30, 72)
@@ -7,17 +7,17 @@
 //          F_child = [F; 0] + C^T phi     to the children                      (18, 39, 47-48, 65)
 //   leaf   A   = Z F + b                                                       (1-4, 45-46)
 //
-// Letters, axes and points of reference are those of joins.h: a motion or force of a body is at its
-// centre of mass, in ground axes. Accelerations of assemblies are never formed, only forces are
-// handed down; a body's acceleration follows when all forces on it are known.
+// Symbols, axes and points of reference are defined in joins.h: a motion or force of a body is at
+// its centre of mass, in ground axes. Accelerations of assemblies are never formed; only forces are
+// handed down. A body's acceleration follows when all forces on it are known.
 //
-// Joins close loops one after another. Where constraints depend on each other, one join may be far
-// worse conditioned than all constraints solved at once, and its round-off spoils the result. The
-// joints' residual r = C A + c0 shows that. One step of iterative refinement,
+// Joins close loops one after another. If constraints are dependent, one join may be much worse
+// conditioned than the simultaneous solution of all constraints, and round-off spoils the result.
+// The joints' residual r = C A + c0 reveals this. One step of iterative refinement,
 //
 //   A += sweep(b = 0, c0 = r),
 //
-// squares the error; a softened weight w becomes 1 - (1 - w)^2.
+// squares the error; a regularization weight w becomes 1 - (1 - w)^2.
 #pragma once
 
 #include "odca/joins.h"
@@ -33,26 +33,26 @@ class Sweep {
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
   const Joins<Space, S>& joins() const { return joins_; }
 
-  /// In: `b` the free acceleration of each body (index = body), `c0` Space::kDim numbers per
-  /// mechanism joint. Out: `A` of each body. After Assemble(). Allocates nothing.
+  /// Computes `A` of each body from `b`, the free acceleration of each body (index = body), and
+  /// `c0`, Space::kDim numbers per mechanism joint. Requires Assemble(). Allocates nothing.
   void Solve(std::span<const Acceleration<Space, S>> b, std::span<const Components<Space, S>> c0,
              std::span<Acceleration<Space, S>> A);
 
-  /// phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint force:
-  /// components along the columns of D, which need not part into moments and forces. Zero where the
-  /// plan has no such joint.
+  /// Returns phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint
+  /// force: components along the columns of D, which may mix moments and forces. Zero if the plan
+  /// has no such joint.
   std::span<const Components<Space, S>> multipliers() const { return phi_; }
 
   /// Multiply-adds since the last Assemble() began.
   long operations() const { return joins_.operations() + operations_; }
 
  private:
-  /// One node on the way up, and on the way down.
+  /// Passes one node upwards, and downwards.
   template <class Rows>
   void Up(const PlanNode& node, int n, Rows rows, std::span<const Components<Space, S>> c0);
   template <class Rows>
   void Down(const PlanNode& node, int n, Rows rows);
-  /// Up and down over what stands in b_; adds to A and phi_.
+  /// Runs up and down over the values in b_; adds to A and phi_.
   void Correct(std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.
   void Residual(std::span<const Components<Space, S>> c0,
@@ -61,7 +61,7 @@ class Sweep {
   const Plan& plan_;
   Joins<Space, S> joins_;
   std::vector<Acceleration<Space, S>> b_;  ///< by kept handle
-  std::vector<Wrench<Space, S>> F_;        ///< likewise
+  std::vector<Wrench<Space, S>> F_;        ///< as b_
   std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;       ///< by row
   std::vector<S> forces_;  ///< phi of one node

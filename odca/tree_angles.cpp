@@ -6,7 +6,7 @@ namespace loopbench::odca::pins {
 
 namespace {
 
-/// Steps of a stretch, and of the longest run: some 30 us of work.
+/// Steps of a stretch, and of the longest run: about 30 us of work.
 constexpr int kLongest = 4096;
 
 }  // namespace

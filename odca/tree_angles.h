@@ -1,10 +1,10 @@
-// Angles and speeds of bodies from those of the pins of a spanning tree, and back, in the plane.
+// Angles and speeds of bodies from the pins of a spanning tree, and back, in the plane.
 //
-//   angle of a child = angle of its parent + offset +- q,      likewise speeds, without an offset
+//   angle of a child = angle of its parent + offset +- q,      also for speeds, without an offset
 //
-// The tree's joints stand in runs, each of which goes on where the joint before it ended. Along a
-// run sums begin at zero, and what its first parent has is added to each: so threads can go along
-// runs before it is known where these begin, and have the same bits.
+// The tree's joints form runs, each continuing at the end of the previous joint. Sums along a run
+// begin at zero; the first parent's value is then added to each. So threads can process runs before
+// their start is known, with the same bits.
 #pragma once
 
 #include <span>
@@ -16,13 +16,13 @@
 
 namespace loopbench::odca::pins {
 
-/// Of one mechanism, T = double, or of some side by side, T = Lanes.
+/// Angles of one mechanism (T = double) or of several in lanes (T = Lanes).
 template <class T>
 class TreeAngles {
  public:
   TreeAngles() = default;
-  /// `place_of` each body, Ground last, is where its numbers stand in lists; `axes` are the angles
-  /// of axes on it whose angles are asked for [rad], in those of the body. All joints are pins.
+  /// `place_of` is the slot of each body in lists, Ground last; `axes` are the angles of the
+  /// requested axes [rad], relative to their bodies. All joints are pins.
   TreeAngles(const Mechanism<Planar, double>& mechanism, const std::vector<int>& place_of,
              const std::vector<double>& axes);
   /// Has the shape of `one`, and its offsets in every lane.
@@ -32,8 +32,8 @@ class TreeAngles {
 
   /// Angles and speeds by place. Those of Ground must be there, zero.
   void ToBodies(std::span<const T> q, std::span<const T> u, T* angles, T* speeds, WorkerPool& pool);
-  /// rates := those of the joints, from those of bodies by place, added to `base` if it is not
-  /// empty (it may be `rates`). False if what comes from bodies is not finite.
+  /// Sets rates to the joints' rates, from the bodies' values by slot, plus `base` if it is not
+  /// empty (it may be `rates`). Returns false if a body's value is not finite.
   TruthOf<T> ToJoints(const T* of_bodies, std::span<const T> base, std::span<T> rates,
                       WorkerPool& pool);
 
@@ -56,7 +56,7 @@ class TreeAngles {
     T zeros = {};  ///< or not a number
   };
 
-  /// Along a run, from the given angle and speed on.
+  /// Sums along a run, from the given angle and speed.
   void Walk(const Run& run, T angle, T speed, const T* q, const T* u, T* angles, T* speeds) const;
   /// The part of ToJoints() that one thread does.
   template <bool kAdd>

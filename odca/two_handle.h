@@ -8,8 +8,8 @@
 //   A_1 = zeta11 F_1 + zeta12 F_2 + zeta13                                                (1)
 //   A_2 = zeta21 F_1 + zeta22 F_2 + zeta23                                                (2)
 //
-// A body pinned to Ground is a body whose point of reference does not move (Link::mobility): no
-// kernel asks which one it has.
+// A body pinned to Ground has a fixed point of reference (Link::mobility): no kernel depends on the
+// case.
 #pragma once
 
 #include "mechanism/algebra/lanes.h"
@@ -79,18 +79,18 @@ LOOPBENCH_INLINE Matrix2<T> TransposeTimes(const Matrix2<T>& A, const Matrix2<T>
           A.xy * B.xy + A.yy * B.yy};
 }
 
-/// What never changes of a body between two pins. Its point of reference is the centre of mass, or
-/// its pin on Ground; arms lead from there to the handles, in axes fixed on the body of which x
-/// leads to handle 1, and are divided by the radius sqrt(I), I being the inertia about that point
-/// [kg m^2]: then (arm x force) is the angular acceleration times sqrt(I).
+/// Constants of a body between two pins. Its point of reference is the centre of mass, or its pin
+/// on Ground. Arms lead from there to the handles, in axes fixed on the body with x towards handle
+/// 1. They are divided by the radius sqrt(I), I being the inertia about that point [kg m^2]: then
+/// (arm x force) is the angular acceleration times sqrt(I).
 template <class T>
 struct Link {
   T x1, x2, y2;    ///< arms (x1, 0) and (x2, y2) [1 / sqrt(kg)]
-  T mobility;      ///< 1 / mass, 0 where the point of reference stands still
+  T mobility;      ///< 1 / mass, 0 if the point of reference is fixed
   T gx, gy;        ///< its acceleration without forces of handles [m/s^2]
   T cosine, sine;  ///< sqrt(I) times angular acceleration by gravity: these times cos and sin
   T radius;        ///< sqrt(I)
-  /// Least response across the joint at handle 1 [1 / kg], 0 where it closes no loop.
+  /// Least response across the joint at handle 1 [1 / kg], 0 if it closes no loop.
   T limit;
 };
 
@@ -101,7 +101,7 @@ struct TurnedLink {
   Vector2<T> r1, r2;
   T alpha;
   Vector2<T> gap_v;  ///< RelativeVelocity() in the joint at handle 1, if that is cut, else 0
-  T gap_w;           ///< speed of its P, likewise
+  T gap_w;           ///< speed of its P, as in the line above
 };
 
 template <class T>
@@ -142,13 +142,13 @@ LOOPBENCH_INLINE Point<T> Across(const Link<T>& link, const TurnedLink<T>& at, c
   return {from.p + d, from.v + Cross(speed, d)};
 }
 
-/// What loops ask of a body: where a joint of the tree pins it to Ground, and whether the joint to
-/// the body before it is cut.
+/// Loop data of a body: its tree pin to Ground, if any, and whether the joint to the body before it
+/// is cut.
 template <class T>
 struct Closure {
-  T follows;               ///< 1 where handle 1 is where the body before has put it, 0 where pinned
+  T follows;               ///< 1: the previous body sets handle 1, 0: pinned
   T pin_x, pin_y;          ///< the pin, if pinned
-  T cut_here, cut_before;  ///< 1 where the joint is cut and its P is this body, the one before
+  T cut_here, cut_before;  ///< 1 if the joint is cut and its P is this body, the previous one
   T inverse_radius;        ///< of the Link
 };
 
@@ -164,15 +164,15 @@ LOOPBENCH_INLINE Point<T> AtPin(const Link<T>& link, const TurnedLink<T>& at, co
   return {{closure.pin_x + r.x, closure.pin_y + r.y}, Cross(speed, r)};
 }
 
-/// A cut joint whose sides have drifted apart is imposed at one point, that of Q (joint.h), and
-/// there the arm of P ends. `gap` leads from the side on handle 1 of a body to that on handle 2 of
-/// the body before it. At that one point their velocities differ by this, whichever of them is P.
+/// A cut joint with drift is imposed at one point of Q (joint.h); there the arm of P ends. `gap`
+/// leads from the side on handle 1 of a body to the side on handle 2 of the body before it. At that
+/// point their velocities differ by this value, whichever of them is P.
 template <class T>
 LOOPBENCH_INLINE Vector2<T> RelativeVelocity(const T& speed_P, const Point<T>& gap) {
   return gap.v - Cross(speed_P, gap.p);
 }
 
-/// zeta of a body or an assembly, and what its handles do without forces.
+/// zeta of a body or an assembly, and accelerations of its handles without forces.
 template <class T>
 struct TwoHandle {
   Symmetric2<T> zeta11, zeta22;
@@ -180,20 +180,20 @@ struct TwoHandle {
   Vector2<T> zeta13, zeta23;
 };
 
-/// What a sweep makes.
+/// Quantity computed by a pass.
 enum class Pass {
   kAccelerations,  ///< from speeds as they are
   kSpeeds,         ///< the smallest change of speeds, in the metric of M, that closes the loops
   kCompleted,      ///< accelerations, speeds being so
 };
 
-/// A leaf (1-4): with t = z x r, zeta_ij = 1/m + t_i t_j^T / I, and zeta_i3 is gravity, the angular
-/// acceleration that it makes about a pin on Ground, and the centripetal -w^2 r_i.
+/// A leaf (1-4): with t = z x r, zeta_ij = 1/m + t_i t_j^T / I, and zeta_i3 is gravity, its angular
+/// acceleration about a pin on Ground, and the centripetal -w^2 r_i.
 ///
 /// At a cut joint A_Q - A_P = g = 2 w_P x v_rel (7), where v_rel is RelativeVelocity() or its
-/// negative, as Q comes before or after; so is A_Q - A_P the motion of the body before it against
-/// this one, or the negative, and in both cases that is 2 w_P x RelativeVelocity(). It is counted
-/// with zeta13. Changes of speeds are to take RelativeVelocity() away.
+/// negative, as Q comes before or after. In the same way A_Q - A_P is the motion of the body before
+/// it relative to this one, or the negative. In both cases that is 2 w_P x RelativeVelocity(),
+/// which zeta13 includes. Changes of speeds remove RelativeVelocity().
 template <Pass kPass, class T>
 LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at, const T& speed) {
   const T m = link.mobility, a = at.alpha, w2 = speed * speed * link.radius;
@@ -224,10 +224,10 @@ LOOPBENCH_INLINE T AngularAcceleration(const TurnedLink<T>& at, const Vector2<T>
   return kPass == Pass::kSpeeds ? moment : at.alpha + moment;
 }
 
-/// X = L D L^T of (16), by D^-1 and the l below L's ones; times b it is the solution of X x = b,
-/// with residuals of some round-offs of X whatever the condition of X, as cofactors over det have
-/// not: where a light body hangs between heavy ones their forces on it must be right to far more
-/// than its own weight.
+/// X = L D L^T of (16), by D^-1 and the l below L's ones; times b it is the solution of X x = b.
+/// Its residuals are some round-offs of X for any condition, unlike cofactors over det: if a light
+/// body hangs between heavy ones, their forces on it must be accurate to far more than its own
+/// weight.
 template <class T>
 struct Factored2 {
   T first, l, second;
@@ -243,8 +243,8 @@ struct Factored2 {
   }
 };
 
-/// The factors of X. `slack` becomes negative where the smallest eigenvalue of X, which is at least
-/// det / trace, is below `limit`: whether a loop has lost rank is then for loop_solver.h to say.
+/// Returns the factors of X. `slack` becomes negative if the smallest eigenvalue of X, which is at
+/// least det / trace, is below `limit`: loop_solver.h then decides on the rank of the loop.
 template <class T>
 LOOPBENCH_INLINE Factored2<T> FactorsOf(const Symmetric2<T>& X, const T& limit, T& slack) {
   const T det = X.xx * X.yy - X.xy * X.xy;
@@ -253,8 +253,8 @@ LOOPBENCH_INLINE Factored2<T> FactorsOf(const Symmetric2<T>& X, const T& limit, 
   return {first, X.xy * first, X.xx * X.xx * inverse};
 }
 
-/// What a series join keeps for the way down: the force in it, on the second assembly at its handle
-/// 1, is U F_1 - W F_2 + y (17).
+/// Data of a series join for the downward pass: the force in it, on the second assembly at its
+/// handle 1, is U F_1 - W F_2 + y (17).
 template <class T>
 struct Cut {
   Matrix2<T> U, W;
@@ -294,7 +294,7 @@ struct EndCut {
   Vector2<T> y;
 };
 
-/// As Join(), A having no handle 1: also where A begins at Ground.
+/// Joins like Join(), for A without handle 1: also if A begins at Ground.
 template <class T>
 LOOPBENCH_INLINE OneHandle<T> Join(const OneHandle<T>& A, const TwoHandle<T>& B, const T& limit,
                                    EndCut<T>& cut, T& slack) {

@@ -1,5 +1,5 @@
-// Numbers (1) to (3) are those of dense_reduction.h. Rows of J are components along D of the cut
-// joints at Mo, in ground axes; columns belong to the speeds of the forest.
+// Equations (1) to (3) are in dense_reduction.h. Rows of J are components along D of the cut joints
+// at Mo, in ground axes; columns belong to the speeds of the forest.
 #include "reduction/dense_reduction.h"
 
 #include <algorithm>
@@ -45,7 +45,7 @@ void DenseReduction<Space, S>::Start(const Kinematics<Space, S>& kinematics) {
   dynamics_.Jacobian(kinematics, J_);
   const int n = mechanism_.num_u(), m = mechanism_.num_rows();
   const bool fixed = kind_ == SolverKind::kAsPublished;
-  // as published knows no redundancy: as many dependent speeds as constraints
+  // as published ignores redundancy: as many dependent speeds as constraints
   const int rank = fixed ? std::min(m, n) : GeometricRank(kinematics, dynamics_, J_);
   Partition<S> partition = BestPartition(J_, rank);
   if (fixed) {
@@ -114,7 +114,7 @@ bool DenseReduction<Space, S>::FactorPartition(const Kinematics<Space, S>& kinem
   const bool fits = static_cast<int>(rows_.size()) == r && !outgrown_;
   if (!fits && !null_space_) return false;
   dynamics_.Jacobian(kinematics, J_);
-  // what leaves rows out does so where they hold again, too
+  // omitted rows stay omitted at regular positions, too
   if (null_space_ && r != mechanism_.num_rows()) return false;
   const S rcond = FactorDependencies();
   found.rcond = static_cast<double>(rcond);
@@ -178,7 +178,7 @@ void DenseReduction<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) 
   ConstraintSolver<Space, S>::Correct(target, x);
 }
 
-/// (2) and (3) with `force` in the place of -h: B^T M B z = B^T (force - M c), x = B z + c.
+/// Solves (2) and (3) with `force` instead of -h: B^T M B z = B^T (force - M c), x = B z + c.
 template <class Space, class S>
 void DenseReduction<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& target,
                                      VectorX<S>& x, VectorX<S>* lambda) {
@@ -203,8 +203,7 @@ void DenseReduction<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& 
   if (lambda != nullptr) SolveForces(force, x, *lambda);
 }
 
-/// From the dependent equations of motion: J_D^T lambda = (M x - force)_D, zero where rows are not
-/// used.
+/// Solves the dependent equations of motion: J_D^T lambda = (M x - force)_D, zero for unused rows.
 template <class Space, class S>
 void DenseReduction<Space, S>::SolveForces(const VectorX<S>& force, const VectorX<S>& x,
                                            VectorX<S>& lambda) {
@@ -233,7 +232,7 @@ bool DenseReduction<Space, S>::Review(const Kinematics<Space, S>& kinematics) {
     SetPartition(BestPartition(J_, rank));
     return true;
   }
-  // started at a singular position, the partition leaves constraints out that now hold again
+  // after a singular start, the partition omits constraints that are independent again
   outgrown_ = rank > static_cast<int>(dependent_.size());
   if (outgrown_ || dependent_.empty()) return false;
   const Partition<S> best = BestPartition(J_, static_cast<int>(dependent_.size()));

@@ -9,17 +9,17 @@
 // level: the state carries q and all speeds, only accelerations follow from (1).
 //
 // As published: the independent set is fixed (the mechanism's, or chosen at the start) and all rows
-// of J are used; it ends as `singular` when J_D does, also where redundant constraints leave more
-// rows than dependent speeds. Automatic ("rank-revealing"): at the start the rank is taken from the
-// geometric response of loop_solver.h, dependent speeds and as many rows from QR of J with
-// pivoting; at each accepted step a partition whose conditioning has fallen below a tenth of the
-// best one's is replaced, which changes the state and restarts the integrator. The number of
-// dependent speeds stays that of the start; where the rank has grown beyond it (a start in a
-// singular position) the run ends as `singular`. J_D is factored by LU either way.
+// of J are used. It ends as `singular` when J_D is singular, also if redundant constraints leave
+// more rows than dependent speeds. Automatic ("rank-revealing"): the geometric response of
+// loop_solver.h gives the rank at the start, QR of J with pivoting the dependent speeds and as many
+// rows. At each accepted step a partition whose conditioning is below a tenth of the best one's is
+// replaced, which changes the state and restarts the integrator. The number of dependent speeds
+// keeps its initial value; if the rank exceeds it (a start in a singular configuration) the run
+// ends as `singular`. J_D is factored by LU either way.
 //
-// At the other levels the state does not depend on the partition, so that it may change its size.
-// Where it is suspicious, or leaves rows out, a basis of the free directions takes its place
-// (null_space.h). Start() and Review() may allocate.
+// At the other levels the state does not depend on the partition, so its size may change. If it is
+// suspicious or omits rows, a basis of the free directions replaces it (null_space.h). Start() and
+// Review() may allocate.
 #pragma once
 
 #include <memory>
@@ -47,8 +47,8 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }
 
-  /// LU of J_D and the basis B. False where it is singular or, the null space being there to take
-  /// its place, suspicious.
+  /// Computes LU of J_D and the basis B. Returns false if J_D is singular or, with a null space as
+  /// replacement, suspicious.
   bool FactorPartition(const Kinematics<Space, S>& kinematics);
   /// FactorPartition(), or the basis of the null space.
   Outcome Factor(const Kinematics<Space, S>& kinematics) override;
@@ -70,7 +70,7 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
  private:
   /// LU of J_D, J being current; the reciprocal condition.
   S FactorDependencies();
-  /// c of (2) with `target` in the place of gamma.
+  /// Computes c of (2) with `target` instead of gamma.
   void Dependent(const VectorX<S>& target, VectorX<S>& x);
   void FactorNullSpace(const Kinematics<Space, S>& kinematics);
   /// M, and the factors of (3), once per position; not before they are needed.

@@ -1,5 +1,5 @@
-// Numbers (4) and (5) are those of null_space.h. Rows of J are components along the directions D of
-// the cut joints at their points Mo, columns belong to the speeds of the forest.
+// Equations (4) and (5) are in null_space.h. Rows of J are components along the directions D of the
+// cut joints at their points Mo, columns belong to the speeds of the forest.
 #include "reduction/null_space.h"
 
 #include <algorithm>

@@ -1,20 +1,20 @@
-// Coordinate reduction without a choice of coordinates: a basis of the directions that the
-// constraints leave free, where no set of independent speeds serves (near singular positions) or
-// none is known (redundant constraints).
+// Coordinate reduction without a choice of coordinates: uses a basis of the free directions if no
+// set of independent speeds is suitable (near singular configurations) or known (redundant
+// constraints).
 //
 // With the mass matrix of unit bodies M_g = L L^T and the free responses K K^T of loop_solver.h,
 //
 //   B = K^-1 J L^-T = U diag(sigma) V^T,                                                     (4)
 //
 // and weights w_i from B B^T (direction_weights.h), the speeds are u = L^-T V z. A direction with
-// w_i = 1 but for kHard is dependent, its z_i given: sigma_i z_i = (U^T K^-1 gamma)_i =: c_i. All
+// w_i = 1 within kHard is dependent, its z_i given: sigma_i z_i = (U^T K^-1 gamma)_i =: c_i. All
 // others are independent,
 //
 //   (V_N^T Mh V_N + diag(k)) z_N = -V_N^T (L^-1 h + Mh V_D z_D) + diag(k) c_N / sigma_N,      (5)
 //   Mh = L^-1 M L^-T,   k_i = w_i / ((1 - w_i) v_i^T Mh^-1 v_i),
 //
-// and k_i, the stiffness with which a degenerating direction is still held, makes (5) the same
-// equations as the softened ones of loop_solver.h: there 1 / k_i stands beside the response.
+// and k_i is the stiffness that still holds a degenerating direction. It makes (5) equal to the
+// regularized equations of loop_solver.h: there 1 / k_i is added to the response.
 //
 // Basis by singular values: Singh and Likins, J. Appl. Mech. 52 (1985) 943; Mani, Haug and
 // Atkinson, J. Mech. Trans. Autom. Des. 107 (1985) 82.
@@ -32,8 +32,8 @@ namespace loopbench::reduction {
 template <class Space, class S>
 class NullSpace {
  public:
-  /// 1 - w below which a direction counts as dependent: its stiffness would be a million times the
-  /// inertia behind it, and what is lost by rounding as much.
+  /// 1 - w below which a direction counts as dependent: its stiffness would be a million times its
+  /// inertia, with an equal loss by rounding.
   static constexpr double kHard = 1e-6;
 
   explicit NullSpace(const Mechanism<Space, S>& mechanism);

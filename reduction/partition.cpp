@@ -12,9 +12,9 @@ namespace loopbench::reduction {
 
 namespace {
 
-/// The first `rank` pivots of a QR with column pivoting, ascending. Columns that differ by rounding
-/// alone, as those of equal bodies do, are taken in their order: each counts a little less than the
-/// one before, by more than rounding in any scalar and less than what makes a choice better.
+/// Returns the first `rank` pivots of a QR with column pivoting, ascending. Columns equal up to
+/// rounding, as for equal bodies, are taken in order: each has a slightly smaller weight than the
+/// one before, by more than rounding in any scalar and less than a useful difference.
 template <class S>
 std::vector<int> FirstPivots(MatrixX<S> columns, int rank) {
   constexpr double kFromFirstToLast = 1e-3;

@@ -1,4 +1,4 @@
-// Which speeds follow from which constraints: the choice behind a coordinate reduction.
+// Choice of dependent speeds and constraints for coordinate reduction.
 //
 // Made at the start and reviewed at accepted steps, never inside a right-hand side; may allocate.
 #pragma once
@@ -21,7 +21,7 @@ template <class Space, class S>
 int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>& dynamics,
                   const MatrixX<S>& J);
 
-/// Dependent speeds by QR of J with column pivoting, rows by the same on what is left of J.
+/// Chooses dependent speeds by QR of J with column pivoting, and rows by QR of the remainder of J.
 template <class S>
 Partition<S> BestPartition(const MatrixX<S>& J, int rank);
 

@@ -8,7 +8,7 @@ namespace loopbench::reduction {
 
 namespace {
 
-/// Of M, J, B and what the null space adds, roughly.
+/// Approximate memory of M, J, B and the null space.
 template <class Space>
 double DenseNumbers(const Mechanism<Space, double>& mechanism) {
   const double n = mechanism.num_u(), m = mechanism.num_rows();
@@ -32,7 +32,7 @@ SparseOrDense<Space>::SparseOrDense(const Mechanism<Space, double>& mechanism,
         SparsePartition<Space>::Make(mechanism, at_velocity_ ? Choice::kKept : Choice::kFree,
                                      matrices == Matrices::kSparse || (!at_velocity_ && fits));
   }
-  // for positions in doubt, which a right-hand side meets
+  // for uncertain positions within a right-hand side
   if (sparse_ == nullptr || (!at_velocity_ && fits)) MakeDense();
 }
 
@@ -50,7 +50,7 @@ template <class Space>
 bool SparseOrDense<Space>::StartsSparsely(const Kinematics<Space, double>& kinematics) {
   if (sparse_ == nullptr) return false;
   const bool independent = sparse_->AreIndependent(kinematics);
-  const bool chosen = sparse_->Choose(kinematics);  // what it allocates is there then
+  const bool chosen = sparse_->Choose(kinematics);  // allocates in advance
   if (at_velocity_ && !(independent && chosen)) return false;
   return !may_decline_ || sparse_->IsWorthwhile();
 }
@@ -93,7 +93,7 @@ Outcome SparseOrDense<Space>::Factor(const Kinematics<Space, double>& kinematics
     found.rcond = sparse_->Factor(kinematics);
     // a pivot below a few eps of the largest is round-off of the elimination
     is_sparse_ = found.rcond > 16 * std::numeric_limits<double>::epsilon();
-    // far from the constraints, where a trial step may end, bodies have arms of any length
+    // far from the constraints, at a trial step, bodies have arms of any length
     if (!at_velocity_ && dense_ != nullptr) is_sparse_ = is_sparse_ && sparse_->HasMass();
     if (is_sparse_) return Outcome::kFinished;
     if (at_velocity_) return Outcome::kSingular;

@@ -1,12 +1,12 @@
-// Coordinate reduction by whatever is less work: sparse factors of the dependencies between speeds
-// (sparse_partition.h), or dense matrices (dense_reduction.h), which are as published, know
-// redundant constraints, and decide and soften where rank is in doubt.
+// Coordinate reduction by the cheaper method: sparse factors of the dependencies between speeds
+// (sparse_partition.h), or dense matrices (dense_reduction.h). Dense matrices are as published,
+// support redundant constraints, and decide and regularize uncertain ranks.
 //
-// At level velocity the state carries the independent speeds: what the start chose stays sparse or
-// dense for the whole run, and J_D is judged by its pivots alone. At all other levels nothing hangs
-// on which speeds are dependent, and sparse factors have the choice that is best at each position,
-// if all joints' pivots leave no doubt there. Where a dense partition is less work, they take its
-// place as soon as it is suspicious; the dense null space has what is left.
+// At velocity level the state carries the independent speeds: the choice at the start, sparse or
+// dense, holds for the whole run, and pivots alone judge J_D. At all other levels the dependent
+// speeds are arbitrary. Sparse factors then use the best choice at each position if the pivots of
+// all joints prove full rank. Cheaper dense partitions replace suspicious sparse factors at once;
+// the dense null space handles the rest.
 #pragma once
 
 #include <memory>
@@ -37,19 +37,19 @@ class SparseOrDense final : public ConstraintSolver<Space, double> {
   bool Review(const Kinematics<Space, double>& kinematics) override;
   std::string WhySingular() const override;
 
-  /// Whether the last Factor() was sparse.
+  /// Returns true if the last Factor() was sparse.
   bool is_sparse() const { return is_sparse_; }
 
  private:
   void MakeDense();
   Outcome FactorDense(const Kinematics<Space, double>& kinematics);
-  /// Whether sparse factors leave nothing to dense matrices from the start on.
+  /// Returns true if sparse factors replace dense matrices from the start.
   bool StartsSparsely(const Kinematics<Space, double>& kinematics);
 
   const Mechanism<Space, double>& mechanism_;
   FormulationOptions options_;
   bool at_velocity_;
-  std::unique_ptr<SparsePartition<Space>> sparse_;        ///< null where it never serves
+  std::unique_ptr<SparsePartition<Space>> sparse_;        ///< null if never applicable
   std::unique_ptr<DenseReduction<Space, double>> dense_;  ///< null until needed, if too large
   bool uses_sparse_ = false;  ///< since Start(), before dense matrices are asked
   bool may_decline_ = false;  ///< the fill of sparse factors, for dense matrices

@@ -11,8 +11,8 @@ namespace loopbench::reduction {
 
 namespace {
 
-/// Rows that differ by rounding alone, as those of equal bodies do, are taken in their order: each
-/// counts a little less than the one before, by less than what makes a choice better.
+/// Rows equal up to rounding, as for equal bodies, are taken in order: each has a slightly smaller
+/// weight than the one before, by less than a useful difference.
 constexpr double kFromFirstToLast = 1e-3;
 
 /// Column numbers in the order of their elimination.
@@ -49,7 +49,7 @@ SparseLu::SparseLu(int num_rows, std::vector<int> start, std::vector<int> rows)
   for (std::vector<int>* list : {&reached_, &open_, &path_, &next_}) list->reserve(num_rows);
 }
 
-/// Depth first from `row`, without recursion: its column of L, and those that this one reaches.
+/// Visits depth first from `row`, without recursion: its column of L, and the columns it reaches.
 void SparseLu::Visit(int row) {
   if (marks_[row] == mark_) return;
   marks_[row] = mark_;
@@ -89,7 +89,7 @@ void SparseLu::Reach(int column) {
   reached_.clear();
   open_.clear();
   for (int e = start_[column]; e < start_[column + 1]; ++e) Visit(rows_[e]);
-  // a column acts before those that it reaches
+  // a column precedes the columns that it reaches
   std::ranges::reverse(reached_);
 }
 
@@ -145,7 +145,7 @@ bool SparseLu::Factor(std::span<const double> values, std::span<const char> barr
     if (k < num_known_ && (place < 0 || L_[place].index != pivots_[k])) {
       num_known_ = k;
       Reach(column);
-      SetL(k);  // in the order that it has without a pivot
+      SetL(k);  // in its order without a pivot
       place = Largest(k, barred);
     }
     const int pivot = place < 0 ? -1 : L_[place].index;
@@ -173,7 +173,7 @@ bool SparseLu::Factor(std::span<const double> values, std::span<const char> barr
 }
 
 void SparseLu::SolveTransposed(double* r, double* x) const {
-  // U^T y = Q^T r, y of step k in the place of r's column order_[k]
+  // U^T y = Q^T r, y of step k instead of r's column order_[k]
   for (int k = 0; k < columns(); ++k) {
     double y = r[order_[k]];
     for (int e = U_start_[k]; e < U_start_[k + 1]; ++e) y -= U_[e].value * r[order_[U_[e].index]];

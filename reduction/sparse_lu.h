@@ -1,14 +1,14 @@
-// P A Q = L U of a tall sparse matrix: which of its rows all others follow from, and how.
+// P A Q = L U of a tall sparse matrix: a choice of rows, and the dependence of all others on them.
 //
-// A has at least as many rows as columns. Partial pivoting takes one row for each column, the one
-// that the elimination leaves largest, so |L| <= 1 and the pivots are as good a choice of rows as
-// such an elimination knows; or pivots come from a choice made before. With D the rows of pivots
-// and I all others, A_I = L_I L_D^-1 A_D. Column by column from the left, in time proportional to
-// the multiply-adds: Gilbert and Peierls, SIAM J. Sci. Stat. Comput. 9 (1988) 862. Columns are
-// taken in the order that bounds the fill of A^T A (COLAMD).
+// A has at least as many rows as columns. Partial pivoting takes the largest remaining row for each
+// column, so |L| <= 1 and the pivots are as good a choice of rows as this elimination permits; or
+// an earlier choice gives the pivots. With D the rows of pivots and I all others, A_I = L_I L_D^-1
+// A_D. Column by column from the left, in time proportional to the multiply-adds: Gilbert and
+// Peierls, SIAM J. Sci. Stat. Comput. 9 (1988) 862. Columns are taken in the order that bounds the
+// fill of A^T A (COLAMD).
 //
-// Eigen's SparseLU has square matrices and allocates for each; KLU could keep a first pivot order,
-// which may pass through zero between two reviews, or allocate for another.
+// Eigen's SparseLU needs square matrices and allocates for each. KLU keeps a first pivot order,
+// which may become singular between two reviews, or allocates for another.
 #pragma once
 
 #include <span>
@@ -19,7 +19,7 @@ namespace loopbench::reduction {
 class SparseLu {
  public:
   SparseLu() = default;
-  /// The pattern of A by columns: that of column k begins at `rows[start[k]]`.
+  /// Takes the pattern of A by columns: column k begins at `rows[start[k]]`.
   SparseLu(int num_rows, std::vector<int> start, std::vector<int> rows);
 
   int columns() const { return static_cast<int>(start_.size()) - 1; }
@@ -27,9 +27,9 @@ class SparseLu {
   const std::vector<int>& start() const { return start_; }
   const std::vector<int>& rows() const { return rows_; }
 
-  /// Factors of A, whose numbers are in the order of the pattern. Rows that `barred` names by a
-  /// non-zero are no pivots (empty: all may be). False where a column has no pivot, or one that is
-  /// not finite. Allocates the first time, and where other pivots fill more than twice as much.
+  /// Factors A, whose numbers are in the order of the pattern. Rows with a non-zero in `barred` are
+  /// no pivots (empty: all may be). Returns false if a column has no finite pivot. Allocates the
+  /// first time, and if other pivots fill more than twice as much.
   bool Factor(std::span<const double> values, std::span<const char> barred = {});
 
   /// The row of each pivot, in the order of elimination.
@@ -42,12 +42,12 @@ class SparseLu {
   double operations() const { return operations_; }
   double fill() const { return static_cast<double>(L_.size()); }
 
-  /// A_D^T x = r. r (by column) is lost; of x (by row) those of I stay as they are.
+  /// Solves A_D^T x = r. Overwrites r (by column); entries of x (by row) for rows I are unchanged.
   void SolveTransposed(double* r, double* x) const;
   /// A_D x = y. y (by row) is lost; x by column.
   void Solve(double* y, double* x) const;
-  /// Rows D of B = -(A_D^T)^-1 A_I^T, of which row `row` is `B[row * count]` and what follows, and
-  /// the column of a row of I is `place[row]`.
+  /// Computes the rows D of B = -(A_D^T)^-1 A_I^T: row `row` begins at `B[row * count]`, and a row
+  /// of I has the column `place[row]`.
   void Dependencies(std::span<const int> place, double* B, int count) const;
 
  private:
@@ -56,20 +56,20 @@ class SparseLu {
     double value = 0.0;
   };
 
-  /// Columns of L that reach this column of A, in the order in which they act, and the other rows
-  /// that it has then.
+  /// Finds the columns of L that reach this column of A, in elimination order, and the other rows
+  /// of the result.
   void Reach(int column);
   void Visit(int row);
-  /// The pattern of column k in the order of elimination, from what Reach() found.
+  /// Sets the pattern of column k in elimination order, from the result of Reach().
   void SetL(int k);
   void SetU(int k);
-  /// The place in L of the pivot that column k gets; -1: none.
+  /// Returns the index in L of the pivot for column k; -1: none.
   int Largest(int k, std::span<const char> barred) const;
 
   std::vector<int> start_, rows_, order_;
   std::vector<Entry> L_, U_;            ///< a column of L begins with its pivot
   std::vector<int> L_start_, U_start_;  ///< by column in the order of elimination
-  /// As long as pivots are those of the last time, so is the pattern of this many columns.
+  /// Number of columns with a valid pattern while pivots are unchanged.
   int num_known_ = 0;
   std::vector<double> diagonal_;  ///< of U
   std::vector<int> pivots_, step_of_row_;

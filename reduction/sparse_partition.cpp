@@ -1,4 +1,4 @@
-// Numbers (1) to (3) are those of dense_reduction.h.
+// Equations (1) to (3) are in dense_reduction.h.
 #include "reduction/sparse_partition.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 /// Entries of J beyond which it is not sparse: numbers and places take 2.4 GB.
 constexpr double kMostEntries = 2e8;
 
-/// How many speeds move the two sides of a cut joint against each other.
+/// Returns the number of speeds that move the two sides of a cut joint relative to each other.
 template <class Space>
 int LengthOfLoop(const Kinematics<Space, double>& anywhere, int index) {
   int length = 0;
@@ -33,7 +33,7 @@ double EntriesOf(const auto& mechanism, const auto& anywhere) {
   return entries;
 }
 
-/// The pattern of J^T: a column for each row of J.
+/// Returns the pattern of J^T: a column for each row of J.
 template <class Space>
 SparseLu WithPattern(const Mechanism<Space, double>& mechanism,
                      const Kinematics<Space, double>& anywhere) {
@@ -49,9 +49,9 @@ SparseLu WithPattern(const Mechanism<Space, double>& mechanism,
   return {mechanism.num_u(), std::move(start), std::move(speeds)};
 }
 
-// Nanoseconds of one machine; what is compared are their ratios. Of 29 ladders, grids, chains and
-// random graphs of 3 to 300 bodies there, sparse ones are within a third, dense ones in the plane
-// too but for one, in space down to half of what was measured, and judging up to twice.
+// Nanoseconds of one machine; only their ratios are used. For 29 ladders, grids, chains and random
+// graphs of 3 to 300 bodies there, sparse estimates are within a third. Dense ones in the plane are
+// too, except one; in space they are down to half of the measured times. Judging is up to twice.
 
 /// M, J_D, B and B^T M B as dense matrices.
 double DenseWork(double n, double r) {
@@ -59,7 +59,7 @@ double DenseWork(double n, double r) {
   return n * (120.0 + 0.7 * n + r) + 0.1 * r * r * (r / 3.0 + f) + 0.06 * n * f * (n + f);
 }
 
-/// The same in sparse ones, whose elimination takes `operations` and leaves `fill` entries in L.
+/// The same for sparse factors: elimination takes `operations` and leaves `fill` entries in L.
 template <class Space>
 double SparseWork(double entries, double operations, double fill, double bodies, double f) {
   const double dim = Space::kDim;
@@ -67,7 +67,7 @@ double SparseWork(double entries, double operations, double fill, double bodies,
          bodies * (30.0 + dim * f * (4.0 + 0.04 * f));
 }
 
-/// Whether constraints are independent, asked at each position.
+/// Returns true if constraints are independent; called at each position.
 template <class Space>
 double WorkOfJudging(const JointResponse<Space>& response, double bodies) {
   return response.operations() + 10.0 * Space::kDim * Space::kDim * bodies;
@@ -236,7 +236,7 @@ void SparsePartition<Space>::FactorMass() {
       for (int k = 0; k < Space::kDim; ++k) MV_(body * Space::kDim + k, i) = momentum[k];
     }
   }
-  // the factor asks for one triangle, which Eigen makes by blocks that few columns do not fill
+  // the factor needs one triangle, which Eigen computes by blocks that few columns do not fill
   if (f > 8) {
     reduced_.template triangularView<Eigen::Lower>() = V_.leftCols(f).transpose() * MV_;
   } else {
@@ -249,7 +249,7 @@ template <class Space>
 bool SparsePartition<Space>::HasMass() {
   if (independent_.empty()) return true;
   FactorMass();
-  // a factorisation does not stop at what is no number
+  // a factorisation does not detect NaN
   return reduced_factor_.info() == Eigen::Success &&
          reduced_factor_.matrixLLT().diagonal().allFinite();
 }

@@ -1,5 +1,4 @@
-// Coordinate reduction where loops have few speeds each: equations (1) to (3) of dense_reduction.h
-// with
+// Coordinate reduction for loops of few speeds each: equations (1) to (3) of dense_reduction.h with
 //
 //   J_D    in sparse factors (sparse_lu.h), which also choose the dependent speeds: they are the
 //          pivots of J^T,
@@ -9,8 +8,8 @@
 // O(n (1 + f)^2) for f independent speeds and loops of bounded length; the reduced matrix stays
 // dense, f x f, as it is for every reduction.
 //
-// All constraints must be independent. Whether they are is asked of the pivots of the geometric
-// response (mechanism/loops/joint_response.h), which leave no doubt or say that there is some.
+// All constraints must be independent. The pivots of the geometric response decide this
+// (mechanism/loops/joint_response.h): they prove it or leave it uncertain.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -23,47 +22,47 @@
 
 namespace loopbench::reduction {
 
-/// Which speeds are dependent: the choice of the last Choose() or ChooseAgain(), or the best at
-/// each position, where nothing hangs on the choice.
+/// Choice of dependent speeds: from the last Choose() or ChooseAgain(), or the best at each
+/// position if the state does not depend on it.
 enum class Choice { kKept, kFree };
 
 template <class Space>
 class SparsePartition {
  public:
-  /// Null where constraints must be dependent and, unless `anyway`, where dense matrices are less
+  /// Returns null if constraints must be dependent or, unless `anyway`, dense matrices are less
   /// work. `mechanism` must outlive this. Throws TooDense (dense_memory.h).
   static std::unique_ptr<SparsePartition> Make(const Mechanism<Space, double>& mechanism,
                                                Choice choice, bool anyway);
 
   /// The judge of positions.
   JointResponse<Space>& response() { return *response_; }
-  /// Whether all constraints are independent at this position, beyond doubt.
+  /// Returns true if all constraints are certainly independent at this position.
   bool AreIndependent(const Kinematics<Space, double>& kinematics) {
     return response_->Factor(kinematics, Masses::kGeometric);
   }
 
-  /// Takes the dependent speeds that are best at these positions. False where there are none for
-  /// each constraint.
+  /// Chooses the best dependent speeds at these positions. Returns false if some constraint has
+  /// none.
   bool Choose(const Kinematics<Space, double>& kinematics);
-  /// The same where the kept ones have a reciprocal condition below `share` of the best; whether
-  /// they were replaced.
+  /// Does the same if the reciprocal condition of the kept ones is below `share` of the best;
+  /// returns true if they were replaced.
   bool ChooseAgain(const Kinematics<Space, double>& kinematics, double share);
-  /// Whether it saves work over dense matrices, with the fill of the last choice, which nobody
-  /// knows before; at level velocity half of it.
+  /// Returns true if it saves work over dense matrices, with the fill of the last choice, unknown
+  /// before; at velocity level half of that fill.
   bool IsWorthwhile() const;
   /// Indices into u, ascending.
   const std::vector<int>& independent() const { return independent_; }
 
-  /// J_D = factors, and B. Its reciprocal condition, 0 where it has no factors.
+  /// Computes J_D's factors and B. Returns the reciprocal condition, 0 without factors.
   double Factor(const Kinematics<Space, double>& kinematics);
-  /// Whether B^T M B of the last Factor() is positive definite: wherever that is no round-off.
+  /// Returns true if B^T M B of the last Factor() is positive definite beyond round-off.
   bool HasMass();
   /// x_D = J_D^-1 target, x_I = 0.
   void Dependent(const VectorX<double>& target, VectorX<double>& x);
   /// (1): u = B u_I, less J_D^-1 b where `bias` is not null.
   void CompleteSpeeds(const VectorX<double>* bias, VectorX<double>& u);
-  /// (2) and (3) with `force` (empty: zero) in the place of -h and `target` in that of gamma; not
-  /// finite where HasMass() is false.
+  /// Solves (2) and (3) with `force` (empty: zero) instead of -h and `target` instead of gamma; not
+  /// finite if HasMass() is false.
   void Solve(const VectorX<double>& force, const VectorX<double>& target, VectorX<double>& x);
   /// lambda of J_D^T lambda = (M x - force)_D.
   void Multipliers(const VectorX<double>& force, const VectorX<double>& x, VectorX<double>& lambda);
@@ -75,7 +74,7 @@ class SparsePartition {
                   std::unique_ptr<JointResponse<Space>> response);
 
   void FillJacobian(const Kinematics<Space, double>& kinematics);
-  /// The lists of what is independent, from the pivots of lu_.
+  /// Sets the lists of independent speeds from the pivots of lu_.
   void SetIndependent();
   /// B^T M B of (3), once per position.
   void FactorMass();
@@ -88,7 +87,7 @@ class SparsePartition {
   const Kinematics<Space, double>* kinematics_ = nullptr;  ///< of the last Factor()
   std::vector<double> J_;                                  ///< in the order of lu_'s pattern
   SparseLu lu_;
-  std::unique_ptr<SparseLu> best_;  ///< null where the choice is free: lu_ is it
+  std::unique_ptr<SparseLu> best_;  ///< null for a free choice, which uses lu_
   std::vector<int> independent_;
   std::vector<char> is_independent_;  ///< by speed, of the choice that is kept
   std::vector<int> place_;            ///< of a speed among the independent ones

@@ -19,12 +19,12 @@
 namespace loopbench::harness {
 namespace {
 
-/// Of a longer run a disturbance is a small part.
+/// Minimum duration: disturbances are a small part of longer runs.
 constexpr double kShortTrial_s = 2e-3;
 /// Neighbours come and go within one, and repeating it would take the pilot's time.
 constexpr double kLongTrial_s = 0.1;
 
-/// One part, so that its energy and its steps are those of all.
+/// One subsystem, so that energy and steps are those of the full mechanism.
 CompileOptions InOnePiece() { return {.islands = false}; }
 
 template <class Space>
@@ -56,7 +56,7 @@ class BenchIn final : public TrialBench {
     // a short run is soon disturbed, and searches go by its time
     if (bare.wall_s < kShortTrial_s) TimeAgain(&trial);
     ErrorMeter meter({scene_.user, compiled_, scene_.points}, 0, scene_.reference);
-    // interpolation doubles what a run costs
+    // interpolation doubles the cost of a run
     if (Run(choice, 10 * cpu_s, &meter).outcome != Outcome::kFinished) return trial;
     Record record;
     meter.Write(record);
@@ -148,7 +148,7 @@ class BenchIn final : public TrialBench {
 }  // namespace
 
 void TrialBench::Settle(Trial* trial) {
-  // twice and more what is short by itself: it may be short and disturbed
+  // re-times runs up to this long: a disturbance may hide a shorter one
   constexpr double kMaybeShort_s = 2.5 * kShortTrial_s;
   constexpr int kSame = 3, kMostTimings = 12;
   for (int same = 0, i = 0; same < kSame && i < kMostTimings && trial->wall_s < kMaybeShort_s;
@@ -190,18 +190,18 @@ namespace {
 /// Tolerances that trials are made at. Below the least rounding rules, above the largest the error
 /// estimate means nothing.
 constexpr double kLeastRtol = 3e-15, kLargestRtol = 0.05;
-/// Of an error or a budget: the search aims a little inside, and is content within a factor.
+/// For an error bound or a budget: target and lower limit of acceptance, as factors of the request.
 constexpr double kAim = 0.7, kContent = 0.4;
 /// Trials of one method and level. Errors follow tolerances by a power near one: three are enough
 /// in most cases.
 constexpr int kMostTrials = 5;
 /// A trial may cost so much more than the best, for timing's sake, and so much at least [s].
 constexpr double kRoom = 1.5, kLeastLimit_s = 2e-4;
-/// Of a sweep: trials beyond are cut off.
+/// Limits of a sweep: trials beyond these are stopped.
 constexpr double kHopeless = 20.0, kHopelessLeast_s = 2e-3;
 /// Steps go with rtol^(-1/p) for a method of order p; p is near six.
 constexpr double kOrder = 6.0;
-/// Of a budget: what finalists aim at, and are content with, and trials that this may take.
+/// For a budget: target and accepted lower limit of finalists, and maximum number of trials.
 constexpr double kSpent = 0.97, kFull = 0.94;
 constexpr int kSqueezes = 5;
 /// Pairs of method and level that all formulations are tried in, and runs that decide.
@@ -267,7 +267,7 @@ class Pilot {
     return advice_;
   }
 
-  /// All tolerances of a column and profile; the best of them is looked at.
+  /// Tries all tolerances of a method and profile and examines the best.
   void TryAll(const std::string& formulation, const std::string& profile, Enforcement level) {
     for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
       Choice choice;
@@ -306,10 +306,10 @@ class Pilot {
     return request_.error ? trial.error <= *request_.error : trial.wall_s <= Budget();
   }
 
-  /// Whether a is better advice than b.
+  /// Returns true if a is better advice than b.
   bool Better(const Trial& a, const Trial& b) const {
     if (Keeps(a) != Keeps(b)) return Keeps(a);
-    // of those that miss what was asked for, the one that misses it least
+    // if both miss the request, the smaller violation wins
     const bool by_time = request_.error.has_value() == Keeps(a);
     return by_time ? a.wall_s < b.wall_s : a.error < b.error;
   }
@@ -318,7 +318,7 @@ class Pilot {
                              [this](const Trial& a, const Trial& b) { return Better(a, b); });
   }
 
-  /// CPU time that the next trial may take: of what is left, and not much more than the best.
+  /// Returns the CPU time limit of the next trial, from the remaining time and the best trial.
   double Limit() const {
     const double left = std::max(request_.cpu_s - Elapsed(), 1e-3) / 4;
     if (request_.budget) return std::min(left, std::max(kLeastLimit_s, 4 * Budget()));
@@ -326,8 +326,8 @@ class Pilot {
     return std::min(left, std::max(kLeastLimit_s, kRoom * best_->wall_s));
   }
 
-  /// Of a sweep: twenty times the best or the budget is no candidate, and low orders at 1e-13 would
-  /// take hours.
+  /// Returns the limit for trials of a sweep: twenty times the best or the budget. Low orders at
+  /// 1e-13 would take hours.
   double LimitOfSweep() const {
     if (request_.budget) return std::max(kHopeless * Budget(), kHopelessLeast_s);
     return best_ ? std::max(kHopeless * best_->wall_s, kHopelessLeast_s) : request_.cpu_s / 10;
@@ -342,7 +342,7 @@ class Pilot {
     return trial;
   }
 
-  /// By the cost of an evaluation over a coarse run.
+  /// Returns the formulation with the cheapest evaluation over a coarse run.
   std::string FastestFormulation() {
     std::string fastest;
     double least = 0.0;
@@ -384,13 +384,13 @@ class Pilot {
   template <class Take>
   void SearchError(Choice choice, Take take) {
     const double asked = *request_.error;
-    // a coarse trial is a cheap one, and tells where to go
+    // a coarse trial is cheap and guides the search
     choice.rtol = Tolerance(10 * asked / length_);
     for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
       const Trial trial = Try(choice);
       take(trial);
       if (trial.outcome != Outcome::kFinished) {
-        // too coarse for its loops, or too dear
+        // too coarse for its loops, or too expensive
         if (trial.outcome == Outcome::kTimeLimit || trial.outcome == Outcome::kStepLimit) return;
         choice.rtol = Tolerance(choice.rtol / 10);
         continue;
@@ -438,8 +438,8 @@ class Pilot {
     }
   }
 
-  /// The most promising of them. With a budget, columns of one method err alike at one tolerance,
-  /// and the cheaper ones have room left: what counts is the error they would have with all of it.
+  /// Keeps the most promising trials. With a budget, methods with one integrator err alike at one
+  /// tolerance. Cheaper ones have time left: trials are ranked by the error with all of it.
   void Shorten(std::vector<Trial>* trials, std::size_t count) const {
     Sort(trials);
     if (request_.budget) {
@@ -497,7 +497,7 @@ class Pilot {
     }
   }
 
-  /// Examines the best until one has no doubts and keeps the requested error, and puts it first.
+  /// Examines the best until one has no warnings and meets the request, and puts it first.
   void Examine(const std::function<void(Trial&)>& examine) {
     for (std::size_t i = 0; i < advice_.finalists.size(); ++i) {
       Trial& trial = advice_.finalists[i];

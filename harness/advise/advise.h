@@ -15,14 +15,14 @@
 
 namespace loopbench::harness {
 
-// Runs of one mechanism in many ways, each timed bare and then held against the reference: what
-// advice is made of.
+// Runs one mechanism with many methods, times each run, and measures its error against the
+// reference solution.
 
 /// A way of running a mechanism.
 struct Choice {
   Column column;
   std::string integrator = "ode45";
-  double rtol = 1e-8;  ///< = atol; of no consequence where the step is fixed
+  double rtol = 1e-8;  ///< = atol; no effect with a fixed step
   double step = 0.0;   ///< [s], fixed; 0: adaptive
 
   friend bool operator==(const Choice&, const Choice&) = default;
@@ -34,15 +34,15 @@ std::string ToString(const Choice& choice);
 struct Trial {
   Choice choice;
   Outcome outcome = Outcome::kFinished;
-  /// Largest of the points asked for, over the reference's times [m]; infinite for one that failed.
+  /// Largest error over requested points and reference times [m]; infinite after a failure.
   double error = std::numeric_limits<double>::infinity();
   double late = 0.0, shape = 0.0;  ///< as error_phase_max [s] and error_path_max [m]
   double wall_s = 0.0;             ///< of the fastest bare run so far [s]
   std::int64_t steps = 0, rhs_evaluations = 0;
-  std::string doubts;  ///< of a run with all observers, where one was made
+  std::string doubts;  ///< warnings of a run with all observers, if one was made
 };
 
-/// What all trials of a mechanism share.
+/// Inputs that all trials of a mechanism share.
 struct TrialScene {
   const MechanismDescription& user;
   const Reference& reference;
@@ -53,7 +53,7 @@ struct TrialScene {
 class TrialBench {
  public:
   virtual ~TrialBench() = default;
-  /// A bare run, timed, and one that is measured. A run that takes more CPU time than `cpu_s` ends
+  /// Times a bare run and measures a second one. A run that takes more CPU time than `cpu_s` ends
   /// with kTimeLimit and is not measured.
   virtual Trial Try(const Choice& choice, double cpu_s) = 0;
   /// Another bare run: lowers the trial's wall_s if it was faster.
@@ -62,21 +62,21 @@ class TrialBench {
   void Settle(Trial* trial);
 };
 
-/// The mechanism as runs have it by default, in one piece. `scene` and what it refers to must
-/// outlive the bench. Throws std::runtime_error where the start cannot be assembled.
+/// Returns the bench for the mechanism with default options, as one subsystem. `scene` and its
+/// referents must outlive the bench. Throws std::runtime_error if the initial assembly fails.
 std::unique_ptr<TrialBench> MakeTrialBench(const TrialScene& scene);
 
-/// What a trial's error is made of, as a sentence.
+/// Returns a sentence that names the main source of a trial's error.
 std::string WhatLimits(const Trial& trial, double reference_error);
 
-// Which way of running a mechanism is the cheapest that keeps an error, or the most accurate that
-// keeps a budget: a pilot of short trials, and what they showed.
+// Finds the cheapest method that meets an error bound, or the most accurate method within a time
+// budget, by short trial runs.
 //
-// Formulations compute the same accelerations, so what a method errs at a tolerance hardly depends
-// on them, and what an evaluation costs hardly on the method. The pilot looks for tolerances, by
-// method and level, in the formulation whose evaluations are the fastest; the best few are then run
-// by all formulations in both coordinate sets, in turn, and timed again until the fastest is known.
-// A trial is cut off as soon as it costs more than the best known by more than chance.
+// Formulations compute the same accelerations. A method's error at a tolerance thus hardly depends
+// on them, nor an evaluation's cost on the method. The search chooses tolerances per method and
+// level in the fastest formulation. The best few then run with all formulations and both coordinate
+// sets until the fastest is known. A trial is stopped once it costs significantly more than the
+// best known.
 
 /// Trials must stay below this share of the requested error. Errors may be larger between a
 /// reference's times, and the last bits of another machine change them.
@@ -89,8 +89,8 @@ struct AdviceRequest {
 };
 
 struct Advice {
-  bool reached = false;          ///< whether the first finalist keeps what was asked for
-  std::vector<Trial> finalists;  ///< the best first; where nothing was reached, the nearest first
+  bool reached = false;          ///< True if the first finalist meets the request
+  std::vector<Trial> finalists;  ///< best first; nearest to the bound if none meets it
   /// The best trial of each method and level that the pilot looked at, in their order.
   std::vector<Trial> looked_at;
   /// The fastest generated run with the first finalist's integrator, level and tolerance, if it was
@@ -102,14 +102,13 @@ struct Advice {
 };
 
 /// `length` [m] is the length of a link. `examine` runs a choice with all observers and enters its
-/// warnings and its error. A finalist with doubts is no advice unless all have some.
+/// warnings and its error. A finalist with warnings is excluded unless all have some.
 Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
               const std::function<void(Trial&)>& examine);
 
-/// The same from the whole product of formulations, levels, coordinates, profiles and tolerances a
-/// decade apart (and with a budget fixed steps, two a decade): what a pilot is held against.
-/// Nothing is cut off but runs that take twenty times the best or the budget, or a tenth of the
-/// time.
+/// Returns advice from all combinations of formulation, level, coordinates, profile and tolerance
+/// (a decade apart; with a budget, two fixed steps a decade). It is the reference for tests of the
+/// pilot. Runs stop only at twenty times the best or the budget, or at a tenth of the time.
 Advice Sweep(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
              const std::function<void(Trial&)>& examine);
 

@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::string_view kPrefix = "series.final.";
 
-/// The runs of one scene, horizon and tolerance that ended alike, by index, the largest set first.
+/// Runs of one problem, horizon and tolerance with equal final poses, by index, largest set first.
 using Clusters = std::vector<std::vector<std::size_t>>;
 
 bool HasFinalPoses(const Record& record) {
@@ -36,7 +36,7 @@ const std::vector<double>* PoseOf(const std::string& key, const Value& value) {
   return key.starts_with(kPrefix) ? std::get_if<std::vector<double>>(&value) : nullptr;
 }
 
-/// What component i of a pose is measured in: lengths of a link, or rad.
+/// Returns the unit of component i of a pose: link length, or 1 rad.
 double UnitOf(double link_length, std::size_t size, std::size_t i) {
   return i < (size == 3 ? 2u : 3u) ? link_length : 1.0;
 }
@@ -54,7 +54,7 @@ bool EndAlike(const Record& a, const Record& b, double rtol) {
 /// finite, or is not there, is as far as can be from all others.
 class Bounds {
  public:
-  /// Whether `run` ends like each of the runs taken so far.
+  /// Returns true if `run` has the final pose of each run in the cluster.
   bool Fit(const Record& run, double rtol) const {
     for (const auto& [key, value] : run.items()) {
       const auto* pose = PoseOf(key, value);
@@ -122,7 +122,7 @@ Clusters ClustersOf(std::span<const Record> records, const std::vector<std::size
   return clusters;
 }
 
-/// Whether runs of different equations all ended alike, that is in one cluster.
+/// Returns true if runs of different equations are all in one cluster.
 bool Decides(std::span<const Record> records, const Clusters& clusters) {
   if (clusters.size() != 1) return false;
   std::set<std::string> ways;
@@ -132,14 +132,14 @@ bool Decides(std::span<const Record> records, const Clusters& clusters) {
   return ways.size() > 1;
 }
 
-/// Whether its level puts the branch back at every step.
+/// Returns true if the run's level restores the branch at every step.
 bool KeepsBranches(const Record& record) {
   const auto level = FindLevel(record.Text("enforcement"));
   return level && TraitsOf(*level).growth == DriftGrowth::kNone && !IsPeer(record);
 }
 
-/// What runs of one tolerance decide: those of an integrator that all end alike, beside the peers,
-/// unless another integrator's all end alike elsewhere. Nothing where none does.
+/// Returns a run whose final pose decides for its tolerance: all runs of its integrator (and the
+/// external engines) agree. Null if none or if another integrator's runs agree elsewhere.
 const Record* DecidedBy(std::span<const Record> records, const std::vector<std::size_t>& runs,
                         double rtol) {
   std::set<std::string> integrators;
@@ -182,7 +182,7 @@ PoseDifference DifferenceOf(const Record& a, const Record& b) {
 
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
                                          const std::vector<bool>& testifies) {
-  // by scene and horizon, then by tolerance, the finest first
+  // by problem and horizon, then by tolerance, the finest first
   std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> scenes;
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (!HasFinalPoses(records[i])) continue;
@@ -246,10 +246,10 @@ constexpr double kAcceleration = 0.02, kVelocity = 0.2;
 constexpr double kFewSteps = 10.0;
 /// Steps that Baumgarte's default gains, 0.05/h, remember: twice one over the gain.
 constexpr double kRemembered = 40.0;
-/// Where steps are fixed, no tolerance promises anything of their errors: a loop that is open by a
-/// tenth of a link, beyond which growth is not analysed either, is none whatever the step.
+/// With fixed steps no tolerance bounds the errors. A loop-closure error of a tenth of a link
+/// counts as open for any step size; growth is not analysed beyond it either.
 constexpr double kOpenLoop = 0.1;
-/// Over the projection's goal, for what rounding does to the evaluation itself: 15 were seen.
+/// Factor over the projection's tolerance for rounding in the evaluation; 15 was observed.
 constexpr double kProjection = 25.0;
 
 /// Sampled less than twice a period, an oscillation looks like a slow one (Nyquist).
@@ -257,8 +257,8 @@ constexpr double kMostPeriods = 0.5;
 /// A step of 16 eps t ends a run (harness/integrator/stepper.cpp). Steps within three decades of
 /// that gain digits of nothing; no regular run comes within six.
 constexpr double kStepFloor = 1e3 * 16 * std::numeric_limits<double>::epsilon();
-/// Rejected steps for each accepted one: step control that fails more often than not follows what
-/// is no smooth solution. Less than a dozen say nothing.
+/// Maximum of rejected steps per accepted step: if step control fails more often, the solution is
+/// not smooth. Fewer than a dozen rejections are not significant.
 constexpr double kMostRejected = 1.0, kFewRejected = 12.0;
 
 /// Step control at its floor, or failing all the time.
@@ -293,15 +293,15 @@ double TolerancesOfDrift(const Record& record) {
   return tolerances;
 }
 
-/// What moves is a millionth of what the absolute tolerance lets pass, with masses near 1 kg: what
-/// feedback makes of rounding in a mechanism at rest.
+/// Returns true if the energy corresponds to speeds below 1e-6 of the absolute tolerance at 1 kg
+/// (round-off amplified by Baumgarte feedback).
 bool IsAtRest(const Record& record) {
   const double speed = 1e-6 * record.Number("atol");
   return record.Number("energy_scale") <= speed * speed;
 }
 
-/// Near enough to a singular position that the level has nothing to keep the branch by. Records of
-/// large mechanisms do not know the distance, but whether evaluations were softened.
+/// Returns true if the run came too near a singular configuration for its level to keep the branch.
+/// Records of large mechanisms lack the distance, but count regularized evaluations.
 bool PassedSingularPosition(const Record& record) {
   if (GrowthAt(record) == DriftGrowth::kNone) return false;
   if (record.Number("singularity_crossings") > 0) return true;
@@ -322,7 +322,7 @@ void Add(std::string* codes, bool on, const char* code) {
   if (on) *codes += (codes->empty() ? "" : " ") + std::string(code);
 }
 
-/// The same codes but for one.
+/// Returns `codes` without `code`.
 std::string Without(const std::string& code, const std::string& codes) {
   std::istringstream words(codes);
   std::string rest;
@@ -330,14 +330,14 @@ std::string Without(const std::string& code, const std::string& codes) {
   return rest;
 }
 
-/// Whether a run with these codes has nothing against the way that it went: members of ensembles
-/// and exponents are not about it.
+/// Returns true if no warning concerns the trajectory itself: warnings on ensemble members and
+/// exponents do not.
 bool TellsOfItsWay(const std::string& codes) {
   return Without(kMembersDoubt, Without(kExponentDoubt, codes)).empty();
 }
 
-/// An error that a published series may know in place of, or besides, that of points, and the
-/// series' own. Speeds have no scale that holds for all mechanisms.
+/// Error measure of published data besides or instead of the error of points. Speeds are left out:
+/// they have no scale that holds for all mechanisms.
 struct OtherError {
   const char *error, *accuracy;
   bool is_length;
@@ -360,7 +360,7 @@ bool IsNear(const Record& record, const char* error, const char* accuracy, doubl
   return record.Number(error) / length <= expected + certain;
 }
 
-/// Of all errors that are known.
+/// Returns true if all known errors are small.
 bool IsNearReference(const Record& record) {
   const double link = record.Number("link_length");
   const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
@@ -372,14 +372,14 @@ bool IsNearReference(const Record& record) {
   });
 }
 
-/// The same to the end of the run. A published series sees some of the motion at some times: who
-/// agrees with it need not have kept the way.
+/// Returns true for agreement to the end of the run. Published data are sparse, so agreement with
+/// them does not prove the branch.
 bool IsCertified(const Record& record) {
   return record.Find("error_position_end") != nullptr && record.Text("reference") != kPublished &&
          IsNearReference(record);
 }
 
-/// By more than runs of one tolerance may be apart (kMostTolerances), if a finer run was asked for.
+/// Returns true if a requested finer run differs by more than kMostTolerances.
 bool IsFarFromFinerRun(const Record& record) {
   const double most = kMostTolerances * record.Number("rtol") + kRoundOffShare;
   return record.Find("refinement_difference") != nullptr &&
@@ -421,8 +421,8 @@ double PromisedDriftShare(const Record& record) {
   const double rtol = record.Number("rtol");
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
   const auto growth = GrowthAt(record);
-  // nothing is left but of softened directions, and what peers, which project to a part of their
-  // tolerance, leave
+  // the rest is due to regularized directions, or to external engines, which project to a fraction
+  // of their tolerance
   const bool left = record.Number("regularized_evaluations") > 0 || IsPeer(record);
   const bool is_fixed = record.Number("step") > 0.0;
   double promised = is_fixed ? kOpenLoop : TolerancesOfDrift(record) * rtol;
@@ -447,13 +447,13 @@ double PeriodsPerStep(const Record& record) {
 std::string OwnDoubts(const Record& record) {
   std::string codes;
   if (record.Text("kind") != "accuracy" || !HasFinished(record)) return codes;
-  // a measure that is no number is none to rely on; one that was not taken says nothing
+  // NaN or infinite measures give a warning; missing ones give none
   const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
   Add(&codes,
       (has("energy_scale") || has("energy_error_relative")) &&
           !(EnergyErrorShare(record) <= ExpectedEnergyShare(record)) && !IsAtRest(record),
       kEnergyDoubt);
-  // where the reference knows the way, who kept to it did
+  // agreement with the reference proves that the branch was kept
   Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularDoubt);
   Add(&codes, WasSoftenedElsewhere(record) && !IsCertified(record), kSoftenedDoubt);
   Add(&codes,
@@ -503,7 +503,7 @@ bool HasDoubt(const Record& record, const std::string& code) {
 }
 namespace {
 
-/// All that names the case of a run but its tolerance.
+/// Returns all keys that name the case of a run, except its tolerance.
 std::string ColumnOf(const Record& record) {
   std::string name = record.Text("problem_id");
   for (const auto& [key, value] : record.items()) {

@@ -95,7 +95,7 @@ std::vector<double> Collect(const std::vector<Scores>& members, const Get& get) 
   return values;
 }
 
-// Whether the values are positive on average, by so many standard errors.
+// Returns true if the mean of the values exceeds zero by so many standard errors.
 bool IsPositive(const std::vector<double>& values, double standard_errors) {
   const double mean = Mean(values), count = static_cast<double>(values.size());
   double squares = 0;
@@ -103,7 +103,7 @@ bool IsPositive(const std::vector<double>& values, double standard_errors) {
   return mean > standard_errors * std::sqrt(squares / (count - 1) / count);
 }
 
-// Whether the winner describes the data at all.
+// Returns true if the winner describes the data.
 bool Holds(std::size_t winner, const std::vector<Scores>& members, double exponent,
            const HypothesisOptions& options) {
   if (winner != kExponential) {
@@ -287,7 +287,7 @@ bool IsResolved(const Growth& growth, const GrowthOptions& options) {
   }
   const double s = std::hypot(growth.spread, growth.spread_late) / std::sqrt(2.0);
   const double error = std::max(growth.spread, growth.spread_late) / std::sqrt(growth.members);
-  // False if anything is NaN.
+  // false if anything is NaN
   return std::abs(growth.exponent - growth.exponent_late) <= std::max(s, options.slope_bias) &&
          error <= options.largest_error;
 }

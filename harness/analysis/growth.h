@@ -1,4 +1,4 @@
-// How drift grows with time and time with size: fits and their tests.
+// Growth of drift with time and of time with size: fits and their tests.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace loopbench::harness {
 
-// Which law of growth fits best: t^(1/2), t, t^(3/2), t^2, or e^(k t).
+// Best-fitting law of growth: t^(1/2), t, t^(3/2), t^2, or e^(k t).
 
 /// One run's drift: times since release in s, increasing, and drift in the unit of a length (signs
 /// are dropped). Samples belong to accepted steps. A value that is not finite ends the run.
@@ -17,17 +17,16 @@ struct DriftSeries {
 };
 
 struct HypothesisOptions {
-  /// Readings of a running maximum are correlated: 64 of them over a window of some ten swings
-  /// tell no more than so many independent ones. Used for the price of a parameter alone.
+  /// Readings of a running maximum are correlated. 64 readings over about ten swings carry the
+  /// information of this many independent ones. Used only for the penalty of a parameter.
   double independent_readings = 16;
 
-  /// How far the fitted exponent may lie from a hypothesis that is still said to hold: the bias of
-  /// a running maximum (0.05, growth.h) and of windows that are not endless (exponents of
-  /// mechanisms come out as 1.84 to 2.08 where theory says 2), below a third of the half unit
-  /// between hypotheses.
+  /// Maximum distance of the fitted exponent from an accepted hypothesis. It covers the bias of a
+  /// running maximum (0.05) and of finite windows (fitted exponents of mechanisms are 1.84 to 2.08
+  /// instead of 2). It is below a third of the half unit between hypotheses.
   double exponent_tolerance = 0.15;
 
-  /// e^(k t) must grow by this factor within the window; slower ones cannot be told from a plateau.
+  /// Minimum growth of e^(k t) within the window; slower growth looks like a plateau.
   double least_factor = 2.718281828459045;
 
   /// A rival is refuted when its mean score lags by so many standard errors: 99 % for 8 members
@@ -42,10 +41,10 @@ struct HypothesisOptions {
 struct Hypothesis {
   std::string name = "none";  ///< "t^0.5", "t^1", "t^1.5", "t^2", "exponential" or "none"
   bool refutes_rivals = false;
-  /// Root-mean-square residual of log drift of the best rival over that of the winner (geometric
-  /// means over the members): 1 is a tie, 3 is plain to see. NaN without data.
+  /// Root-mean-square residual of log drift: best rival over winner (geometric means over the
+  /// members). 1 is a tie, 3 is clear. NaN without data.
   double ratio;
-  double rate;  ///< mean k of e^(k t) over the members, 1/s, whoever wins; NaN without data
+  double rate;  ///< mean k of e^(k t) over the members [1/s], for any winner; NaN without data
 };
 
 /// Compares the hypotheses on running maxima read at times spaced evenly in log t, one series per
@@ -59,9 +58,9 @@ struct Hypothesis {
 /// `exponent_tolerance` from the mean of the fitted ones, or when e^(k t) wins without growing by
 /// `least_factor` or without beating a power law of free exponent.
 ///
-/// Differences of score between two hypotheses are taken member by member, and their standard error
-/// over the members says whether a rival is refuted: members are independent of each other,
-/// readings of one run are not (Vuong's comparison of models, paired by run).
+/// Score differences between two hypotheses are formed member by member. Their standard error over
+/// the members decides whether a rival is refuted: members are independent, readings of one run are
+/// not (Vuong's model comparison, paired by run).
 ///
 /// @param exponent  mean of the fitted exponents over the members, same window.
 Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double exponent,
@@ -69,16 +68,16 @@ Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double expon
 
 // The exponent p in "drift grows like t^p", from an ensemble of runs, with an honest spread.
 
-/// What is cut off and when a window is long enough. Fractions of times are of the end of the
-/// usable part of the runs.
+/// Cut-offs and minimum window lengths. Fractions of time refer to the end of the usable part of
+/// the runs.
 struct GrowthOptions {
-  /// Where the two windows start. Before the first, growth is that of the start-up: of few steps,
-  /// and of a first swing that need not be like the later ones.
+  /// Starts of the two windows. Earlier growth is affected by the few first steps and by a first
+  /// swing that may differ from later ones.
   double window_start = 0.1;
   double late_window_start = 0.5;
 
-  /// The running maximum is read at so many times, evenly spaced in log t: an even weight per
-  /// decade, where the integrator's own samples would put nine tenths of it on the last one.
+  /// Number of times at which the running maximum is read, evenly spaced in log t for equal weight
+  /// per decade. The integrator's own samples would put nine tenths of it on the last decade.
   int points = 64;
 
   /// Drift above this fraction of `length` is no longer small, and stops growing: cut off.
@@ -87,10 +86,10 @@ struct GrowthOptions {
   /// Drift below this many round-offs of `length` is the evaluation's own noise: cut off.
   double floor = 10;
 
-  /// A final drift below this many round-offs of `length` is called "round-off". A thousand is what
-  /// rounding alone gives after N = 1e4 steps: random velocity errors add up to eps v sqrt(N),
-  /// positions to eps v T sqrt(N / 3), and v T is some ten lengths. Truncation at the tightest
-  /// tolerance in use (1e-12) leaves ten thousand and more.
+  /// A final drift below this many round-offs of `length` is called "round-off". A thousand is the
+  /// effect of rounding after N = 1e4 steps: random velocity errors add up to eps v sqrt(N),
+  /// positions to eps v T sqrt(N / 3), with v T about ten lengths. Truncation at the tightest
+  /// tolerance in use (1e-12) leaves more than ten thousand.
   double round_off = 1e3;
 
   /// "too-short" unless the first window's end is this many times its start (saturation and floor
@@ -114,7 +113,7 @@ struct GrowthOptions {
   HypothesisOptions hypotheses = {};
 };
 
-/// The answer. Exponents and spreads are NaN where they cannot be had.
+/// Result of the analysis. Exponents and spreads are NaN if not available.
 struct Growth {
   double exponent;       ///< mean over the members, window [0.1 T, T]
   double spread;         ///< sample standard deviation over the members; NaN for one member
@@ -132,9 +131,9 @@ struct Growth {
 /// Least-squares slope of log(running maximum) against log t, per run and window; mean and spread
 /// over the ensemble.
 ///
-/// The scatter of one fit says nothing about its error, because residuals are periodic and
-/// correlated: such an interval is 3 to 12 times too narrow. So the spread comes from runs with
-/// perturbed starts (16 to 32 of them), and one run resolves nothing.
+/// The residual scatter of one fit underestimates its error by a factor of 3 to 12 because
+/// residuals are periodic and correlated. The spread therefore comes from 16 to 32 runs with
+/// perturbed starts. One run resolves nothing.
 ///
 /// All members use the same windows: T is the earliest of t_end, a run's end and saturation, and
 /// the first window starts no earlier than the last member leaves the floor.
@@ -143,7 +142,7 @@ struct Growth {
 ///  1. at least `fewest_members` members and windows that are not too short;
 ///  2. |exponent - exponent_late| <= max(s, slope_bias) with s^2 the mean of the squares of the two
 ///     spreads. The measure is the spread and not the standard error s / sqrt(m): the question is
-///     whether one power law holds on both windows as far as a run can tell, and that must not
+///     whether one power law holds on both windows within the scatter of runs, and that must not
 ///     become harder to affirm the more runs there are;
 ///  3. s / sqrt(m) <= largest_error for either spread, because with a large spread the second
 ///     condition would hold for any numbers.
@@ -162,12 +161,12 @@ struct Growth {
 Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double length,
                      const GrowthOptions& options = {});
 
-/// The running maximum of |value| at `points` times spaced evenly in log t, from the first positive
-/// time to the last: what a log-log plot of drift shows, in little space. Empty if there is no
-/// interval or points < 2.
+/// Returns the running maximum of |value| at `points` times spaced evenly in log t, from the first
+/// positive time to the last. It is a compact log-log curve of drift. Empty if there is no interval
+/// or points < 2.
 DriftSeries Envelope(const DriftSeries& series, int points);
 
-// How a cost grows with size: the exponent of cost = c size^p.
+// Fits the exponent p of cost = c size^p.
 //
 // Least squares of log(cost) against log(size), one point per size. Costs of real programs are not
 // powers (fixed costs at small sizes, caches at large ones), so the fit comes with two spreads: the

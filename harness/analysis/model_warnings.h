@@ -1,4 +1,4 @@
-// What is unusual in a model, measured by the length of its links.
+// Warnings about unusual models, with lengths relative to the links.
 #pragma once
 
 #include <string>
@@ -11,17 +11,17 @@ namespace loopbench::harness {
 
 // The length that lengths of one mechanism are compared with.
 
-/// The longest extent [m] of the joints of one moving body, which for two joints is their distance,
-/// or of a rod; where no body has two joints, the longest way from a joint to a centre of mass. 1
-/// where there is none either. Geometry alone: where the scene stands does not matter.
+/// Returns the longest extent [m] of the joints of one moving body (their distance for two joints)
+/// or of a rod. If no body has two joints: the longest distance of a joint from a centre of mass,
+/// or else 1. Depends on geometry alone, not on the position in space.
 double LinkLength(const MechanismDescription& description);
 
-// What looks wrong about a mechanism before anything is run.
+// Warnings about a mechanism before any run.
 
 enum class WarningKind {
   kInconsistentStart,  ///< the start cannot be assembled
   kLocked,             ///< nothing can move
-  kSingularStart,      ///< the start is a singular position
+  kSingularStart,      ///< the start is a singular configuration
   kNearSingular,       ///< the loops are almost dependent at the start: bodies nearly in line
   kFloating,           ///< a part that no joint connects to ground
   kMassRatio,          ///< masses further apart than their equations can resolve well
@@ -39,26 +39,26 @@ struct Warning {
 
 /// The heaviest body over the lightest: beyond it half the digits of a double are the light body's.
 inline constexpr double kLargestMassRatio = 1e8;
-/// Ratio of singular values (Structure::conditioning) below which a start is near singular. Forces
-/// in the loops are then some hundred times those that cause them. The scenes of the paper stay
-/// above 0.1 but at their singular positions.
+/// Ratio of singular values (Structure::conditioning) below which a start is near singular. Loop
+/// forces are then about a hundred times their causes. The paper's problems stay above 0.1 except
+/// at their singular configurations.
 inline constexpr double kNearSingularRatio = 1e-2;
 
-/// Distance of a centre of mass from the middle of its joints over the mechanism's length: poses go
-/// through centres of mass, so that joints know their places to eps times as much; beyond this a
-/// tolerance of 1e-12 cannot be met.
+/// Distance of a centre of mass from the middle of its joints over the mechanism's length. Poses
+/// refer to centres of mass, so joint positions have rounding errors eps times as large. Beyond
+/// this limit a tolerance of 1e-12 cannot be met.
 inline constexpr double kFarthestCentre = 1e3;
 
-/// What can be said of the numbers alone, without an assembly: angles of more than a turn among
-/// initial coordinates, frames and rests of springs. All in one warning, as sure as a guess can be:
-/// such an angle may be meant.
+/// Returns warnings from the numbers alone, without assembly. Angles above one turn in initial
+/// coordinates, frames and spring rest angles give one combined warning. It is a guess: such an
+/// angle may be intended.
 std::vector<Warning> FindUnitWarnings(const MechanismDescription& description);
 
 /// A warning for each guess that a start q in joint coordinates misses.
 std::vector<Warning> FindGuessWarnings(const MechanismDescription& description,
                                        const VectorX<double>& q);
 
-/// All of them.
+/// Returns all warnings.
 std::vector<Warning> FindWarnings(const MechanismDescription& description,
                                   const Structure& structure);
 

@@ -57,7 +57,7 @@ std::string RunCompiler(const std::vector<std::string>& arguments) {
 
 namespace {
 
-/// Whether others could have written the file or folder.
+/// Throws if other users could have written the file or folder.
 void RequireOwn(const fs::path& path, mode_t kind) {
   struct stat found = {};
   if (::lstat(path.c_str(), &found) != 0) FailOn("look at", path);
@@ -71,7 +71,7 @@ void RequireOwn(const fs::path& path, mode_t kind) {
       ::geteuid()));
 }
 
-/// The folder of libraries, made where it is missing; nothing where it cannot be made.
+/// Returns the folder of libraries, created if missing; nothing on failure.
 std::optional<fs::path> CacheFolder() {
   const char* cache = std::getenv("XDG_CACHE_HOME");
   const char* home = std::getenv("HOME");

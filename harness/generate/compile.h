@@ -23,8 +23,8 @@ inline constexpr const char* kCompilerFlags[] = {
 #endif
 };
 
-/// Whether the compiler may round a product and a sum once, by fused multiply-add. Without it code
-/// has the same bits as the library's general text.
+/// Rounding of a product and a sum: separate, or once (fused multiply-add). Separate rounding gives
+/// the bits of the library's general code.
 enum class Contraction { kNone, kFused };
 
 /// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no

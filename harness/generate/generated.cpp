@@ -105,7 +105,7 @@ class LaneCalls final : public Together {
 /// The lane of one run.
 class Lane {
  public:
-  /// Null if no run is beside or no lane is free.
+  /// Returns null without a batch or a free lane.
   static std::unique_ptr<Lane> Take(SideBySide* beside) {
     if (beside == nullptr) return nullptr;
     LaneCalls& calls = LaneCalls::Of(*beside);
@@ -116,7 +116,7 @@ class Lane {
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
-  /// False if a comparison came out otherwise than it was recorded.
+  /// Returns false if a comparison differs from its recorded outcome.
   bool Call(const CompiledBranch& function, std::span<const double> x, std::span<double> y) {
     calls_.Want(lane_, function, x, y);
     beside_.Meet();

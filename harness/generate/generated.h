@@ -1,10 +1,10 @@
 // A system's right-hand side as generated code: recorded, compiled, loaded, called.
 //
-// A recording holds where all its comparisons come out as they did (graph.h). Where they do not,
-// the library evaluates; after some such evaluations the branch of the state at hand is recorded
-// too. Compiled branches stay until the mode of the system changes. Runs side by side, the members
-// of an ensemble, call compiled code together: each run has a lane of a function that evaluates
-// kLanes states at once (mechanism/formulation/side_by_side.h), and the bits that it has alone.
+// A recording is valid if all its comparisons have their recorded outcomes (graph.h). Otherwise the
+// library evaluates; after several such evaluations the branch of the current state is recorded
+// too. Compiled branches stay until the mode of the system changes. Batched runs (members of an
+// ensemble) call compiled code together, each in a lane of a function for kLanes states
+// (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a single run.
 #pragma once
 
 #include <memory>
@@ -60,7 +60,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
   RecordingStart start_;
-  std::vector<Branch> branches_;  ///< the one that served last stands first
+  std::vector<Branch> branches_;  ///< last used branch first
   std::vector<double> x_, room_;  ///< time and state; intermediate values
   std::int64_t misses_ = 0;
   int misses_left_ = 0;  ///< until the next branch is recorded

@@ -224,7 +224,7 @@ int Graph::Depth(const std::vector<bool>& live, const std::vector<bool>& given) 
   int deepest = 0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
     const auto& [operation, a, b, value] = nodes_[node];
-    // a cosine waits for the angle, not for the sine beside it
+    // a cosine waits for the angle, not for the paired sine
     const int before =
         std::max(a >= 0 ? depth[a] : 0, b >= 0 && operation != Operation::kPoseCos ? depth[b] : 0);
     const bool is_given = node < given.size() && given[node];
@@ -370,7 +370,7 @@ std::vector<int> Differentiate(Graph& graph, const std::vector<int>& outputs,
       if (!live[node]) continue;
       const Node of = graph.nodes()[node];
       const int da = of.a >= 0 ? derivative[of.a] : zero;
-      // a cosine names its sine beside its angle
+      // a cosine names its sine next to its angle
       const int db = of.b >= 0 && of.operation != Operation::kPoseCos ? derivative[of.b] : zero;
       if (static_cast<int>(node) == input) {
         derivative[node] = one;

@@ -23,7 +23,7 @@ inline void PoseSines(double angle, double* sine, double* cosine) {
   }
 }
 
-/// The same for kLanes angles.
+/// Does the same for kLanes angles.
 inline void PoseLaneSines(const double* angles, double* sines, double* cosines) {
   const Lanes x = Load<Lanes>(angles);
   Lanes sine, cosine;
@@ -76,7 +76,7 @@ struct Node {
   double value = 0.0;  ///< of a constant
 };
 
-/// A comparison of nodes, with its outcome where it was recorded.
+/// A comparison of nodes, with its recorded outcome.
 struct Comparison {
   Relation relation;
   int a, b;
@@ -85,7 +85,7 @@ struct Comparison {
   friend bool operator==(const Comparison&, const Comparison&) = default;
 };
 
-/// Exact numbers of operations. Negations and absolute values, which change a sign bit, are none.
+/// Exact numbers of operations, without negations and absolute values, which change a sign bit.
 struct OperationCounts {
   std::int64_t additions = 0;  ///< and subtractions
   std::int64_t multiplications = 0;
@@ -112,7 +112,7 @@ class Graph {
   int Make(Operation operation, int a, int b = -1);
   void Compare(Relation relation, int a, int b, bool outcome);
 
-  /// A node's value where it is a constant.
+  /// Returns true if the node's value is constant.
   bool IsConstant(int node) const { return nodes_[node].operation == Operation::kConstant; }
   bool Is(int node, double value) const { return IsConstant(node) && nodes_[node].value == value; }
 
@@ -132,7 +132,7 @@ class Graph {
 
   /// Numbers of all nodes for these inputs, by the arithmetic of Value().
   std::vector<double> Values(const std::vector<double>& inputs) const;
-  /// Whether all comparisons of these numbers come out as they were recorded.
+  /// Returns true if all comparisons of these numbers have their recorded outcomes.
   bool Holds(const std::vector<double>& values) const;
 
   /// Operations that the recorded text executed, before any simplification.
@@ -152,7 +152,7 @@ class Graph {
 /// The value of an operation on numbers, as the recorded text computes it.
 double Value(Operation operation, double a, double b);
 
-/// Whether an operation counts (OperationCounts).
+/// Returns true if an operation counts (OperationCounts).
 bool Counts(Operation operation);
 
 // Derivatives of a graph's nodes with respect to its inputs, as further nodes of the graph.

@@ -179,7 +179,7 @@ class Printer {
 
   const char* Truth() const { return has_lanes_ ? "holds" : "int"; }
 
-  /// How a node is called in a function.
+  /// Returns the name of a node in a function.
   std::string Name(int node, int function) const {
     const Node& of = graph_.nodes()[node];
     if (of.operation == Operation::kConstant) return Literal(of.value);
@@ -188,7 +188,7 @@ class Printer {
     return fmt::format("v{}", node);
   }
 
-  /// The same, where a constant is no number yet.
+  /// Does the same for constants without a number.
   std::string Whole(int node, int function) const {
     const bool is_constant = graph_.nodes()[node].operation == Operation::kConstant;
     const std::string name = Name(node, function);

@@ -28,13 +28,13 @@ std::string PrintFunction(const RecordedFunction& recorded, const std::string& n
 ///   const int loopbench_room
 std::string PrintLibrary(const RecordedFunction& recorded);
 
-/// The same function for `lanes` states at once, in vector types of GCC and clang:
+/// Prints the same function for `lanes` states at once, in vector types of GCC and clang:
 ///
 ///   void loopbench_use_lane_sines(void (*sines)(const double*, double*, double*))
 ///
 /// receives sines and cosines of as many angles. x, y and w are arrays of vectors: the numbers of a
 /// quantity in all lanes follow each other. Bit i of the result is set if all comparisons come out
-/// as recorded in lane i. Each lane has the bits of PrintLibrary().
+/// as recorded in lane i. Without fused multiply-add, lanes have PrintLibrary()'s bits.
 std::string PrintLanes(const RecordedFunction& recorded, int lanes);
 
 }  // namespace loopbench::generate

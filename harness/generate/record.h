@@ -60,7 +60,7 @@ struct Stages {
 struct RecordedFunction {
   Graph graph;
   std::vector<int> inputs, outputs;  ///< nodes
-  std::vector<double> numbers;       ///< the outputs where they were recorded
+  std::vector<double> numbers;       ///< the recorded values of the outputs
   std::vector<int> carried_speeds;   ///< of the state, indices into u
   Stages stages;                     ///< of dy/dt alone
 };
@@ -84,8 +84,8 @@ void RequireShort(const RecordedFunction& recorded);
 
 /// Exact counts of a right-hand side.
 struct MethodCounts {
-  OperationCounts as_run;    ///< operations of the text as it is
-  OperationCounts result;    ///< what is left for dy/dt alone after simplification
+  OperationCounts as_run;    ///< operations without simplification
+  OperationCounts result;    ///< operations for dy/dt alone after simplification
   OperationCounts compared;  ///< including the operations for comparisons
   std::int64_t comparisons = 0;
   /// Parts of `result`: poses and motions; applied forces; equations of motion and constraints.

@@ -1,10 +1,9 @@
 // A scalar that records the operations of any template compiled for it.
 //
-// It carries the number, by which the text takes its branches, and the node of a graph (graph.h)
-// that stands for it. A number without a node is a constant. Comparisons of numbers with nodes are
-// recorded with their outcomes. A number with a node that leaves the recording (a cast to double)
-// is shown to the caller as the recording says (CastsAs): a recording whose graph depends on that
-// has control flow behind a cast.
+// It carries the number, which decides branches of the code, and its node of a graph (graph.h). A
+// number without a node is a constant. Comparisons of numbers with nodes are recorded with their
+// outcomes. CastsAs defines the value of a number with a node that is cast to double. If the graph
+// depends on this value, control flow uses a cast.
 #pragma once
 
 #include <Eigen/Core>

@@ -14,9 +14,9 @@
 namespace loopbench::harness {
 namespace {
 
-// w = theta^2 (1 - theta)^2 vanishes with its derivative at both ends, so p + w (a + b theta)
-// leaves the ends of a cubic p as they are. Its derivative at theta = 1/2 is zero: a derivative
-// there says nothing of the factor, those at 1/3 and 2/3 do.
+// w = theta^2 (1 - theta)^2 and its derivative vanish at both ends, so p + w (a + b theta) keeps
+// the end values of a cubic p. Its derivative at theta = 1/2 is zero. Derivatives are therefore
+// taken at 1/3 and 2/3.
 double W(double theta) { return theta * theta * (1 - theta) * (1 - theta); }
 double DW(double theta) { return 2 * theta * (1 - theta) * (1 - 2 * theta); }
 constexpr double kFirst = 1.0 / 3.0, kSecond = 2.0 / 3.0;
@@ -48,7 +48,7 @@ bool DenseOutput::Prepare(double t0, std::span<const double> y0, double t1,
   };
   constexpr double kBack = -std::numeric_limits<double>::infinity();
   if (!scaled(t0, y0_, f0_) || !scaled(std::nextafter(t1, kBack), y1_, f1_)) return false;
-  // what the derivative at a point of the curve wants beyond the cubic's own
+  // derivative at a point of the curve minus the cubic's own derivative
   const auto excess = [&](double theta, std::vector<double>& more) {
     Cubic(theta, y);
     for (std::size_t i = 0; i < n; ++i) y[i] += W(theta) * bump_[i];
@@ -97,8 +97,8 @@ int Weights(N_Vector y, N_Vector weight, void* data) {
 }
 int NoChange(sunrealtype, N_Vector, void*) { return 0; }
 
-// The times at which steps must end, in order, t_end last. Times closer together than ARKODE can
-// tell apart are one.
+// Returns the times at which steps must end, in order, t_end last. Times too close for ARKODE to
+// separate are merged.
 std::vector<double> StepEnds(const std::vector<double>& stop_times, double t0, double t_end) {
   const double close =
       100 * std::numeric_limits<double>::epsilon() * std::max(std::abs(t0), std::abs(t_end));
@@ -168,9 +168,9 @@ struct Stepper::Arkode {
 
   void SetSteps(double t0) {
     const IntegratorOptions& options = ode_.options();
-    LOOPBENCH_SET(profile_.is_implicit, SetMaxNumSteps, memory(), -1);  // the limit is ours
-    // A fast transient, a knot or a singular position may ask for a step shorter by many orders of
-    // magnitude, from halving to halving; that steps vanish is for us to say. ARKODE gives up at 7.
+    LOOPBENCH_SET(profile_.is_implicit, SetMaxNumSteps, memory(), -1);  // limited here
+    // A fast transient, a knot or a singular configuration may need a step many orders of magnitude
+    // shorter, by repeated halving. This program detects vanishing steps; ARKODE stops at 7.
     LOOPBENCH_SET(profile_.is_implicit, SetMaxErrTestFails, memory(), 60);
     LOOPBENCH_SET(profile_.is_implicit, SetMaxHnilWarns, memory(),
                   -1);  // so is the test for vanishing steps

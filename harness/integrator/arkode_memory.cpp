@@ -48,7 +48,7 @@ int LinearCombination(int count, sunrealtype* c, N_Vector* x, N_Vector z) {
   return 0;
 }
 
-// How many components the norms see: quadratures come last and have weight zero.
+// Number of components in the norms: quadratures come last and have weight zero.
 size_t Weighted(std::span<const double> weight) {
   size_t count = weight.size();
   while (count > 0 && weight[count - 1] == 0) {
@@ -121,7 +121,7 @@ ControllerPtr SetControl(void* memory, bool, SUNContext context, const Controlle
           "the controller's parameters");
   Require(SUNAdaptController_SetErrorBias(made.get(), c.bias), "the error bias");
   LOOPBENCH_SET(, SetAdaptController, memory, made.get());
-  // Relative to one more than the lower of the two orders, which is what -1 undoes.
+  // Relative to one more than the lower of the two orders; -1 cancels this.
   LOOPBENCH_SET(, SetAdaptivityAdjustment, memory, c.uses_method_order ? 0 : -1);
   return made;
 }
@@ -200,13 +200,13 @@ Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_ste
   // A solution scaled for a gamma that has changed would be wrong in the quadratures, whose
   // convergence nothing tests.
   LOOPBENCH_SET_IMPLICIT(SetLinearSolutionScaling, memory, SUNFALSE);
-  // f of a stage is (z - a) / gamma: evaluated at z it would multiply what Newton left over by J.
+  // f of a stage is (z - a) / gamma: evaluated at z it would multiply Newton's residual by J.
   LOOPBENCH_SET_IMPLICIT(SetDeduceImplicitRhs, memory, SUNTRUE);
   // ARKODE's own 20 and 51 steps between matrices and Jacobians let the error test fail until the
   // run ends; a Jacobian per step costs less than the iterations and the rejected steps it saves.
   LOOPBENCH_SET_IMPLICIT(SetLSetupFrequency, memory, 1);
   LOOPBENCH_SET_IMPLICIT(SetJacEvalFrequency, memory, 1);
-  // What Newton leaves over, in units of the tolerance: at ARKODE's 0.1 it rules the global error.
+  // Newton residual in units of the tolerance: at ARKODE's 0.1 it dominates the global error.
   LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, 0.01);
   // A step that may shrink is cheaper shortened than iterated on.
   LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, fixed_step ? Stepper::kMostIterations : 8);

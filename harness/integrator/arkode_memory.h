@@ -1,4 +1,4 @@
-// What ARKODE is made of here: vectors, calls of its versions, Newton iterations.
+// Parts of the ARKODE interface: vectors, calls of its versions, Newton iterations.
 #pragma once
 
 #include <arkode/arkode_arkstep.h>
@@ -32,7 +32,7 @@
 #define LOOPBENCH_ARK_IMPLICIT(call, ...) ARKStep##call(__VA_ARGS__)
 #endif
 
-// The same for calls that can only fail by a mistake of ours.
+// The same for calls that can fail only by a programming error.
 #define LOOPBENCH_SET(implicit, call, ...) \
   ::loopbench::harness::Require(LOOPBENCH_ARK(implicit, call, __VA_ARGS__), #call)
 #define LOOPBENCH_SET_IMPLICIT(call, ...) \
@@ -51,10 +51,10 @@ inline std::span<double> Span(N_Vector v) {
 /// (quadratures, ode.h) and no others.
 void UseOurOperations(N_Vector v, bool max_norm);
 
-// What differs between the versions of SUNDIALS that are supported, 6.4 and 7: names of calls,
-// context, messages, step-size controller. Also the owners of SUNDIALS' objects.
+// Differences between the supported versions of SUNDIALS, 6.4 and 7: names of calls, context,
+// messages, step-size controller. Also the owners of SUNDIALS' objects.
 
-/// A setting that ARKODE refuses is a mistake in the code, not an ending of a run.
+/// A setting that ARKODE rejects is an error in the code, not an outcome of a run.
 inline void Require(int code, const char* what) {
   if (code != 0) {
     throw std::logic_error(std::string("ARKODE refused ") + what);
@@ -89,14 +89,14 @@ using ControllerPtr = Nothing;  // ARKODE 6 keeps the controller inside its memo
 Context MakeContext(std::string* message);
 void CaptureMessages(void* memory, bool implicit, std::string* message);
 
-/// Makes `memory` choose steps by `c`; what is returned must live as long as `memory`.
+/// Makes `memory` choose steps by `c`; the returned object must live as long as `memory`.
 ControllerPtr SetControl(void* memory, bool implicit, SUNContext context, const Controller& c);
 
 // Newton's iteration for the stages of an implicit Runge-Kutta method in ARKODE.
 
 /// The dense matrix I - gamma J of a stage and its factors. Quadratures come last in y, and f does
-/// not depend on them, so that the matrix is block triangular: only the leading block is factored,
-/// and what it gives does not depend on the quadratures in any bit.
+/// not depend on them, so the matrix is block triangular. Only the leading block is factored; its
+/// solution does not depend on the quadratures in any bit.
 class Newton {
  public:
   /// Makes ARKStep's `memory` solve its stages with Jacobians of the GuardedOde that is its user

@@ -1,7 +1,7 @@
 // CPU time of the calling thread, and a limit on it.
 //
-// Limits measure the case, not the machine: a run that waits for a processor, or is stopped and
-// continued, uses wall time that is none of its own.
+// Limits measure the case, not the machine: waiting for a processor or being stopped uses wall
+// time, but no CPU time.
 #pragma once
 
 #include <chrono>
@@ -16,11 +16,11 @@ inline double ThreadCpuSeconds() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// Times the thread that makes it and asks it, against a limit of CPU time.
+/// CPU time limit of the thread that creates and queries it.
 ///
-/// Reading the CPU clock is a system call, ten times as dear as reading the wall clock. A thread
-/// cannot use more CPU time than passes on the wall, so the CPU clock is read only once as much
-/// wall time has passed as was left at the last reading: hardly ever on an idle machine.
+/// Reading the CPU clock is a system call, ten times as expensive as reading the wall clock. CPU
+/// time never exceeds wall time. The CPU clock is therefore read only after as much wall time as
+/// was left at the last reading: hardly ever on an idle machine.
 class CpuLimit {
  public:
   explicit CpuLimit(double limit_s) : limit_s_(limit_s), look_s_(limit_s) {}

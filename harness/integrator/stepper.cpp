@@ -141,7 +141,7 @@ constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 std::string At(double t) { return " at t = " + std::to_string(t) + " s"; }
 
-// Ends the run with what the derivative, the clock or ARKODE reported in the step after t_reached.
+// Ends the run with the failure of the derivative, the clock or ARKODE in the step after t_reached.
 bool Fails(const GuardedOde& ode, const Stepper& stepper, int code, IntegratorResult& result) {
   if (ode.exception()) {
     std::rethrow_exception(ode.exception());
@@ -175,12 +175,12 @@ bool Exhausted(GuardedOde& ode, IntegratorResult& result) {
   return true;
 }
 
-// Shows a dense observer the times it asks for, from step to step.
+// Passes the requested times to a dense observer, step by step.
 class Watcher {
  public:
   Watcher(Ode& ode, const DenseObserver* dense) : ode_(ode), dense_(dense) {}
 
-  /// Where the next step begins.
+  /// Sets the start of the next step.
   void Leave(double t, const std::vector<double>& y) {
     if (dense_ == nullptr) return;
     t0_ = t;

@@ -1,4 +1,4 @@
-// Steps under guard: what a right-hand side may throw, limits, and the loop over steps.
+// Guarded steps: exceptions of a right-hand side, limits, and the loop over steps.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +27,7 @@ class GuardedOde {
   /// Starts the clocks. Both arguments must outlive the object.
   GuardedOde(Ode& ode, const IntegratorOptions& options);
 
-  /// False if the run must end; `failure()` or `exception()` then says why.
+  /// Returns false if the run must end; `failure()` or `exception()` then give the reason.
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept;
 
   /// Renews jacobian() from the problem's own, or else by forward differences, whose evaluations
@@ -37,7 +37,7 @@ class GuardedOde {
   /// df_i/dy_j at [i + y.size() * j] for all i and for the j that are not quadratures.
   std::span<const double> jacobian() const { return jacobian_; }
 
-  /// Lets the derivative see only times before `t` from now on; infinity lifts this.
+  /// Limits the times passed to the derivative to less than `t`; infinity removes the limit.
   void SetStop(double t);
 
   /// True, and the failure is kTimeLimit, once the CPU time is used up.
@@ -76,7 +76,7 @@ class GuardedOde {
 
   const IntegratorOptions& options_;
   Ode& ode_;
-  double latest_ = std::numeric_limits<double>::infinity();  // time that the derivative may see
+  double latest_ = std::numeric_limits<double>::infinity();  // latest time passed to the derivative
   CpuLimit time_;
   std::int64_t calls_ = 0, jacobian_calls_ = 0, jacobians_ = 0, dual_evaluations_ = 0;
   std::vector<double> jacobian_, shifted_, shifted_f_;  // empty for explicit profiles
@@ -92,9 +92,8 @@ class Stepper {
  public:
   static constexpr int kMostIterations = 50;  ///< of Newton in a stage of a step of fixed length
 
-  /// The profile, the limits on steps and the stop times are those of `ode.options()`, which must
-  /// be valid. May evaluate the derivative at (t0, y0) to choose the first step; requires t0 <
-  /// t_end.
+  /// Takes the profile, step limits and stop times from `ode.options()`, which must be valid. May
+  /// evaluate the derivative at (t0, y0) to choose the first step; requires t0 < t_end.
   Stepper(GuardedOde& ode, double t0, double t_end, const std::vector<double>& y0);
   ~Stepper();
 
@@ -102,7 +101,7 @@ class Stepper {
   /// y() are the step's end; a step that reaches t_end or a stop time ends there exactly.
   int Step(double& t);
 
-  /// Starts anew from (t, y), t < t_end, with the step size meant for the next step.
+  /// Restarts from (t, y), t < t_end, with the size planned for the next step.
   void Restart(double t, const std::vector<double>& y);
 
   std::span<const double> y() const;

@@ -20,8 +20,8 @@ namespace loopbench::harness {
 template <class Space>
 class JointView {
  public:
-  /// `mechanism` is made of `description` and must outlive the view. Loops are seen with all that
-  /// their joints constrain, or without what was released as redundant at every position.
+  /// Builds the view of `mechanism`, made of `description`; it must outlive the view. Loops have
+  /// all constrained directions of their joints, or omit those redundant at every position.
   JointView(const MechanismDescription& description, const Mechanism<Space, double>& mechanism,
             bool with_released)
       : mechanism_(&mechanism) {
@@ -55,12 +55,12 @@ class JointView {
 
 namespace {
 
-/// Keeps the largest; one that is no number stays.
+/// Keeps the larger value; NaN stays.
 void Keep(double* largest, double value) {
   if (!std::isnan(*largest) && !(value <= *largest)) *largest = value;
 }
 
-/// Largest mismatch of some joints: points and rotations apart, and whose points are worst.
+/// Largest violation of some joints: points and rotations apart; joint with the worst points.
 struct Largest {
   double shift = 0.0, rotation = 0.0;
   int joint = -1;
@@ -80,7 +80,7 @@ struct Largest {
 
 }  // namespace
 
-/// What is watched besides positions.
+/// Measured quantities besides positions.
 template <class Space>
 struct DriftObserver<Space>::Rest {
   Rest(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
@@ -185,7 +185,7 @@ ExactObserver<Space>::ExactObserver(const SceneObservation& scene,
 
 namespace {
 
-// Of a planar scene, in space the angle about z.
+// For planar problems, in space the angle about z.
 template <class Space>
 double AngleOf(const Pose<Space, double>& X) {
   if constexpr (Space::kRot == 1) {
@@ -310,7 +310,7 @@ void CoordinateObserver<Space>::Observe(const Sample<Space>& sample) {
   for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
     if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
     if (first) {
-      // motions have their rotations first; a helix is told by its angle
+      // motions have their rotations first; a helix is measured by its angle
       const bool shifts = joints[j].kind->axes[0] >= Space::kRot;
       keys_.push_back((shifts ? "displacement." : "angle.") +
                       kinematics.mechanism().joint_names()[j]);
@@ -366,7 +366,7 @@ template class CoordinateObserver<Spatial>;
 
 namespace {
 
-/// Rows and speeds up to which every accepted step can afford a dense decomposition (some 0.1 ms).
+/// Rows and speeds up to which every accepted step affords a dense decomposition (about 0.1 ms).
 constexpr int kMostRows = 24, kMostSpeeds = 64;
 
 /// Counts the zeros that a quantity passed of which only the size is seen, sample by sample.
@@ -411,7 +411,7 @@ struct SingularityObserver<Space>::Work {
       : view(description, mechanism, false) {}  // released rows gain rank as they drift
 
   JointView<Space> view;
-  /// Of each singular value, the largest first: its smallest ratio to the largest and when.
+  /// per singular value, the largest first: smallest ratio to the largest, and its time
   std::vector<double> smallest, when;
   int generic_rank = 0;
   std::vector<Released> released;  ///< of the last sample

@@ -20,28 +20,28 @@ struct TimeSeries {
   std::vector<double> t, value;
 };
 
-/// Of the first `samples` (all, unless said) every k-th, k chosen so that at most `points` >= 2
-/// remain, always with the last one.
+/// Returns every k-th of the first `samples` (default: all), with k such that at most `points` >= 2
+/// remain. Always includes the last one.
 TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples = SIZE_MAX);
 
 /// The largest distance of the first `samples` from the line through those that Thin() keeps.
 double LargestGap(const TimeSeries& series, int points, std::size_t samples);
 
-// What is watched along a run. Observers see accepted steps only; each keeps maxima and, where a
-// figure needs one, a series, and writes them into the case's record at the end. An observer that
-// saw nothing writes nothing: an empty cell is not a zero.
+// Measurements along a run. Observers receive accepted steps only. Each keeps maxima and, for
+// figures, a series, and writes them into the case's record at the end. An observer without data
+// writes nothing: missing values are not zero.
 
-/// An accepted step. The formulation's kinematics, speeds and, but for members of ensembles,
-/// accelerations are those of (t, y).
+/// An accepted step. The formulation's kinematics and speeds belong to (t, y); so do its
+/// accelerations, except for members of ensembles.
 template <class Space>
 struct Sample {
   double t = 0.0;
   const System<Space, double>& formulation;
   double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]
-  bool knows_work = true;                   ///< else these two say nothing
+  bool knows_work = true;                   ///< if false, these two are undefined
 };
 
-/// What an analysis needs besides the record.
+/// Data of an analysis besides the record.
 struct Traces {
   TimeSeries drift, correction;       ///< [m]
   TimeSeries energy;                  ///< deviation [J]
@@ -54,13 +54,13 @@ class Observer {
  public:
   virtual ~Observer() = default;
   virtual void Observe(const Sample<Space>& sample) = 0;
-  /// At a state whose accelerations were lost to a singular matrix: only diagnostics are valid.
+  /// Observes a state whose singular matrix gave no accelerations: only diagnostics are valid.
   virtual void ObserveSingular(const Sample<Space>& /*sample*/) {}
   virtual void Write(Record& record) const = 0;
   virtual void Trace(Traces& /*traces*/) const {}
 };
 
-/// What observers may know before the run; all of it outlives them.
+/// Data available to observers before the run; all of it outlives them.
 template <class Space>
 struct Watched {
   const MechanismDescription& description;
@@ -70,29 +70,28 @@ struct Watched {
   std::span<const double> stops = {};  ///< [s], rising: times at which steps have to end
 };
 
-/// All observers of a run, in the order of their keys in records: the built-in ones, each a line
-/// here (observers.cpp) and a row for each of its keys in the table of measures
-/// (harness/record/measures.cpp), then those of other programs (registry.h).
+/// Returns all observers of a run, in the order of their record keys. Built-in observers have a
+/// line here (observers.cpp) and an entry per key in the table of measures
+/// (harness/record/measures.cpp). User-defined ones (registry.h) follow.
 template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run);
 
-/// Those of a member of an ensemble, of which largest errors are kept and no more
-/// (harness/run/ensemble.h). They ask for positions and speeds of a sample alone.
+/// Returns the observers of an ensemble member; they keep only largest errors
+/// (harness/run/ensemble.h) and need only positions and speeds of a sample.
 template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeMemberObservers(const Watched<Space>& run);
 
 /// Drift at position, velocity and acceleration level.
 ///
-/// Position drift is the largest mismatch of a constraint that the coordinate set imposes: of the
-/// cut joints in joint coordinates, of every joint in absolute coordinates; points [m] and
-/// rotations [rad] apart. Velocity and acceleration drift are the largest V_Q - V_P and A_Q - A_P -
-/// g in the constrained directions, points only [m/s, m/s^2].
+/// Position drift is the largest violation of a constraint imposed by the coordinate set: cut
+/// joints in joint coordinates, every joint in absolute coordinates; points [m] and rotations [rad]
+/// apart. Velocity and acceleration drift are the largest V_Q - V_P and A_Q - A_P - g in the
+/// constrained directions, points only [m/s, m/s^2].
 ///
-/// Loop closure compares the two sets: the tree of user joints is followed with the joint
-/// coordinates (in absolute coordinates: those measured between the bodies), and what a cut joint
-/// then misses is its loop's closure, which equals the sum of the mismatches around the loop. In
-/// joint coordinates it is the position drift itself; in absolute coordinates mismatches may cancel
-/// in it.
+/// Loop closure compares the two sets. The tree of user joints follows the joint coordinates (in
+/// absolute coordinates: those measured between the bodies). The violation at a cut joint then is
+/// its loop's closure error, the sum of the violations around the loop. In joint coordinates it
+/// equals the position drift; in absolute coordinates violations may cancel.
 template <class Space>
 class DriftObserver final : public Observer<Space> {
  public:
@@ -145,9 +144,9 @@ class EnergyObserver final : public Observer<Space> {
   TimeSeries series_;
 };
 
-/// Lengths of accepted steps, and the fastest given function of time: an error estimate sees
-/// nothing of what happens between the points that a step looks at. The shortest step is taken
-/// without those that a stop time or the end has clipped.
+/// Lengths of accepted steps, and the fastest prescribed function of time: an error estimate does
+/// not detect events between the points of a step. The shortest step excludes those clipped by a
+/// stop time or the end.
 template <class Space>
 class StepLengthObserver final : public Observer<Space> {
  public:
@@ -166,8 +165,8 @@ class StepLengthObserver final : public Observer<Space> {
 /// time; 0 without any. Tables have knots, at which steps end.
 double FastestDrive(const MechanismDescription& description);
 
-/// What projections (levels that leave no drift) took away and what they cost: the largest mismatch
-/// of points [m], its series, and Newton steps. Nothing at other levels.
+/// Corrections and cost of projections (levels without drift): the largest violation of points [m],
+/// its series, and Newton steps. Writes nothing at other levels.
 template <class Space>
 class CorrectionObserver final : public Observer<Space> {
  public:
@@ -184,10 +183,10 @@ class CorrectionObserver final : public Observer<Space> {
   TimeSeries series_;
 };
 
-/// Smallest rank, reciprocal condition and weight met at accepted steps, and when; how many steps
-/// and evaluations were softened, how often the mode changed. `rank_min` is that of the loops, in
-/// joint coordinates whatever the set; `rank_constraints_min` that of all constraints of the set,
-/// by as much more as it has more speeds than the joints.
+/// Smallest rank, reciprocal condition and weight at accepted steps with their times; numbers of
+/// regularized steps and evaluations and of mode changes. `rank_min` is the rank of the loops, in
+/// joint coordinates for either set. `rank_constraints_min` is the rank of all constraints of the
+/// set, larger by its additional speeds.
 template <class Space>
 class ConditionObserver final : public Observer<Space> {
  public:
@@ -202,15 +201,15 @@ class ConditionObserver final : public Observer<Space> {
   std::int64_t softened_steps_ = 0, softened_evaluations_ = 0, mode_changes_ = 0;
 };
 
-/// How near the run came to a singular position: the smallest ratio of singular values of the
-/// scaled loops (mechanism/loops/scaled_loops.h), at the largest rank met. By Eckart and Young it
-/// is the relative distance of the constraints from the nearest ones of lower rank; near a singular
-/// position it is about the angle [rad] still to go. At accepted steps only, and only for loops
-/// with few rows; redundant rows do not count.
+/// Distance from a singular configuration: the smallest ratio of singular values of the scaled
+/// loops (mechanism/loops/scaled_loops.h), at the largest rank met. By Eckart and Young it is the
+/// relative distance of the constraints from the nearest ones of lower rank. Near a singular
+/// configuration it is about the remaining angle [rad]. At accepted steps only, for loops with few
+/// rows; redundant rows do not count.
 ///
-/// A step may carry the run across: then the ratio, which has no sign, falls and rises like the
-/// absolute value of a line, and its course is straighter with the sign changed on one side. Such
-/// passages are counted.
+/// A step may cross the singular configuration. The ratio has no sign and then falls and rises like
+/// an absolute value; with the sign changed on one side, its course is straighter. Such crossings
+/// are counted.
 template <class Space>
 class SingularityObserver final : public Observer<Space> {
  public:
@@ -225,7 +224,7 @@ class SingularityObserver final : public Observer<Space> {
   std::unique_ptr<Work> work_;
 };
 
-/// Distance from what is known of a scene: branch invariants and closed form (mechanism_reader.h).
+/// Distance from a problem's known solution: branch invariants, closed form (mechanism_reader.h).
 template <class Space>
 class ExactObserver final : public Observer<Space> {
  public:
@@ -250,12 +249,11 @@ class ExactObserver final : public Observer<Space> {
   TimeSeries branch_;
 };
 
-/// Joint coordinates against time, of mechanisms with few of them: a series is for a figure.
-/// "series.angle.JOINT" [rad] and "series.displacement.JOINT" [m] against "series.t", from the
-/// start to the end of the run. Where so few points do not show the motion (a straight line between
-/// two of them misses a sample by more than 1 % of all angles or displacements), the same number of
-/// points of its first half, quarter, ... that they do show: "series.opening.angle.JOINT" and so on
-/// against "series.opening_t".
+/// Joint coordinates over time, of mechanisms with few of them, for figures: "series.angle.JOINT"
+/// [rad] and "series.displacement.JOINT" [m] over "series.t", for the whole run. These few points
+/// may not show the motion: a straight line between two of them misses a sample by more than 1 % of
+/// all angles or displacements. Then the same number of points covers its first half, quarter, ...
+/// that they do show: "series.opening.angle.JOINT" and so on over "series.opening_t".
 template <class Space>
 class CoordinateObserver final : public Observer<Space> {
  public:
@@ -264,7 +262,7 @@ class CoordinateObserver final : public Observer<Space> {
   void Write(Record& record) const override;
 
  private:
-  /// Whether the points kept of the first `samples` show them, on an axis for all of the group.
+  /// Returns true if the points kept of the first `samples` show them, on the group's common axis.
   bool Shows(const std::vector<std::size_t>& group, std::size_t samples) const;
   void WriteOpening(std::size_t samples, const std::string& prefix, const std::string& time,
                     Record& record) const;

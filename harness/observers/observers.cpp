@@ -1,4 +1,4 @@
-// Observers registered, made and asked, and what all of them use.
+// Registration, construction and calls of observers, and their shared functions.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -195,7 +195,7 @@ template void WriteFinalPoses(const MechanismDescription&, const Compiled&, int,
 
 namespace {
 
-// Which of `n` samples stay: evenly spaced, always with the last one.
+// Returns the kept indices of `n` samples: evenly spaced, always with the last one.
 std::vector<std::size_t> Kept(std::size_t n, int points) {
   const std::size_t count = std::min(n, static_cast<std::size_t>(points));
   std::vector<std::size_t> kept(count);

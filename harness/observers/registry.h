@@ -1,12 +1,12 @@
-// Observers of other programs. One registers its own before it calls loopbench::Main():
+// User-defined observers. A program registers them before it calls loopbench::Main():
 //
 //   harness::RegisterObserver(harness::ObserverRowOf<Turns>(
 //       "turns", "how far bodies turn.",
 //       {{"turns_max", kNumber, {"largest turn", "rad", kScientific}, {kLargest}, kError}}));
 //
-// It then watches every accuracy run but the members of ensembles. Its keys are measures like all
-// others (measures.h): they stand in records, with words for a heading in drift.csv, and `compare`
-// judges those that have a rule.
+// They observe every accuracy run except members of ensembles. Their keys are measures like all
+// others (measures.h): records contain them, drift.csv has their headings, and `compare` judges
+// those with a rule.
 #pragma once
 
 #include <deque>
@@ -29,10 +29,10 @@ using ObserverFactory = std::function<std::unique_ptr<Observer<Space>>(const Wat
 
 struct ObserverRow {
   std::string name;      ///< a word: a-z, 0-9, '-' and '_'
-  std::string sentence;  ///< what `explain` says of it, after "name: "
+  std::string sentence;  ///< text of `explain`, after "name: "
   ObserverFactory<Planar> planar;
   ObserverFactory<Spatial> spatial;
-  std::vector<Measure> measures;  ///< a row for each key that it writes, and no other keys
+  std::vector<Measure> measures;  ///< an entry for each key that it writes, and no other keys
 
   std::unique_ptr<Observer<Planar>> Make(const Watched<Planar>& run) const { return planar(run); }
   std::unique_ptr<Observer<Spatial>> Make(const Watched<Spatial>& run) const {
@@ -40,7 +40,7 @@ struct ObserverRow {
   }
 };
 
-/// The row of a class template derived from Observer<Space>, made from what may be known of a run.
+/// Returns the entry of a class template derived from Observer<Space>, built per run.
 template <template <class Space> class Own>
 ObserverRow ObserverRowOf(std::string name, std::string sentence, std::vector<Measure> measures) {
   const auto make = []<class Space>(const Watched<Space>& run) {
@@ -54,10 +54,10 @@ ObserverRow ObserverRowOf(std::string name, std::string sentence, std::vector<Me
 /// (AddMeasures()): then nothing is added.
 void RegisterObserver(ObserverRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
-/// In the order of their registration. Rows stay where they are.
+/// Returns the entries in registration order. References stay valid.
 const std::deque<ObserverRow>& RegisteredObservers();
 
-// Where a run ended: the poses of the user's bodies, whatever was simplified for it.
+// Final poses of the user's bodies, independent of preprocessing.
 
 /// Writes "series.final.<body>" for the bodies of `part`, at most kMostFinalBodies of the whole
 /// mechanism, evenly chosen: of a planar mechanism x, y [m] of the body's origin and its angle

@@ -26,7 +26,7 @@ ClosedStart<Space, S> CloseStart(const MechanismDescription& description) {
   if (closed.outcome == Outcome::kFinished) {
     closed.system->ToState(q, u, y);
     closed.system->BeginStep(S(0), y);
-    // says whether the projection failed
+    // the outcome is a failure if the projection failed
     closed.outcome = closed.system->Derivative(S(0), y, ydot);
   }
   if (closed.outcome != Outcome::kFinished) {
@@ -63,7 +63,7 @@ Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
   for (int index : mechanism_.constraints()) {
     const JointState<Planar, Float128>& state = kinematics_.joints()[index];
     const int all = state.directions();
-    // what a joint leaves free is no mismatch
+    // free directions of a joint have no violation
     const Direction<Planar, Float128> constrained =
         state.Sum(state.Along(kinematics_.ConstraintMismatch(index), all), all);
     largest = std::max(largest, constrained.linear.norm());

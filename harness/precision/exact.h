@@ -1,4 +1,4 @@
-// A mechanism in a wide scalar: its start, and its state held against runs.
+// A mechanism in a wide scalar: its start, and the comparison of its state with runs.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ struct ClosedStart {
   Outcome outcome = Outcome::kFinished;
   std::string message;
   std::unique_ptr<Mechanism<Space, S>> mechanism;  ///< in joint coordinates
-  std::unique_ptr<System<Space, S>> system;  ///< stands at the start; null where there is none
+  std::unique_ptr<System<Space, S>> system;        ///< at the start; null if there is none
 };
 
 /// Assembles the start in double and closes its loops in S: positions, then speeds, by the
@@ -25,7 +25,7 @@ struct ClosedStart {
 template <class Space, class S>
 ClosedStart<Space, S> CloseStart(const MechanismDescription& description);
 
-// A mechanism in the widest scalar: its start, and what the states of all runs are held against.
+// A mechanism in the widest scalar: its initial state, and the reference for all runs' states.
 
 class Exact {
  public:

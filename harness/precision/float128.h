@@ -1,5 +1,5 @@
-// IEEE binary128 in software: 113 bits, eps 1.9e-34. The compiler's __float128 and the functions of
-// libquadmath, with what Eigen and the templates of the mechanism ask of a scalar.
+// IEEE binary128 in software: 113 bits, eps 1.9e-34. The compiler's __float128 and functions of
+// libquadmath, with the traits that Eigen and the mechanism's templates need.
 #pragma once
 
 #include <quadmath.h>

@@ -197,7 +197,7 @@ class Run {
     return std::clamp(ideal, S(kReduction), largest);
   }
 
-  /// One accepted step.
+  /// Takes one accepted step.
   Outcome Advance() {
     S largest = S(kGrowth);
     for (int failures = 0;;) {
@@ -209,7 +209,7 @@ class Run {
       if (options_.fixed_step > S(0)) return Accept(last ? t_end_ : t_ + h, h);
       const S error = is_known ? ScaledError() : std::numeric_limits<S>::max();
       if (error <= S(1)) {
-        // what was clipped was good enough, and says less than the step that was meant
+        // a clipped step gives less information than the planned one
         const S next = h * Factor(error, largest);
         h_ = std::min(last && failures == 0 ? std::max(h_, next) : next, longest_);
         return Accept(last ? t_end_ : t_ + h, h);
@@ -247,7 +247,7 @@ class Run {
   const OneStepOptions<S>& options_;
   const S t_end_;
   const S longest_;  // ode45's longest step is a tenth of the interval
-  // no step for what rounding has left of the interval; ARKODE's bound
+  // no step for a rounding remainder of the interval; ARKODE's bound
   const S close_ = S(100) * std::numeric_limits<S>::epsilon() * t_end_;
   std::vector<S>& y_;
   std::vector<S> f_;

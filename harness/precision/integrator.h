@@ -13,16 +13,16 @@ namespace loopbench::harness {
 
 // One-step methods with the step-size control of profile `ode45`, in any scalar.
 //
-// ARKODE computes in double alone. To see what rounding does, the same method must run in narrower
-// and wider scalars: the Dormand-Prince pair, MATLAB's norm (max_i |e_i| / max(rtol |y_i|, atol)),
+// ARKODE computes in double alone. To measure rounding, the same method must run in narrower and
+// wider scalars: the Dormand-Prince pair, MATLAB's norm (max_i |e_i| / max(rtol |y_i|, atol)),
 // first step, longest step and I controller, as harness/config/options.h has them for ARKODE.
-// In double the two take the same steps but for rounding (tests/precision/). Times, tolerances and
-// coefficients are of the same scalar as the state.
+// In double the two take the same steps except for rounding (tests/precision/). Times, tolerances
+// and coefficients have the scalar type of the state.
 //
 // A reference far below the reach of order 5 comes from Gragg's method: the modified midpoint rule
 // with 2, 4, .., 20 substeps, extrapolated to order 20 by Aitken and Neville (Hairer, Norsett,
 // Wanner, Solving Ordinary Differential Equations I, section II.9), under the same controller. The
-// weights of ten columns add up to 550, and round-off grows as much; those of seven, to 56.
+// weights of ten columns add up to 550 and amplify round-off by that factor; of seven, to 56.
 
 /// y' = f(t, y).
 template <class S>
@@ -30,8 +30,8 @@ struct Problem {
   int size = 0;
   /// Writes f(t, y); anything but kFinished ends the run. Values that are not finite do so too.
   std::function<Outcome(S t, std::span<const S> y, std::span<S> ydot)> derivative;
-  /// Called with the start and with every accepted step. True when it has rewritten y, so that f
-  /// must be evaluated anew.
+  /// Called with the start and with every accepted step. Returns true if it has changed y, so that
+  /// f must be evaluated again.
   std::function<bool(S t, std::span<S> y)> accept;
 };
 
@@ -57,7 +57,7 @@ struct OneStepOptions {
   double time_limit_s = 600.0;  ///< CPU time of the thread, looked at after each step
 };
 
-/// How a run went.
+/// Result of a run.
 struct OneStepResult {
   Outcome outcome = Outcome::kFinished;
   double t_reached = 0.0;  ///< [s]
@@ -88,7 +88,7 @@ class OneStep {
 
   const std::vector<S>& y_new() const { return y_new_; }
   const std::vector<S>& error() const { return error_; }
-  /// f at y_new() where the method knows it (the last stage of Dormand-Prince), else empty.
+  /// Returns f at y_new() if the method has it (the last stage of Dormand-Prince), else empty.
   const std::vector<S>& f_new() const { return f_new_; }
 
   /// f(t, y), counted, and whether it is finite.

@@ -17,7 +17,7 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Those of kLadderFormulations, in their order.
+/// One entry per formulation of kLadderFormulations, in their order.
 template <class S>
 std::unique_ptr<System<Planar, S>> Make(const Column& column,
                                         const Mechanism<Planar, S>& mechanism) {
@@ -29,7 +29,7 @@ std::unique_ptr<System<Planar, S>> Make(const Column& column,
   throw std::invalid_argument("no ladder of formulation " + column.formulation);
 }
 
-/// A run and where it ended.
+/// A run and its final state.
 struct Ended {
   Rung rung;
   VectorX<Float128> centres;
@@ -126,8 +126,8 @@ double Epsilon(Scalar scalar) {
   return static_cast<double>(std::numeric_limits<Float128>::epsilon());
 }
 
-/// The rung that `own` is judged by: at the same tolerance the widest that finished, or for that
-/// one the next narrower; nullptr when there is none.
+/// Returns the run that judges `own`: at the same tolerance the widest that finished, or for the
+/// widest the next narrower; nullptr if there is none.
 const Rung* JudgeOf(const std::vector<Rung>& rungs, const Rung& own) {
   const Rung *widest = &own, *narrower = nullptr;
   for (const Rung& rung : rungs) {
@@ -148,8 +148,8 @@ void Judge(std::vector<Rung>& rungs) {
       own.drift_ruled_by = RuledBy(own.drift, other->drift);
       continue;
     }
-    // nothing wider: its round-off is that of the narrower, as much smaller as its eps, give or
-    // take the luck of a random walk
+    // no wider scalar: its round-off is estimated from the narrower one by the ratio of eps, within
+    // a random walk's scatter
     const double walk = 10 * Epsilon(own.scalar) / Epsilon(other->scalar);
     if (own.error > walk * other->error) own.error_ruled_by = "truncation";
     if (own.drift > walk * other->drift) own.drift_ruled_by = "truncation";

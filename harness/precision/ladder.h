@@ -1,13 +1,13 @@
-// The precision ladder: one mechanism and formulation in float, double, long double and float128,
+// The precision study: one mechanism and formulation in float, double, long double and float128,
 // with one integrator (integrator.h), against a reference in float128.
 //
-// Error and drift of a run have two parts: round-off of the scalar, and truncation, here all that
-// is left in the widest scalar at the same tolerance: that of the method, and near singular
-// positions what softening takes (mechanism/loops/loop_solver.h). So what the widest scalar changes
-// was round-off.
+// Error and drift of a run have two parts: round-off and truncation. Truncation is the remainder in
+// the widest scalar at the same tolerance: the method's error, and near singular configurations the
+// error of regularization (mechanism/loops/loop_solver.h). A change in the widest scalar was thus
+// round-off.
 //
-// The reference is one for all columns of a mechanism, whose exact motion is one: multipliers in
-// joint coordinates, positions projected after each step, without softening.
+// All methods of a mechanism share one reference, because the exact motion is the same: multipliers
+// in joint coordinates, positions projected after each step, without regularization.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ namespace loopbench::harness {
 inline constexpr std::array<std::string_view, 3> kLadderFormulations = {"odca", "lagrange",
                                                                         "reduction"};
 
-/// One mechanism and column, and the rungs to climb.
+/// One mechanism, one method, and the scalars to run.
 struct LadderTask {
   MechanismDescription description;  ///< planar, no tables of time
   Column column;                     ///< with one of kLadderFormulations
@@ -33,7 +33,7 @@ struct LadderTask {
   Limits limits;                     ///< CPU time and steps, of each run
 };
 
-/// One run.
+/// One run in one scalar.
 struct Rung {
   Scalar scalar = Scalar::kDouble;
   double tolerance = 0.0;
@@ -41,10 +41,10 @@ struct Rung {
   double t_reached = 0.0;  ///< [s]
   std::int64_t steps = 0, rejected = 0, rhs_evaluations = 0, restarts = 0;
   double wall_s = 0.0, cpu_s = 0.0;
-  double drift = 0.0;  ///< largest mismatch of points at accepted steps [m]
-  double error = 0.0;  ///< largest distance of a centre of mass from the reference's at the end
-                       ///< [m]; NaN when one of them did not get there
-  /// "truncation", "round-off", or "" where that cannot be said.
+  double drift = 0.0;  ///< largest violation of points at accepted steps [m]
+  double error = 0.0;  ///< largest distance of a centre of mass from the reference at the end [m];
+                       ///< NaN if either run failed
+  /// "truncation", "round-off", or "" if undecided.
   std::string error_ruled_by, drift_ruled_by;
 };
 
@@ -52,8 +52,8 @@ struct Ladder {
   Outcome start = Outcome::kFinished;  ///< otherwise nothing was run
   std::string message;
   std::vector<Rung> rungs;  ///< by scalar, then by tolerance, in the order of the task
-  /// In float128 by Gragg's method. Its error is the distance from another reference with a
-  /// tolerance 10^4 times as large, its drift that of its own coordinates.
+  /// In float128 by Gragg's method. Its error is the distance from a second reference with a
+  /// tolerance 10^4 times as large; its drift uses its own coordinates.
   Rung reference;
 };
 
@@ -62,11 +62,11 @@ struct Ladder {
 /// scalar.
 Ladder RunLadder(const LadderTask& task);
 
-/// Which part rules a number (error or drift) that is `own` in one scalar and `widest` in the
-/// widest that finished at the same tolerance: round-off when the two differ by more than a factor
-/// of two (by chance it may cancel truncation too), else truncation; "" when one is NaN. Not the
-/// next wider scalar: two neighbours may fail alike. For the widest itself the next narrower one
-/// bounds the round-off: truncation rules where the own number is more than ten times the other's
+/// Returns the dominant part of a number (error or drift) that is `own` in one scalar and `widest`
+/// in the widest that finished at the same tolerance. Round-off if the two differ by more than a
+/// factor of two (by chance it may cancel truncation too), else truncation; "" if one is NaN. The
+/// next wider scalar is not used: neighbours may fail alike. For the widest, the next narrower one
+/// bounds the round-off. Truncation dominates if its number exceeds ten times the narrower one's
 /// scaled by the ratio of their eps.
 std::string_view RuledBy(double own, double widest);
 

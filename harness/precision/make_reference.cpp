@@ -11,8 +11,8 @@
 namespace loopbench::harness {
 namespace {
 
-/// What the user's points are away from the centres of mass of the bodies they sit on [m]: turns
-/// bounds of orientations into bounds of points.
+/// Returns the distance of the user's points from the centres of mass of their bodies [m]: converts
+/// bounds of orientations to bounds of points.
 double LongestArm(const Measured& measured) {
   double longest = 0.0;
   for (const auto& [body, at] : PointsOf(measured.user)) {
@@ -26,8 +26,8 @@ double LongestArm(const Measured& measured) {
   return longest;
 }
 
-/// A bound in double of what is kept in double, of a part's pictures with points at `arm` from the
-/// centres.
+/// Returns the bound of errors from storage in double, for a subsystem's snapshots with points at
+/// `arm` from the centres.
 template <class S>
 Distance InUsersTerms(const WideDistance<S>& wide, double arm, const Snapshot& kept) {
   constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -70,7 +70,7 @@ void Fill(const Measured& measured, const Certified<Space, S>& certified, Refere
       EnterBody(measured, 0, static_cast<int>(i),
                 StateAtCentre<Space, S>(moment.poses[i], moment.motions[i]), &snapshot);
     }
-    // joint coordinates are those of the tree, rounded
+    // joint coordinates are the tree's, rounded
     kinematics.SetTime(reference->times[k]);
     kinematics.UpdatePosition(certified.reference.positions[k].template cast<double>());
     for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
@@ -91,7 +91,7 @@ void Fill(const Measured& measured, const Certified<Space, S>& certified, Refere
   reference->cpu_s = certified.cpu_s;
 }
 
-/// In one piece: its energy is then that of all, and its times are one list.
+/// One subsystem: one energy for all and one list of times.
 CompileOptions InOnePiece() { return {.islands = false}; }
 
 bool IsPlanar(const Compiled& compiled) {
@@ -108,7 +108,7 @@ Way By(PutBack put_back, const Measured& measured, double cpu_s) {
   };
 }
 
-/// From the cheapest to the one that gets furthest.
+/// Returns the methods from the cheapest to the one with the longest validity.
 std::vector<Way> WaysOf(const Measured& measured, const ReferenceOptions& options) {
   const double cpu_s = options.cpu_s;
   if (!IsPlanar(measured.compiled)) {
@@ -183,7 +183,7 @@ Reference MakeReference(const MechanismDescription& user, double horizon, double
     }
     if (furthest->trust_horizon >= horizon) break;
   }
-  furthest->cpu_s = cpu_s;  // of all that it took
+  furthest->cpu_s = cpu_s;  // total of all attempts
   return *std::move(furthest);
 }
 

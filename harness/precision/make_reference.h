@@ -1,13 +1,13 @@
-// Certified references: one motion integrated three times in a wide scalar. Where the three agree,
-// the digits are the motion's.
+// Certified references: one motion integrated three times in a wide scalar. Digits on which the
+// three agree belong to the motion.
 //
 //   multipliers at a tolerance near the scalar's round-off, which is the reference,
-//   multipliers at a tolerance 30 times as large: truncation shows,
-//   O-DCA at one in between: another formulation, another way of rounding.
+//   multipliers at a tolerance 30 times as large: shows truncation,
+//   O-DCA at an intermediate tolerance: another formulation with other rounding.
 //
-// The certified error is twice the largest distance of the other two from the first. It
-// grows as errors of the motion do: of a chaotic one, or one that branches, until nothing is left.
-// All three begin at one start, which is the assembled one of every run, closed in the wide scalar.
+// The certified error is twice the largest distance of the other two from the first. It grows with
+// the errors of the motion, without bound for chaotic or branching motions. All three begin at the
+// assembled start of every run, closed in the wide scalar.
 #pragma once
 
 #include <string>
@@ -19,12 +19,12 @@ namespace loopbench::harness {
 /// "" or why there can be no reference of this mechanism in that scalar, as a sentence's end.
 std::string WhyNoReference(const MechanismDescription& user, const ReferenceOptions& options);
 
-/// The cheapest way is tried first; another one, which gets further, where that one is not
-/// certified to the end.
+/// Methods tried: the cheapest first; another, which gets further, if the first is not certified to
+/// the end.
 enum class WaysTried { kAll, kCheapest, kFurthest };
 
-/// The reference of a user's mechanism from 0 to `horizon` [s]. `length` [m] is what
-/// kCertifiedShare is a share of.
+/// Returns the reference of a user's mechanism from 0 to `horizon` [s]. kCertifiedShare is relative
+/// to `length` [m].
 Reference MakeReference(const MechanismDescription& user, double horizon, double length,
                         const ReferenceOptions& options, WaysTried tried = WaysTried::kAll);
 

@@ -1,6 +1,6 @@
-// The scalars of the precision ladder besides double, and what mechanism and formulations are
-// compiled for once more (mechanism/algebra/instantiate.h): the plane in each of them, and space in
-// long double. A unit of CMakeLists.txt names the one scalar that it compiles them for.
+// The scalars of the precision study besides double. Mechanism and formulations are also compiled
+// for them (mechanism/algebra/instantiate.h): the plane in each, space in long double only. Each
+// unit of CMakeLists.txt names the scalar that it compiles.
 #pragma once
 
 #include "harness/precision/float128.h"

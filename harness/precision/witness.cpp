@@ -51,7 +51,7 @@ class Followed {
     return system_->BeginStep(t, y);
   }
 
-  /// For IntegrateSystem(), whose derivatives see no time after `last`. Both must outlive it.
+  /// Returns the problem for IntegrateSystem() with times up to `last`. Both must outlive it.
   Problem<S> Until(const S& last) {
     return {system_->state_size(),
             [&](S t, std::span<const S> y, std::span<S> rates) {
@@ -76,18 +76,18 @@ class Followed {
   S accepted_t_ = S(0);
 };
 
-/// Of Gragg's method: orders 14 and 20.
+/// Gragg's method with orders 14 and 20.
 template <class S>
 constexpr int kColumns = std::same_as<S, long double> ? 7 : kMostColumns;
 
-/// Halvings of a step that runs into a singular position, before a witness gives up.
+/// Maximum halvings of a step that runs into a singular configuration.
 constexpr int kMostFailures = 40;
-/// What a stretch without a singular position may take: so many steps and so many times those of
-/// the longest one before it. Beside one steps shrink with the distance, a hundred and more to a
-/// stretch; behind it a motion that is lost took 17 000. Of the first nothing is known.
+/// Limits for a stretch without a singular configuration: this many steps, and a multiple of the
+/// longest stretch before it. Near a singular configuration steps shrink with the distance, over a
+/// hundred a stretch; beyond it a lost motion needed 17 000. The first stretch has its own limit.
 constexpr std::int64_t kFewSteps = 1000, kManyTimes = 10, kFirstStretch = 100'000;
 
-/// Where a step must end, and what for.
+/// Time at which a step must end, and the reason.
 struct Stop {
   double t;
   bool is_time = false;  ///< one of the times asked for
@@ -110,7 +110,7 @@ std::vector<Stop> StopsOf(const std::vector<double>& times, const std::vector<do
       continue;
     }
     Stop& same = stops.back();
-    if (stop.is_knot) same.t = stop.t;  // what jumps decides
+    if (stop.is_knot) same.t = stop.t;  // the jump decides
     same.is_time = same.is_time || stop.is_time;
     same.is_knot = same.is_knot || stop.is_knot;
   }
@@ -296,7 +296,7 @@ Certified<Space, S> Certify(const MechanismDescription& description,
     const Moment<Space, S>& own = result.reference.moments[k];
     WideDistance<S> bound = Bound(DistanceOf<Space, S>(own, looser.moments[k]),
                                   DistanceOf<Space, S>(own, other.moments[k]));
-    // witnesses may meet by chance; a bound that was reached stays
+    // integrations may agree by chance; the largest bound so far stays
     if (k > 0) bound = Larger(bound, result.bounds.back());
     result.bounds.push_back(bound);
   }

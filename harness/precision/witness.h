@@ -1,4 +1,4 @@
-// One integration of a mechanism in a wide scalar: what a reference is certified by.
+// One integration of a mechanism in a wide scalar; several of them certify a reference.
 #pragma once
 
 #include <concepts>
@@ -13,20 +13,20 @@
 
 namespace loopbench::harness {
 
-/// What a mechanism does at one time.
+/// State of a mechanism at one time.
 template <class Space, class S>
 struct Moment {
   std::vector<Pose<Space, S>> poses;        ///< at centres of mass, Ground first
-  std::vector<Velocity<Space, S>> motions;  ///< likewise
+  std::vector<Velocity<Space, S>> motions;  ///< as in the line above
   S energy = S(0);                          ///< kinetic and potential [J]
 };
 
-/// Where a witness is put back onto its constraints.
+/// Times at which an integration is projected onto its constraints.
 enum class PutBack {
   kAtSteps,  ///< level `projection`
-  /// Before every evaluation as well, so that derivatives are those of the constrained motion,
-  /// which is smooth where constraints are singular but beside them is not. What is left is
-  /// rounding, by the inverse of the distance to the singular position.
+  /// Also before every evaluation, so that derivatives belong to the constrained motion. That
+  /// motion stays smooth at singular configurations; off the constraints it does not. The remaining
+  /// error is rounding over the distance to the singular configuration.
   kAtStages
 };
 
@@ -34,8 +34,8 @@ template <class S>
 struct WitnessOptions {
   std::string_view formulation;  ///< "lagrange" or "odca"
   S tolerance = S(0);
-  /// Columns fewer than usual to extrapolate: where the times alone decide the steps, witnesses of
-  /// as many columns round alike and would not see it.
+  /// Number of extrapolation columns fewer than usual. If the times alone decide the steps,
+  /// integrations with equal columns round alike and would not detect it.
   int fewer = 0;
   PutBack put_back = PutBack::kAtSteps;
   double cpu_s = 0.0;
@@ -51,34 +51,34 @@ struct Witness {
   double cpu_s = 0.0;
 };
 
-/// Follows the motion from its closed start (exact.h) through `times` [s], the first of them
-/// 0, by Gragg's method without softening. Steps end at the times, and where a prescribed motion
-/// or a table has a knot.
+/// Follows the motion from its closed start (exact.h) through `times` [s], the first of them 0, by
+/// Gragg's method without regularization. Steps end at the times, and at knots of prescribed
+/// motions or tables.
 ///
-/// A witness that is put back at steps alone ends where a stretch between two times takes ten times
-/// as many as any before, and a thousand more: a singular position is in it. One that is put back
-/// at stages tries smaller steps about derivatives that cannot be had, and goes on from a step that
-/// ends in a singular position, as from a start there, with the softened one.
+/// With projection at steps alone, a stretch between two times that needs ten times as many steps
+/// as any before, and a thousand more, ends the integration: it contains a singular configuration.
+/// With projection at stages, failing derivatives lead to smaller steps. From a step that ends in a
+/// singular configuration, as from a start there, it continues with the regularized derivative.
 template <class Space, class S>
 Witness<Space, S> Follow(const MechanismDescription& description, const WitnessOptions<S>& options,
                          const std::vector<double>& times);
 
-// What the witnesses of a reference say together (make_reference.h): the certified error.
+// Certified error of a reference from its independent integrations (make_reference.h).
 
-/// The reference's tolerance in eps of the scalar: what round-off lets the extrapolation reach
-/// (integrator.h), with room. At a tenth of it steps begin to be rejected for rounding alone. Near
-/// singular positions rounding is larger by the inverse square of the distance to them: no stage
+/// The reference's tolerance in eps of the scalar: the round-off limit of the extrapolation
+/// (integrator.h), with a margin. At a tenth of it steps begin to be rejected for rounding alone.
+/// Near singular configurations rounding grows with the inverse square of the distance: no stage
 /// may come nearer than sqrt(eps / tolerance), 1e-6 in float128. Steps that shrink for truncation
-/// bring their stages as near as 1e-5; at 1e10 eps not every passage of a kite succeeds.
+/// have stages as near as 1e-5; at 1e10 eps some crossings of a kite fail.
 template <class S>
 constexpr double Tightest(PutBack put_back) {
   if (put_back == PutBack::kAtStages) return std::same_as<S, long double> ? 1e7 : 1e12;
   return std::same_as<S, long double> ? 1e3 : 1e6;
 }
-/// The other witnesses' tolerances over that one: multipliers', O-DCA's.
+/// Tolerances of the other integrations over the reference's: multipliers', O-DCA's.
 inline constexpr double kLooser = 30.0, kBetween = 5.0;
-/// The looser witness errs by some kLooser times as much as the reference, so that their distance
-/// alone would do; twice covers that round-off of the three may add up.
+/// The looser integration's error is about kLooser times the reference's, so their distance alone
+/// would suffice; the factor two covers the sum of round-off of all three.
 inline constexpr double kSafety = 2.0;
 
 /// Distances of one moment, or bounds on them: of centres of mass [m], bodies' orientations [rad],
@@ -90,16 +90,16 @@ struct WideDistance {
 
 template <class Space, class S>
 struct Certified {
-  Outcome outcome = Outcome::kFinished;  ///< of the witness that got least far
+  Outcome outcome = Outcome::kFinished;  ///< outcome of the shortest integration
   std::string message, witnesses;
   Witness<Space, S> reference;
-  std::vector<WideDistance<S>> bounds;  ///< by time, as far as all witnesses got
+  std::vector<WideDistance<S>> bounds;  ///< by time, as far as all integrations got
   std::int64_t rhs_evaluations = 0;
   double cpu_s = 0.0;
 };
 
-/// `description` as it is run: its redundant constraints released. Each witness has `cpu_s`; where
-/// the reference ends early the others follow it no further.
+/// `description` as it is run, with redundant constraints released. Each integration has `cpu_s`;
+/// if the reference ends early, the others stop there.
 template <class Space, class S>
 Certified<Space, S> Certify(const MechanismDescription& description,
                             const std::vector<double>& times, double cpu_s,

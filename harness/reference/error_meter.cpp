@@ -22,7 +22,7 @@ void ErrorMeter::Add(std::size_t k, const Snapshot& own, const Snapshot& lower) 
   Distance distance = DistanceOf(measured_, part_, own, reference_.snapshots[k]);
   distance.energy = std::abs(own.energy - first_energy_ - reference_.snapshots[k].energy +
                              reference_.snapshots.front().energy);
-  // a run of one part knows its own energy only
+  // a run of one subsystem has only its own energy
   if (measured_.compiled.parts.size() > 1 || k == 0 || at_.empty()) {
     distance.energy = k == 0 ? 0.0 : std::nan("");
   }
@@ -42,7 +42,7 @@ void ErrorMeter::Write(Record& record) const {
     t.push_back(times_[at_[i]]);
     error.push_back(distances_[i].position);
   }
-  // where everything all but stands still, being late has no meaning
+  // time shift is undefined if nearly everything is at rest
   constexpr double kMoves = 0.01;
   double late = 0.0, shape = 0.0;
   for (const Distance& one : distances_) {
@@ -98,8 +98,8 @@ bool IsAngle(const MechanismDescription& user, const PublishedQuantity& quantity
   return quantity.kind == PublishedKind::kAngle || !IsLength(user, quantity.index);
 }
 
-/// The largest by measure of what quantities have, NaN left out; that of a point is the root of the
-/// squares over its axes.
+/// Returns the maximum of each measure over the quantities, without NaN. The error of a point is
+/// the root of the squares over its axes.
 template <class ValueOf>
 std::map<std::string, double> LargestOf(const MechanismDescription& user,
                                         const PublishedSeries& series, ValueOf value_of) {

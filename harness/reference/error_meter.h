@@ -12,8 +12,8 @@
 
 namespace loopbench::harness {
 
-// What holds a run against what is known of its motion: a certified reference (error_meter.h) or a
-// published series (error_meter.h).
+// Interface that compares a run with known data of its motion: a certified reference or published
+// data (both in error_meter.h).
 
 class Meter {
  public:
@@ -22,8 +22,8 @@ class Meter {
   /// When the run is looked at [s], rising.
   virtual const std::vector<double>& times() const = 0;
 
-  /// The run at times()[k], and the same with an interpolant of one degree less: their distance is
-  /// at least what interpolation adds.
+  /// Adds the run at times()[k], and its interpolant of one degree less: their distance is a lower
+  /// estimate of the interpolation error.
   virtual void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) = 0;
 
   virtual void Write(Record& record) const = 0;
@@ -34,19 +34,18 @@ class Meter {
 
 class ErrorMeter : public Meter {
  public:
-  /// Of the run of one part. What `measured` and the reference refer to outlives the meter.
+  /// Measures the run of one subsystem; referents of `measured` and the reference outlive it.
   ErrorMeter(const Measured& measured, int part, const Reference& reference);
 
-  /// Those that the reference is certified at.
+  /// Returns the times at which the reference is certified.
   const std::vector<double>& times() const override { return times_; }
 
-  /// Energies count from the first picture, which is that of the start: what does not move may be
-  /// left out of a simplified model.
+  /// Adds a snapshot. Energies are relative to the first snapshot, at the start: simplified models
+  /// may omit immovable bodies.
   void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override;
 
-  /// Errors at the end, at most and in the mean (keys error_*, docs/errors-and-costs.md), and
-  /// series.error. The error at the end is left out where the run or the certificate did not get
-  /// there.
+  /// Writes errors at the end, their maximum and mean (keys error_*, docs/errors-and-costs.md), and
+  /// series.error. Omits the error at the end if the run or the certificate ends earlier.
   void Write(Record& record) const override;
 
  private:
@@ -59,27 +58,27 @@ class ErrorMeter : public Meter {
   double first_energy_ = 0.0, interpolation_ = 0.0;
 };
 
-/// What a row says of its reference: keys reference, reference_runs, reference_error and
+/// Writes the reference's keys: reference, reference_runs, reference_error and
 /// reference_valid_until.
 void WriteCertificate(const Reference& reference, Record& record);
 
-// The error of a run against a published series (harness/config/published_series.h), in the same
-// measures as against a certified reference. What the series does not have is left out.
+// Error of a run against published data (harness/config/published_series.h), in the measures of a
+// certified reference. Quantities without published data are left out.
 
 class SeriesMeter : public Meter {
  public:
-  /// Of the run of one part, over `horizon` [s]. What `measured` and the series refer to outlives
-  /// the meter.
+  /// Measures the run of one subsystem, over `horizon` [s]. The objects that `measured` and the
+  /// series refer to outlive the meter.
   SeriesMeter(const Measured& measured, int part, const PublishedSeries& series, double horizon);
 
-  /// Those of the series up to the horizon.
+  /// Returns the times of the series up to the horizon.
   const std::vector<double>& times() const override { return times_; }
 
   void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override;
 
-  /// Keys error_*; of points the distance in the axes that the series has. "error_over_uncertainty"
-  /// is the largest difference of any number from the published one, over its accuracy: at 1 and
-  /// below the series does not tell the run from the truth.
+  /// Writes the keys error_*; errors of points use the axes of the series. "error_over_uncertainty"
+  /// is the largest deviation from a published number over its uncertainty. At 1 and below the run
+  /// agrees with the series.
   void Write(Record& record) const override;
 
  private:
@@ -96,9 +95,9 @@ class SeriesMeter : public Meter {
   std::int64_t points_ = 0;
 };
 
-/// What a row says of its series: reference, reference_runs (name and source),
-/// reference_error and its like for each measure, and reference_valid_until, the last time within
-/// `horizon`.
+/// Writes the keys of the published data: reference, reference_runs (name and source),
+/// reference_error and its counterparts for each measure, and reference_valid_until, the last time
+/// within `horizon`.
 void WriteCertificate(const MechanismDescription& user, const PublishedSeries& series,
                       double horizon, Record& record);
 

@@ -154,7 +154,7 @@ Distance Larger(const Distance& a, const Distance& b) {
 }
 namespace {
 
-/// Of the file, and of what stands in it: raised when either changes.
+/// Version of the file and of its content, raised when either changes.
 constexpr int kFormat = 2;
 
 /// Numbers of a body's state in the file: position, two columns of R, velocity, angular velocity.
@@ -346,7 +346,7 @@ Known ReadOne(const fs::path& file) {
   return one;
 }
 
-/// As a line, without what two makings of one reference may differ in.
+/// Returns the record as a line, without keys that may differ between computations.
 std::string Lasting(const Record& record) {
   Record lasting;
   for (const auto& [key, value] : record.items()) {

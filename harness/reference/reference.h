@@ -13,10 +13,10 @@
 
 namespace loopbench::harness {
 
-// What a mechanism does at one time, in the user's terms, whatever it was compiled to; and how far
-// two such pictures are apart.
+// State of a mechanism at one time in the user's terms, independent of preprocessing, and the
+// distance between two such snapshots.
 
-/// Where a body is and how it moves, in the user's ground axes, at the body's origin.
+/// Pose and velocity of a body, in the user's ground axes, at the body's origin.
 struct BodyState {
   Frame pose;
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< [m/s]
@@ -25,10 +25,10 @@ struct BodyState {
 
 struct Snapshot {
   std::vector<BodyState> bodies;  ///< by the user's body, Ground included
-  /// By the user's joint: its coordinate [rad or m] where it has one, else NaN.
+  /// By the user's joint: its coordinate [rad or m] if it has just one, else NaN.
   std::vector<double> joints;
-  std::vector<double> rates = {};  ///< of these coordinates; NaN where it was not taken
-  double energy = 0.0;  ///< kinetic and potential [J]; NaN where it is not known of the whole
+  std::vector<double> rates = {};  ///< rates of these coordinates; NaN if not taken
+  double energy = 0.0;             ///< kinetic and potential [J]; NaN if unknown for the whole
 };
 
 /// A point of a user's body, in its axes from its origin [m].
@@ -37,25 +37,25 @@ struct MeasuredPoint {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
 };
 
-/// A mechanism that is measured: the user's description and what became of it.
+/// A measured mechanism: the user's description and its preprocessed form.
 struct Measured {
   const MechanismDescription& user;
   const Compiled& compiled;
-  /// Where distances of points are taken; none: at all of PointsOf().
+  /// Points at which distances are taken; empty: all of PointsOf().
   std::vector<MeasuredPoint> points = {};
 };
 
-/// Whether the first coordinate of a joint is a length, not an angle.
+/// Returns true if the first coordinate of a joint is a length, not an angle.
 bool IsLength(const MechanismDescription& user, std::size_t joint);
 
 /// Origins, centres of mass and named points of all bodies but Ground.
 std::vector<MeasuredPoint> PointsOf(const MechanismDescription& user);
 
-/// One with room for all bodies and joints: what is fixed to Ground is where it is, all else at the
-/// origin.
+/// Returns a snapshot with room for all bodies and joints: bodies fixed to Ground have their poses,
+/// all others are at the origin.
 Snapshot EmptySnapshot(const Measured& measured);
 
-/// The same state of one part's body, at its centre of mass in the part's ground axes.
+/// Returns the same state for one part's body, at its centre of mass in the part's ground axes.
 template <class Space, class S>
 BodyState StateAtCentre(const Pose<Space, S>& pose, const Velocity<Space, S>& motion);
 
@@ -66,7 +66,7 @@ void EnterBody(const Measured& measured, int part, int body, const BodyState& at
 void EnterJoint(const Measured& measured, int part, int joint, double coordinate, double rate,
                 Snapshot* snapshot);
 
-/// The picture of one part at `kinematics`, rounded to double; other parts stay as they are.
+/// Sets the snapshot of one part at `kinematics`, rounded to double; other parts are unchanged.
 template <class Space, class S>
 void TakeSnapshot(const Measured& measured, int part, const Kinematics<Space, S>& kinematics,
                   Snapshot* snapshot) {
@@ -87,7 +87,7 @@ void TakeSnapshot(const Measured& measured, int part, const Kinematics<Space, S>
   snapshot->energy = static_cast<double>(ComputeEnergy(kinematics).total());
 }
 
-/// The largest distances between two pictures of what belongs to one part (-1: to any).
+/// Largest distances between two snapshots of one subsystem (-1: of all).
 struct Distance {
   double position = 0.0;          ///< of named points, origins and centres of mass [m]
   double rotation = 0.0;          ///< of bodies [rad]
@@ -95,10 +95,10 @@ struct Distance {
   double angular_velocity = 0.0;  ///< [rad/s]
   double angle = 0.0;             ///< of joint coordinates [rad], without whole turns
   double displacement = 0.0;      ///< of joint coordinates [m]
-  double energy = 0.0;            ///< [J]; NaN where one is not known
-  /// By how much `a` is late on the way of `b`, to first order: least squares over the points, b's
-  /// speeds as weights [s]; and the largest distance that is left [m]. NaN and the position where
-  /// b stands still.
+  double energy = 0.0;            ///< [J]; NaN if one is unknown
+  /// Time shift of `a` behind `b`, to first order: least squares over the points, weighted by b's
+  /// speeds [s]; and the largest remaining distance [m]. NaN and the position error if b is at
+  /// rest.
   double late = 0.0, shape = 0.0;
   double speed = 0.0;  ///< of b's points, root of the mean square [m/s]
 };
@@ -121,27 +121,27 @@ BodyState StateAtCentre(const Pose<Space, S>& pose, const Velocity<Space, S>& mo
   return state;
 }
 
-// A reference: what a mechanism does at given times, with the error that it is certified to.
+// A reference solution: states of a mechanism at given times, with their certified error.
 //
-// harness/precision/make_reference.h makes them; here is what they hold, and the file they are kept
-// in: one line of JSON with a checksum (harness/record/record.h).
+// harness/precision/make_reference.h computes them. A file holds one reference: one line of JSON
+// with a checksum (harness/record/record.h).
 
-/// Errors are held against a reference up to the time where its own exceeds this share of a link:
-/// a tenth of the least error of runs in double that is told from round-off over long horizons.
+/// Errors are measured until the reference's own error exceeds this share of a link: a tenth of the
+/// smallest error in double that exceeds round-off over long horizons.
 inline constexpr double kCertifiedShare = 1e-9;
 
 struct Reference {
-  /// Name of the outcome of its start, or of the first witness that ended early.
+  /// Name of the outcome of its start, or of the first integration that ended early.
   std::string outcome = "finished";
-  std::string message;  ///< why there is none, or it ends early
+  std::string message;  ///< reason for no reference or an early end
   /// "long-double", "gragg 20(19): lagrange 1e-17, lagrange 1e-15, odca 1e-16".
   std::string scalar, witnesses;
   std::vector<double> times;        ///< [s], the start and the end among them
-  std::vector<Snapshot> snapshots;  ///< by time, as far as the witnesses got
+  std::vector<Snapshot> snapshots;  ///< by time, up to the shortest integration
   std::vector<Distance> bounds;     ///< certified errors of the snapshots; `late` is not known
   double trust_horizon = 0.0;       ///< [s] of the last time before bounds exceed kCertifiedShare
   double cpu_s = 0.0;
-  std::int64_t rhs_evaluations = 0;  ///< of all witnesses
+  std::int64_t rhs_evaluations = 0;  ///< of all integrations
 
   /// The largest bound up to the trust horizon.
   Distance Certified() const;
@@ -149,8 +149,8 @@ struct Reference {
   std::size_t NumTrusted() const;
 };
 
-/// The name of a scene's reference: what decides it, and no version of this program, so that none
-/// is made again for nothing.
+/// Returns the name of a problem's reference. It depends on the problem alone, not on the version
+/// of this program, so that references are reused.
 std::string ReferenceId(const ExperimentScene& scene, double horizon,
                         const ReferenceOptions& options);
 
@@ -159,21 +159,21 @@ std::filesystem::path ReferencePath(const std::filesystem::path& store_file, con
 
 void WriteReference(const std::filesystem::path& path, const std::string& id,
                     const MechanismDescription& user, const Reference& reference);
-/// Nothing where there is no such file. Throws std::runtime_error, with the file's name, for one
-/// that is damaged or another's.
+/// Reads a reference; returns nothing without a file. Throws std::runtime_error, with the file's
+/// name, for a damaged or foreign file.
 std::optional<Reference> ReadReference(const std::filesystem::path& path, const std::string& id,
                                        const MechanismDescription& user);
 
 // The certified references beside several stores, put beside one.
 
 struct MergedReferences {
-  std::map<std::string, std::string> texts;  ///< name of a file in references/ and what is in it
-  std::vector<std::string> notes;            ///< of which certificate was kept, where two differ
+  std::map<std::string, std::string> texts;  ///< file name in references/ and content
+  std::vector<std::string> notes;            ///< certificate that was kept if two differ
 };
 
-/// All references of stores (`store_files`: their results.jsonl). Those of one name agree in all
-/// but the time they took, or the one that is certified longer, and then to less, is kept. Throws
-/// std::runtime_error, with the file's name, for one that is damaged or another's.
+/// Reads all references of stores (`store_files`: their results.jsonl). References of one name must
+/// agree in all but their computing time; otherwise the one certified longer, and then to less, is
+/// kept. Throws std::runtime_error, with the file's name, for damaged or foreign references.
 MergedReferences MergeReferences(const std::vector<std::filesystem::path>& store_files);
 
 /// Writes them beside the store.

@@ -32,7 +32,7 @@ CompiledScene CompileScene(const MechanismDescription& description, const SceneO
   if (scene.compiled.done == CompileOptions::None()) return scene;
   const std::vector<BodyDescription>& bodies = scene.compiled.parts.front().description.bodies;
   for (AngleCombination& combination : scene.observe.branch_invariants) {
-    // what is fixed adds a constant, and only changes count
+    // fixed terms add a constant, and only changes count
     std::erase_if(combination, [&](const auto& term) {
       return ImageOf(description, scene.compiled, term.first).part < 0;
     });
@@ -66,7 +66,7 @@ std::string ToString(const CompileOptions& options) {
 }
 namespace {
 
-/// What decides any run besides its keys.
+/// Returns the content common to all runs besides their keys.
 Record CommonContent(const Experiment& experiment) {
   Record content = RecordOf(experiment.limits);
   content.Set("preprocess", ToString(experiment.compile));

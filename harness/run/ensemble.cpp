@@ -20,8 +20,8 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Sum of a key over the parts that have it, or NaN where one of `all` lacks it; nothing where none
-/// has it.
+/// Returns the sum of a key over the parts that have it; NaN if one of `all` lacks it; nothing if
+/// no part has it.
 Value Sum(std::span<const Run> parts, std::string_view key, bool all) {
   std::int64_t count = 0;
   double sum = 0.0;
@@ -39,8 +39,8 @@ Value Sum(std::span<const Run> parts, std::string_view key, bool all) {
   return is_count ? Value(count) : Value(sum);
 }
 
-/// The part that decides a key: the one with the largest or smallest number of those that have it,
-/// the first one that failed, ...; null where none has it.
+/// Returns the part that decides a key: the part with the largest or smallest number, the first
+/// that failed, ...; null if no part has the key.
 const Run* Deciding(std::span<const Run> parts, const Measure& measure, std::string_view key) {
   const auto& [how, with] = measure.merging;
   if (how == Merge::kWith) return Deciding(parts, *FindMeasure(with), with);
@@ -62,7 +62,7 @@ const Run* Deciding(std::span<const Run> parts, const Measure& measure, std::str
   return best;
 }
 
-/// The value of a key for the whole; nothing where it has none.
+/// Returns the value of a key for the whole; nothing if undefined.
 Value MergeKey(std::span<const Run> parts, const Measure& measure, std::string_view key) {
   const bool started = std::ranges::all_of(
       parts, [](const Run& part) { return !std::isnan(part.record.Number("rank_min")); });
@@ -89,7 +89,7 @@ Value MergeKey(std::span<const Run> parts, const Measure& measure, std::string_v
   return part == nullptr || part->record.Find(key) == nullptr ? Value() : *part->record.Find(key);
 }
 
-/// At every time of any part the largest of what the parts had last.
+/// Returns, at every time of any part, the maximum of the parts' last values.
 DriftSeries MergeDrift(std::span<const Run> parts) {
   std::vector<std::pair<double, std::size_t>> order;  // time, part
   for (std::size_t p = 0; p < parts.size(); ++p) {
@@ -155,7 +155,7 @@ MechanismDescription Drawn(MechanismDescription description, const Case& one, in
   return description;
 }
 
-// Guesses for all coordinates of tree joints that are not held.
+// Guesses for all coordinates of tree joints that are not fixed.
 template <class Space>
 void SetGuesses(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                 MechanismDescription* description) {
@@ -173,7 +173,7 @@ void SetGuesses(const Mechanism<Space, double>& mechanism, const VectorX<double>
   }
 }
 
-// `from` with its held coordinates those of `to`, reached in `steps` steps.
+// `from` with its fixed coordinates taken from `to`, reached in `steps` steps.
 template <class Space>
 MechanismDescription Follow(const MechanismDescription& from, const MechanismDescription& to,
                             int steps) {

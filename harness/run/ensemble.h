@@ -11,57 +11,57 @@
 
 namespace loopbench::harness {
 
-// One record from the runs of parts that have nothing to do with each other.
+// Merges the runs of independent parts into one record.
 
-/// What one run leaves behind.
+/// Results of one run.
 struct Run {
   Record record;
   DriftSeries drift;
-  /// Of the projections [m] and of the energy balance [J], with the largest kinetic energy [J].
+  /// Corrections of projections [m], energy balance [J] and largest kinetic energy [J].
   DriftSeries correction = {}, energy = {};
   double kinetic = 0.0;
-  /// The scene's branch combinations (mechanism_reader.h) at the assembled start [rad]; empty
-  /// without.
+  /// The problem's branch combinations (mechanism_reader.h) at the assembled start [rad], or empty.
   std::vector<double> branch_start = {};
 };
 
-/// Each part has its own steps. Work adds up (steps, evaluations, wall time, rank); drift is the
-/// largest of the parts, at each time the largest of what each had last; the worst outcome and the
-/// earliest end count; energy errors and the energies that they are compared with add up, upper
-/// bounds of the whole's. Series of corrections, energy and angles, which belong to one sequence of
-/// steps, stay out.
+/// Merges the runs of subsystems, which have their own steps. Work is summed (steps, evaluations,
+/// wall time, rank). Drift is the maximum over the parts, at each time of each part's last value.
+/// The worst outcome and the earliest end count. Energy errors and their reference energies are
+/// summed (upper bounds). Series of corrections, energy and angles belong to one step sequence and
+/// are omitted.
 Run MergeParts(std::span<const Run> parts);
 
-// The members of an ensemble: where they start, and how many of them stay on their branch.
+// Members of an ensemble: their starts, and the number that stay on their branch.
 
-/// The description of one member: held coordinates moved by uniform random amounts of at most
-/// `perturb`, or those that `between` names drawn uniformly between their bounds. The same seed and
-/// member give the same start everywhere.
+/// Returns the description of one member: fixed coordinates moved by uniform random amounts of at
+/// most `perturb`, or coordinates in `between` drawn uniformly between their bounds. The same seed
+/// and member give the same start everywhere.
 ///
-/// Loops stay on their branch: a start is reached in steps of at most 0.1 rad or m, each assembled
-/// from the positions before it, extrapolated, which passes positions where branches cross. Shorter
-/// ways take one step, the description's own guesses. Where a step cannot be closed the member has
-/// the drawn coordinates and those guesses, and its run ends as inconsistent-start if they fail.
+/// Loops stay on their branch: a start is reached in steps of at most 0.1 rad or m. Each is
+/// assembled from the extrapolated previous positions, which passes positions where branches cross.
+/// Shorter paths take one step, with the description's own guesses. If a step cannot be closed, the
+/// member has the drawn coordinates and those guesses; its run ends as inconsistent-start if they
+/// fail.
 MechanismDescription MemberStart(const MechanismDescription& description, const Case& one,
                                  int member);
 
-/// What becomes of the members; the unperturbed run is none of them.
+/// Statistics of the members, without the unperturbed run.
 class EnsembleTally {
  public:
-  /// `nominal` is the unperturbed run, whose start tells the branch.
+  /// `nominal` is the unperturbed run; its start determines the branch.
   EnsembleTally(const Run& nominal, double branch_bound)
       : branch_start_(nominal.branch_start), branch_bound_(branch_bound) {}
 
-  /// `start` is what the member was run from.
+  /// `start` is the member's initial state.
   void Add(const Run& member, const MechanismDescription& start);
 
-  /// ensemble_size, ensemble_failed (did not finish); of the members that finished the largest
-  /// branch, closed-form, energy and drift errors, ensemble_<key>, where the scene knows them; and
-  /// where it knows a branch ensemble_branch_bound [rad], ensemble_branch_kept (finished, started
-  /// on the branch, and never further from it than that), ensemble_started_off (on another branch,
-  /// finished or not). A largest error that is not finite is kept as such. ensemble_first_failed
-  /// and ensemble_first_left (finished, but not kept) name the first such member, its start
-  /// with all digits, and its ending.
+  /// Writes ensemble_size and ensemble_failed (did not finish). For finished members with a known
+  /// solution, writes the largest branch, closed-form, energy and drift errors as ensemble_<key>.
+  /// If a branch is known, adds ensemble_branch_bound [rad], ensemble_branch_kept (finished,
+  /// started on the branch, never further from it than the bound) and ensemble_started_off (on
+  /// another branch, finished or not). Keeps non-finite largest errors. ensemble_first_failed and
+  /// ensemble_first_left (finished, not kept) give the first such member, its start with all
+  /// digits, and its outcome.
   void Write(Record& record) const;
 
  private:

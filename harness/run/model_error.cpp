@@ -11,7 +11,7 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Where the bodies of a joint stand against each other.
+/// Relative poses of the bodies of a joint.
 template <class Space>
 struct Stand {
   Pose<Space, double> X_PQ;     ///< axes and centres of mass

@@ -1,4 +1,4 @@
-// Short runs beside each other: what hardly moves, and errors of simpler models.
+// Short runs: detection of nearly constant coordinates, and errors of simplified models.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +12,17 @@
 
 namespace loopbench::harness {
 
-// A description made ready to run by itself, without observers: joint coordinates, loops at level
-// position.
+// A description prepared to run alone, without observers: joint coordinates, loops at level
+// projection.
 
 template <class Space>
 struct ReadyToRun {
-  std::unique_ptr<System<Space, double>> system;  ///< null where it does not start
+  std::unique_ptr<System<Space, double>> system;  ///< null if it has no start
   std::vector<double> y;                          ///< its state at time 0
   std::string failure;                            ///< why it does not start
 };
 
-/// `mechanism` is the description in joint coordinates and outlives what comes back.
+/// `mechanism` is the description in joint coordinates and outlives the returned object.
 template <class Space>
 ReadyToRun<Space> StartAtLevelPosition(const MechanismDescription& description,
                                        const Mechanism<Space, double>& mechanism,
@@ -44,18 +44,18 @@ ReadyToRun<Space> StartAtLevelPosition(const MechanismDescription& description,
   return ready;
 }
 
-// A short run of a whole model, to see what hardly moves (mechanism/simplify/model.h).
+// A short run of a full model to detect nearly constant coordinates (mechanism/simplify/model.h).
 
 /// Runs the description for `duration` seconds by O-DCA at level projection, ode45 at 1e-6, in
-/// joint coordinates. A run that ends earlier (its CPU time is `cpu_s`) tells what it saw until
-/// then, and why it ended; one that does not begin tells nothing.
+/// joint coordinates. A run that ends earlier (its CPU time is limited to `cpu_s`) returns its data
+/// so far and the reason. A run that cannot start returns no data.
 ShortRun MakeShortRun(const MechanismDescription& description, double duration, double cpu_s);
 
-// How far a simplified model moves from the whole one, and what it takes (mechanism/simplify/).
+// Error and cost of a simplified model relative to the full model (mechanism/simplify/).
 
 /// Named points of bodies at equal times, ground axes [m].
 struct Track {
-  std::string failure;  ///< why there is none
+  std::string failure;  ///< reason if there is none
   std::vector<double> times;
   std::vector<std::vector<Eigen::Vector3d>> points;  ///< by time, in the order of `names`
   std::vector<std::string> names;                    ///< "<body>.<point>"
@@ -63,8 +63,8 @@ struct Track {
 };
 
 /// Runs the model by multipliers at level projection, dormand-prince at 1e-10. Steps end at the
-/// times that are looked at. `whole` says which points: those of its bodies by their names in the
-/// model (FindPoint), where the model has them.
+/// compared times. `whole` selects the points: points of its bodies by their names in the model
+/// (FindPoint), if the model has them.
 Track TrackOf(const MechanismDescription& model, const Eigen::Matrix3d& R_WC,
               const MechanismDescription& whole, double horizon, double cpu_s);
 

@@ -20,17 +20,17 @@ using PeerFactory = std::function<std::unique_ptr<Peer>(const MechanismDescripti
 /// for a name that is no peer's or has one already.
 void RegisterPeer(const std::string& name, PeerFactory make);
 
-/// Null where the formulation is no peer. Throws Inexpressible, and ConfigError for a peer that
-/// this build does not have.
+/// Returns null if the formulation is no external engine. Throws Inexpressible, and ConfigError for
+/// an engine that this build does not contain.
 std::unique_ptr<Peer> MakePeer(const std::string& formulation,
                                const MechanismDescription& description);
 
-/// The same with Inexpressible as outcome and message of `result`, which else is as it was.
+/// Does the same; stores Inexpressible as outcome and message of `result`, otherwise unchanged.
 std::unique_ptr<Peer> TryPeer(const std::string& formulation,
                               const MechanismDescription& description, IntegratorResult* result);
 
-/// Throws ConfigError when a column of an experiment names a peer that this build does not have:
-/// files with peers are read everywhere, and run where the peers are.
+/// Throws ConfigError if a method of an experiment names an engine that this build does not
+/// contain. Every build can read such files, but not run them.
 void RequirePeers(const std::vector<Experiment>& experiments);
 
 }  // namespace loopbench::harness

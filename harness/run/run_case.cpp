@@ -92,7 +92,7 @@ void ForEachMember(const Experiment& experiment, const Case& one, int threads, c
     RunSideBySide(static_cast<int>(held.size()), threads, run_member);
     for (int i = 0; i < static_cast<int>(held.size()); ++i) {
       Member& member = held[static_cast<std::size_t>(i)];
-      // its time was also that of those beside it
+      // its time includes the other runs of its batch
       if (member.run.record.Text("outcome") == ToString(Outcome::kTimeLimit)) {
         RunSideBySide(1, 1, [&](int, SideBySide& alone) { run_member(i, alone); });
       }
@@ -101,7 +101,7 @@ void ForEachMember(const Experiment& experiment, const Case& one, int threads, c
   }
 }
 
-/// What the case's errors are measured against, and in the record what that is certified to.
+/// Returns the reference for the case's errors, and writes its certified error to the record.
 HeldAgainst WriteCertificateOf(const ExperimentScene& scene, const Case& one,
                                const Reference* reference, Record& record) {
   HeldAgainst held;
@@ -204,7 +204,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
 
 namespace {
 
-/// Of the last state: equal hashes mean equal runs.
+/// Returns a hash of the last state: equal hashes mean equal runs.
 std::string StateHash(std::span<const double> y) {
   return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
 }
@@ -212,8 +212,8 @@ std::string StateHash(std::span<const double> y) {
 template <class Space>
 class Runner {
  public:
-  /// Part `part` of `user`, simplified to `scene`. A member of an ensemble has others `beside` it,
-  /// and less of it is watched.
+  /// Runs part `part` of `user`, simplified to `scene`. A member of an ensemble has other runs
+  /// `beside` it and fewer observers.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
          const CompiledScene& scene, int part, SideBySide* beside, const HeldAgainst& held,
          const TrajectoryTask* trajectory)
@@ -364,8 +364,8 @@ class Runner {
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
       const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);
       const bool restart = formulation->BeginStep(t, y);
-      // a derivative that fails here fails in the integrator's next call, with its outcome; only
-      // what the failing matrix looked like is worth keeping
+      // a failing derivative fails again in the integrator's next call, which gives the outcome;
+      // this keeps only the diagnostics of the failing matrix
       const Outcome outcome =
           IsMember() ? formulation->Look(t, y) : formulation->Examine(t, y, ydot);
       Sample<Space> sample{t, *formulation};
@@ -423,7 +423,7 @@ class Runner {
   std::optional<Recorder<Space>> recorder_;
   bool by_steps_ = false;                         ///< rows are at the ends of steps
   std::vector<double> rows_;                      ///< else at these times
-  std::int64_t looked_ = 0, looked_by_then_ = 0;  ///< softened, for nobody's step; at the last one
+  std::int64_t looked_ = 0, looked_by_then_ = 0;  ///< regularized, outside steps; at last step
   std::int64_t library_evaluations_ = 0;          ///< instead of generated code
   double compile_s_ = 0.0;                        ///< [s], to record and compile
   Record final_poses_;

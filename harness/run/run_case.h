@@ -1,4 +1,4 @@
-// One run of one case, and all runs that a case consists of.
+// Runs one case with all its runs.
 #pragma once
 
 #include <filesystem>
@@ -22,17 +22,17 @@
 
 namespace loopbench::harness {
 
-// What a record says of a run besides what its observers have measured.
+// Run-level record keys besides the observers' measurements.
 
-/// How the run ended and what the integrator counted; a projection's Newton steps are evaluations,
-/// too.
+/// Writes the outcome of the run and the integrator's counters. Newton steps of a projection count
+/// as evaluations, too.
 void WriteCounts(const IntegratorResult& result, std::int64_t projection_steps, bool is_implicit,
                  Record& record);
 
 /// Growth of drift over an ensemble, of which `failed` did not finish.
 void WriteGrowth(const Growth& growth, int failed, Record& record);
 
-/// Growth of what is no drift, in the one run that it is known of: its exponent, without a verdict.
+/// Writes the exponent of a growth other than drift, known only in this run, without a verdict.
 void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
                    Record& record);
 
@@ -52,8 +52,8 @@ std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
                                  .beside = beside});
 }
 
-/// Gives a system, after its start, the Jacobians that a case's Newton iteration asks for: none
-/// where it makes difference quotients, or has no iteration.
+/// Gives a system, after its start, the Jacobians for the Newton iteration of a case: none for
+/// difference quotients or without iteration.
 template <class Space>
 void GiveJacobian(const std::string& integrator, JacobianKind kind,
                   const MechanismDescription& description, System<Space, double>& system) {
@@ -61,8 +61,8 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
   if (wanted) system.UseJacobian(std::make_unique<ForwardJacobian<Space>>(description, system));
 }
 
-/// Gives a system, after its start and IntegrateWork(), the generated right-hand side that a column
-/// asks for. Throws NotCovered (harness/generate/record.h).
+/// Gives a system, after its start and IntegrateWork(), the generated right-hand side of a method.
+/// Throws NotCovered (harness/generate/record.h).
 template <class Space>
 void GiveExecution(const Column& column, const MechanismDescription& description,
                    System<Space, double>& system) {
@@ -90,34 +90,34 @@ void GiveExecution(const Column& column, const MechanismDescription& description
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.
 IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times);
 
-/// Runs the case and, where it asks for one, its ensemble of perturbed starts. The record holds the
-/// keys, the outcome and all measured values of the unperturbed run; growth is analysed over the
-/// ensemble (or over the single run, which resolves nothing). Limits hold for each run.
+/// Runs the case and, if requested, its ensemble of perturbed starts. The record holds the keys,
+/// the outcome and all measured values of the unperturbed run. Growth is analysed over the ensemble
+/// (or over the single run, which resolves nothing). Limits hold for each run.
 ///
-/// With a reference (harness/reference/), the unperturbed run is held against it at the reference's
-/// times, between steps through dense output.
+/// With a reference (harness/reference/), the unperturbed run is compared with it at the
+/// reference's times, by dense output.
 ///
-/// Where the experiment asks for output, the unperturbed run's trajectory is written to
-/// `trajectory` (harness/trajectory/), unless that is empty.
+/// If the experiment requests output, the unperturbed run's trajectory is written to `trajectory`
+/// (harness/trajectory/), unless that is empty.
 ///
-/// Members of the ensemble run side by side on `threads` threads (side_by_side.h), which changes no
-/// bit of them.
+/// Members of the ensemble run in batches on `threads` threads (side_by_side.h), which does not
+/// change their bits.
 ///
-/// Whatever goes wrong numerically ends in the record; only misuse throws.
+/// Numerical failures are stored in the record; only misuse throws.
 Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr,
                const std::filesystem::path& trajectory = {}, int threads = 1);
 
-// One motion of a case: start, integration, observers, and what they write.
+// One motion of a case: start, integration, observers, and their records.
 
-/// What is known of the motion: one of them, or nothing.
+/// Reference for the motion: one of these, or none.
 struct HeldAgainst {
   const Reference* reference = nullptr;     ///< with snapshots
   const PublishedSeries* series = nullptr;  ///< with times within the horizon
 };
 
-/// `description` is that of the case or the start of a member of its ensemble, whose run has others
-/// `beside` it and is watched for less; null for the run of the case itself. Parts that are
-/// connected through ground alone run one after another.
+/// `description` is the case's or the start of an ensemble member. Members have other runs `beside`
+/// them and fewer observers; `beside` is null for the case itself. Parts connected through ground
+/// alone run one after another.
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
             SideBySide* beside, const HeldAgainst& held = {},
             const TrajectoryTask* trajectory = nullptr);

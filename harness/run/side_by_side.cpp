@@ -25,11 +25,11 @@ constexpr int kMost = 1;
 constexpr int kMost = kLanes;
 #endif
 
-/// Stacks begin at places of their own within a page: what all runs use at once would else meet in
-/// the same few sets of the nearest cache.
+/// Stacks start at different offsets within a page. Otherwise data used by all runs would compete
+/// for the same few sets of the nearest cache.
 constexpr std::size_t kApart = 4096 / kLanes;
 
-/// Where one run after another has its stack.
+/// Stack that successive runs use.
 class Place {
  public:
   explicit Place(int number) : away_(static_cast<std::size_t>(number) * kApart) {}
@@ -40,7 +40,7 @@ class Place {
   Place& operator=(const Place&) = delete;
 
   bool IsTaken() const { return static_cast<bool>(fiber_); }
-  /// Only a place that is used takes memory. False where there is none.
+  /// Only a used stack takes memory. Returns false without a stack.
   bool HasStack() noexcept {
     if (memory_.sp != nullptr) return true;
     try {
@@ -118,7 +118,7 @@ class Places final : public SideBySide {
 }  // namespace
 
 void RunSideBySide(int count, int threads, const std::function<void(int, SideBySide&)>& run) {
-  // a thread for fewer runs than it has lanes would leave lanes empty
+  // more threads would leave lanes empty
   const int useful = std::clamp((count + kMost - 1) / kMost, 1, std::max(1, threads));
   // of the runs, then of threads
   std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count + useful));

@@ -8,10 +8,10 @@
 
 namespace loopbench::harness {
 
-/// Calls run(i, beside) for each i < count. Runs on one thread take turns where they Meet(): each
-/// has a stack of its own, of kStackBytes; where memory is short, fewer take turns. Returns when
-/// all have ended; an exception is that of the first run that threw one. Sanitizers follow one
-/// stack: under them runs go one after another.
+/// Calls run(i, beside) for each i < count. Runs on one thread switch where they Meet(); each has
+/// its own stack of kStackBytes. If memory is short, fewer runs alternate. Returns when all have
+/// ended; rethrows the exception of the first run that threw. Sanitizers follow one stack only:
+/// with them runs are sequential.
 void RunSideBySide(int count, int threads, const std::function<void(int, SideBySide&)>& run);
 
 inline constexpr std::size_t kStackBytes = std::size_t{8} << 20;

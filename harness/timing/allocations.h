@@ -1,4 +1,4 @@
-// Counts what a program allocates. Linked into benchmark programs only: it replaces malloc.
+// Counts the allocations of a program. Linked into benchmark programs only: it replaces malloc.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,13 @@ namespace loopbench::harness {
 
 struct Allocations {
   std::int64_t count = 0;  ///< calls of malloc and its relatives so far
-  std::int64_t bytes = 0;  ///< asked for so far; what is freed is not subtracted
+  std::int64_t bytes = 0;  ///< total requested so far; freed bytes are not subtracted
 };
 
 Allocations AllocationsSoFar();
 
-/// Allocates and looks whether it is counted: throws std::runtime_error when another malloc has
-/// taken the place of the counting one. A counter that sees nothing would report zero for ever.
+/// Checks that an allocation is counted: throws std::runtime_error if another malloc has replaced
+/// the counting one. Such a counter would always report zero.
 void CheckAllocationsAreCounted();
 
 }  // namespace loopbench::harness

@@ -1,7 +1,7 @@
 // loopbench_bench: right-hand sides and integrator steps under Google Benchmark.
 //
-// What is measured stands in a JSON file and is registered at run time. The library's JSON writer
-// prints NaN, which no reader takes: runs pass through SafeReporter first.
+// A JSON file defines the measurements; they are registered at run time. The library's JSON writer
+// prints NaN, which JSON readers reject: runs pass through SafeReporter first.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -49,7 +49,7 @@ its reason, without counters.
 Exit codes: 0 done, 2 bad input, or nothing could be measured.
 )";
 
-/// Leaves out what JSON cannot say, for example the spread of a counter that is always zero.
+/// Omits values that JSON cannot represent, such as the spread of a counter that is always zero.
 class SafeReporter final : public benchmark::JSONReporter {
  public:
   void Finalize() override {
@@ -78,9 +78,9 @@ constexpr const char* kAssertions = "on (the preset native builds without)";
 #endif
 
 /// The reporter of a terminal, without the library's warning that it was "built as DEBUG" and
-/// "timings may be affected". Debian builds it without NDEBUG, but what is timed is not in it: the
-/// loop over iterations is a header, and as good as this program's own flags. Of those the context
-/// tells, in the lines "assertions" and "flags".
+/// "timings may be affected". Debian builds it without NDEBUG, but that code is not timed: the loop
+/// over iterations is a header, compiled with this program's flags. The context lists these flags
+/// in the lines "assertions" and "flags".
 class PlainReporter final : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override {
@@ -161,7 +161,7 @@ void Count(benchmark::State& state, const char* name, double value) {
   if (std::isfinite(value)) state.counters[name] = value;
 }
 
-/// Of the processor, or by the clock where several threads work.
+/// Returns processor time, or wall time with several threads.
 double Nanoseconds(const Column& column) {
   timespec now{};
   clock_gettime(column.threads > 1 ? CLOCK_MONOTONIC : CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -261,7 +261,7 @@ bool TakeFlag(std::vector<char*>& arguments, const std::string& name) {
   return std::erase_if(arguments, [&](const char* word) { return name == word; }) > 0;
 }
 
-/// What the library will take for one of its string options, from the arguments or the environment.
+/// Returns the library's value of a string option, from the arguments or the environment.
 std::string LibraryOption(const std::vector<char*>& arguments, const std::string& name,
                           const char* variable) {
   std::string value = std::getenv(variable) == nullptr ? "" : std::getenv(variable);

@@ -26,7 +26,7 @@ namespace loopbench::harness {
 /// Set to false by an evaluation that fails.
 bool all_finished = true;
 
-/// Callgrind knows this function by its name (--toggle-collect, --dump-after).
+/// Callgrind finds this function by its name (--toggle-collect, --dump-after).
 extern "C" [[gnu::noinline]] void CountedEvaluations(BenchmarkSubject* subject, int evaluations) {
   for (int i = 0; i < evaluations; ++i) {
     if (subject->Derivative() != Outcome::kFinished) all_finished = false;
@@ -46,7 +46,7 @@ Only right-hand sides ("measure": "rhs") are counted. Exit codes: 0 done, 2 coul
 
 struct Options {
   std::filesystem::path file, callgrind, out;
-  int evaluations = 20;  ///< enough to make what a first evaluation does differently vanish
+  int evaluations = 20;  ///< enough to make extra work of a first evaluation negligible
   int planted = 0;
 };
 

@@ -19,7 +19,7 @@ namespace loopbench::harness {
 
 namespace {
 
-// Short against any motion of unit bars; against that of small and fast machines.
+// Short compared with any motion of unit bars; the second is for small and fast machines.
 constexpr double kWarmUpSteps[] = {5e-3, 5e-5};
 constexpr int kNumWarmUpSteps = 10;
 constexpr double kNever = 1e9;  // time limit of a benchmark's integrator [s]
@@ -149,7 +149,7 @@ std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& descri
 
 namespace {
 
-/// What follows `key` at the start of a line, or nothing.
+/// Returns the text after `key` at the start of a line, or nothing.
 std::optional<std::string_view> LineAfter(std::string_view text, std::string_view key) {
   for (std::size_t start = 0; start < text.size();) {
     const std::size_t end = std::min(text.find('\n', start), text.size());

@@ -1,4 +1,4 @@
-// What is timed, and what counts its instructions.
+// Timed objects and the counter of their instructions.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace loopbench::harness {
 
-// One benchmark's work, ready to be repeated: a right-hand side or an integrator step of one column
-// of one mechanism, always from the same state.
+// Work of one benchmark, ready to be repeated: a right-hand side or an integrator step of one
+// method of one mechanism, always from the same state.
 //
-// States are computed, not stored: the mechanism's start, moved for a short while, so that speeds
-// and all terms of the equations are there. Their hashes are saved (configs/benchmarks/), and a
-// state that comes out differently is refused, because times of different states do not compare.
+// States are computed, not stored: the mechanism's start, moved for a short time, so that speeds
+// and all terms of the equations are nonzero. Their hashes are saved (configs/benchmarks/). A state
+// that differs is rejected, because times of different states are not comparable.
 
 /// Positions and speeds at which a mechanism is measured, the same for all columns of one
 /// coordinate set.
@@ -31,8 +31,8 @@ struct BenchmarkState {
 /// The start of the description after 0.05 s of O-DCA at velocity level, in fixed steps.
 BenchmarkState ComputeState(const MechanismDescription& description, Coordinates coordinates);
 
-/// FNV-1a (64 bit) of the numbers rounded to 1e-6. Other flags and libraries move states by some
-/// 1e-13, so that their hashes agree, but for a chance of 1e-7 per number.
+/// Returns FNV-1a (64 bit) of the numbers rounded to 1e-6. Other flags and libraries change states
+/// by about 1e-13, so hashes agree except with a chance of 1e-7 per number.
 std::string HashRounded(std::span<const double> numbers);
 
 /// FNV-1a (64 bit) of all bits.
@@ -41,7 +41,7 @@ std::string HashExact(std::span<const double> numbers);
 class BenchmarkSubject {
  public:
   virtual ~BenchmarkSubject() = default;
-  /// One right-hand side at the state.
+  /// Evaluates the right-hand side at the state.
   virtual Outcome Derivative() = 0;
   /// One step of the set's integrator and length, from the state.
   virtual Outcome Step() = 0;

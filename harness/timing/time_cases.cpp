@@ -29,20 +29,20 @@ double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// One column of one mechanism, ready to be timed.
+/// One method of one mechanism, ready to be timed.
 class Subject {
  public:
   virtual ~Subject() = default;
   /// Runs the simulation once, keeping states for the right-hand sides. Not timed.
   virtual void Prepare() = 0;
-  /// One batch of right-hand sides.
+  /// Times one batch of right-hand sides.
   virtual void TimeDerivative() = 0;
-  /// One whole simulation.
+  /// Times one whole simulation.
   virtual void TimeSimulation() = 0;
   virtual Record Finish(const Record& keys) = 0;
 
   std::vector<double> rhs_ns;  ///< one value per batch
-  std::vector<double> wall_s;  ///< one value per simulation, none where it fails
+  std::vector<double> wall_s;  ///< one value per simulation, empty on failure
 };
 
 template <class Space>
@@ -111,7 +111,7 @@ class SubjectIn final : public Subject {
     record.Set("bodies", std::int64_t{bodies});
     record.Set("joints", joints);
     record.Set("loops", std::int64_t{mechanism_.num_loops()});
-    // Derivative() may have taken a short cut past the rank
+    // Derivative() may have taken a fast path without a rank
     if (formulation_ && formulation_->Examine(0.0, y_, ydot_) == Outcome::kFinished) {
       const int dof = mechanism_.num_joint_speeds() - formulation_->diagnostics().rank;
       record.Set("dof", std::int64_t{dof});
@@ -146,7 +146,7 @@ class SubjectIn final : public Subject {
   }
 
  private:
-  /// What is timed.
+  /// Returns the timed object.
   Ode& ode() {
     if (peer_) return *peer_;
     return *formulation_;
@@ -190,7 +190,7 @@ class SubjectIn final : public Subject {
       for (int i = 0; i < evaluations_; ++i) {
         const auto& state = states_[i % states_.size()];
         if (ode().Derivative(0.0, state, ydot_) != Outcome::kFinished) {
-          evaluations_ = 0;  // what fails is not timed
+          evaluations_ = 0;  // failures are not timed
           return;
         }
       }
@@ -205,11 +205,11 @@ class SubjectIn final : public Subject {
   Mechanism<Space, double> mechanism_;
   Start<double> start_;
   std::unique_ptr<System<Space, double>> formulation_;
-  std::unique_ptr<Peer> peer_;  ///< in the place of the formulation, which then only counts
+  std::unique_ptr<Peer> peer_;  ///< instead of the formulation, which then only counts
   std::vector<double> y_, ydot_;
   std::vector<std::vector<double>> states_;
   int evaluations_ = 0;
-  double compile_s_ = 0.0;  ///< [s], the first time; later ones find what is compiled
+  double compile_s_ = 0.0;  ///< [s], the first time; later cases reuse the compiled code
   IntegratorResult result_;
 };
 
@@ -221,14 +221,14 @@ std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, co
   return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
 }
 
-/// What the yardstick said of rounds that are kept, and how many are not.
+/// Calibration values of the kept rounds, and the number of discarded rounds.
 struct Rounds {
   double yardstick = std::numeric_limits<double>::quiet_NaN();
   std::int64_t disturbed = 0;
 };
 
-/// Rounds of one kind of time, the subjects in turn, the yardstick between them. While others
-/// disturb the machine there are more rounds than wanted, and the quietest are kept.
+/// Times rounds of one kind, the subjects in turn, the calibration between them. If other load
+/// disturbs the machine, more rounds are taken and the quietest are kept.
 Rounds TimeInTurn(std::size_t wanted, const std::vector<std::unique_ptr<Subject>>& subjects,
                   void (Subject::*time)(), std::vector<double> Subject::*times) {
   constexpr double kPatience_s = 1.0;  // as long as a neighbour's burst of work; some stay longer
@@ -257,14 +257,14 @@ Rounds TimeInTurn(std::size_t wanted, const std::vector<std::unique_ptr<Subject>
   }
   for (const auto& subject : subjects) {
     std::vector<double>& all = (*subject).*times;
-    if (all.size() != slowest.size()) continue;  // those of a simulation that failed
+    if (all.size() != slowest.size()) continue;  // a failed simulation
     for (std::size_t i = 0; i < kept.size(); ++i) all[i] = all[kept[i]];
     all.resize(kept.size());
   }
   return {Quantile(std::move(of_kept), 0.5), std::ssize(slowest) - std::ssize(kept)};
 }
 
-/// What the A/A pair and the machine say about all times of one mechanism.
+/// Returns the noise keys of one mechanism, from its A/A pair and the machine state.
 Record NoiseKeys(const MachineState& machine, const Subject& first, const Subject& again) {
   const double rhs = AaSpread(first.rhs_ns, again.rhs_ns);
   const double wall = AaSpread(first.wall_s, again.wall_s);
@@ -287,7 +287,7 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   for (const Case& one : group.cases) {
     subjects.push_back(MakeSubject(description, one, group.simulate));
   }
-  // the A/A pair stands first and last, as far apart as two columns can be
+  // the A/A pair is first and last: maximum distance between two methods
   subjects.push_back(MakeSubject(description, group.cases.front(), group.simulate));
   for (auto& subject : subjects) subject->Prepare();
   const MachineState machine = ReadMachineState();
@@ -307,11 +307,11 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   return records;
 }
 
-// What is timed together: the columns of a scene, or of a member of a family.
+// Subjects timed together: the methods of a problem, or of a family member.
 
 namespace {
 
-/// One system per timing: parts are not timed apart.
+/// Returns one system per timing: parts are not timed separately.
 MechanismDescription OneSystem(const Experiment& experiment, std::size_t scene) {
   CompileOptions options = experiment.compile;
   options.islands = false;
@@ -328,7 +328,7 @@ void SetTimingId(const std::string& content, Record* keys) {
 
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Selection& filter) {
   std::vector<TimingGroup> groups;
-  // cases come scene by scene and, in a scene, horizon by horizon
+  // cases are ordered by problem and, within it, by horizon
   for (const Case& one : ExpandTiming(experiment)) {
     if (!Matches(one.keys, filter)) continue;
     const bool is_next = groups.empty() || groups.back().cases.back().scene != one.scene ||

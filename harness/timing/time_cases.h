@@ -1,14 +1,13 @@
-// Time of right-hand sides and of whole simulations, in runs of their own.
+// Times of right-hand sides and of whole simulations, in separate runs.
 //
-// The columns of one mechanism are measured in turn, batch by batch, so that a change of the
-// machine's speed hits all of them; minimum, median, 10th and 90th percentile are reported. The
-// first column of each mechanism is timed a second time under no name: how far it is from itself
-// (`aa_spread`, noise.h) is the least difference between columns that means anything. How fast the
-// machine was meanwhile is told by the yardstick (yardstick.h), its median between all rounds:
-// `calibration_ns` of right-hand sides, `calibration_wall_ns` of simulations. Rounds during which
-// it was slower than it is alone are measured again, for a second at most, and the quietest are
-// kept; `discarded_repetitions` are left out. Right-hand sides of scenes are evaluated at states
-// from an actual run, those of families at their moving start.
+// The methods of one mechanism are measured in turn, batch by batch, so that speed changes of the
+// machine affect all of them; minimum, median, 10th and 90th percentile are reported. The first
+// method of each mechanism is timed a second time without a name. The difference (`aa_spread`,
+// noise.h) is the smallest significant difference between methods. The calibration workload
+// (yardstick.h) measures the machine's speed, as the median between all rounds: `calibration_ns` of
+// right-hand sides, `calibration_wall_ns` of simulations. Rounds on a slowed machine are measured
+// again, for a second at most, and the quietest are kept; `discarded_repetitions` are left out.
+// Right-hand sides of problems are evaluated at states of a run; families at their moving start.
 #pragma once
 
 #include <functional>
@@ -30,8 +29,8 @@ struct TimingGroup {
   bool simulate = true;     ///< whole simulations too; families have right-hand sides alone
 };
 
-/// The timings of an experiment that pass `filter`: a group per scene (with `timing.cases` per
-/// scene and horizon), then one per member of a family. The experiment must outlive them.
+/// Returns an experiment's timings that pass `filter`: a group per problem (with `timing.cases` per
+/// problem and horizon), then one per member of a family. The experiment must outlive them.
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Selection& filter = {});
 
 inline constexpr double kBatchSeconds = 1e-3;  ///< long against the clock's resolution

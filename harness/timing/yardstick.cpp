@@ -12,8 +12,8 @@ namespace {
 constexpr int kRows = 12, kNumbers = 4096;  // of doubles: 32 KiB, a first cache
 constexpr int kFactorings = 12, kPasses = 4;
 
-// The same instructions at the same places of cache lines in every build: what a loop takes depends
-// on both by a fifth, and neither is the machine's speed. CMakeLists.txt aligns the loops.
+// The same instructions at the same offsets of cache lines in every build: either changes the time
+// of a loop by a fifth at equal machine speed. CMakeLists.txt aligns the loops.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define LOOPBENCH_ONE_CODE \
   [[gnu::noinline, gnu::aligned(64), gnu::target("arch=x86-64,tune=generic")]]
@@ -21,7 +21,7 @@ constexpr int kFactorings = 12, kPasses = 4;
 #define LOOPBENCH_ONE_CODE [[gnu::noinline, gnu::aligned(64)]]
 #endif
 
-/// L of A = L L^T, in the place of A.
+/// Computes L of A = L L^T in place of A.
 LOOPBENCH_ONE_CODE void Factor(double (*A)[kRows]) {
   for (int i = 0; i < kRows; ++i) {
     for (int j = 0; j < kRows; ++j) A[i][j] = 1.0 / (1 + i + j) + (i == j ? 20.0 : 0.0);

@@ -1,9 +1,9 @@
-// How fast the machine is at the moment, by the time of work that is always the same.
+// Calibration workload: measures the current speed of the machine by constant work.
 //
-// On a virtual machine somebody else's thread may work on the other half of the core, for
-// milliseconds or for minutes, and a processor may lower its clock. Times of a program are then a
-// third longer and nothing in them tells why. The yardstick does: one compiler
-// makes the same instructions of it in every build, at the same places of cache lines.
+// On a virtual machine another VM may share the physical core, for milliseconds or minutes, and a
+// processor may lower its clock. Program times then grow by a third without any sign of the cause.
+// The calibration reveals it: one compiler generates the same instructions at the same offsets of
+// cache lines in every build.
 #pragma once
 
 namespace loopbench::harness {
@@ -13,8 +13,8 @@ namespace loopbench::harness {
 /// three, which take some 20 us together.
 double YardstickNs();
 
-/// The least that YardstickNs() found in this process and before it was forked: how fast the
-/// machine is for whoever has it alone, as far as is known. Infinite before the first.
+/// Returns the smallest result of YardstickNs() in this process and before its fork: an estimate
+/// for an otherwise idle machine. Infinite before the first call.
 double YardstickAloneNs();
 
 }  // namespace loopbench::harness

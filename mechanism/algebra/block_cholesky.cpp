@@ -30,11 +30,11 @@ std::vector<int> MinimumDegree(int blocks, std::span<const std::pair<int, int>> 
   return {order.indices().data(), order.indices().data() + blocks};
 }
 
-/// What an order of elimination leads to: below each column the columns whose rows fill.
+/// Fill of an elimination order: for each column, the columns below whose rows fill.
 struct Elimination {
   std::vector<int> sequence, order;  ///< blocks by column, columns by block
   std::vector<std::vector<int>> below;
-  double numbers = 0.0;  ///< in L, or more than `most`, where it was given up
+  double numbers = 0.0;  ///< in L, or more than `most` if stopped
 };
 
 Elimination Eliminate(std::vector<int> sequence, const std::vector<int>& rows,
@@ -60,8 +60,8 @@ Elimination Eliminate(std::vector<int> sequence, const std::vector<int>& rows,
   return all;
 }
 
-/// By approximate minimum degree, or from the last block to the first, whatever fills less: the
-/// latter fills nothing where blocks are the joints of a tree, and the former does, a quarter more.
+/// Returns approximate minimum degree or the order from the last block to the first, whichever
+/// fills less. The latter fills nothing for the joints of a tree, the former a quarter more.
 Elimination BestElimination(const std::vector<int>& rows,
                             std::span<const std::pair<int, int>> pairs, double most) {
   const int blocks = static_cast<int>(rows.size());

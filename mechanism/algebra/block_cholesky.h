@@ -2,11 +2,10 @@
 //
 //   P A P^T = L L^T
 //
-// P orders whole blocks, once. Factors of any values then cost no memory and no search: column by
-// column from the left, each from the columns before it that have a block in its row (A. George,
+// P orders whole blocks, once. Factors of new values then need no allocation and no search: column
+// by column from the left, each from the columns before it that have a block in its row (A. George,
 // J. W. Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981, section 5.3).
-// Eigen's own sparse factors allocate whenever values change, and see numbers where there are
-// blocks.
+// Eigen's sparse factors allocate whenever values change, and store numbers instead of blocks.
 #pragma once
 
 #include <span>
@@ -17,28 +16,27 @@ namespace loopbench {
 
 class BlockCholesky {
  public:
-  /// Diagonal blocks of so many rows each; `pairs` are those (i, j), i != j, whose block is not
-  /// zero. A pair may come twice, either way round. Where L would have more than `most` numbers
-  /// none is made: numbers() is more than `most` then, and nothing else may be called.
+  /// Takes the rows of each diagonal block; `pairs` are the (i, j), i != j, with nonzero blocks. A
+  /// pair may occur twice, in either order. If L would exceed `most` numbers, none is built:
+  /// numbers() then exceeds `most`, and no other call is allowed.
   BlockCholesky(const std::vector<int>& rows, std::span<const std::pair<int, int>> pairs,
                 double most);
 
-  /// Where A is put, block by block and row by row, each time after SetZero(). Of diagonal blocks
-  /// the lower triangle is used. Of a pair one block is kept: rows of the one that FirstOf() names,
-  /// columns of the other.
+  /// Storage of A, by blocks and rows, to be filled after each SetZero(). Diagonal blocks use the
+  /// lower triangle. A pair has one block: rows of the block FirstOf(), columns of the other.
   void SetZero();
   double* Diagonal(int block) { return &L_[columns_[order_[block]].first_number]; }
   int FirstOf(int i, int j) const { return order_[i] > order_[j] ? i : j; }
-  /// Null where no such pair was given.
+  /// Returns null if there is no such pair.
   double* OffDiagonal(int i, int j);
 
-  /// False where a pivot is not positive; nothing can be solved then.
+  /// Returns false if a pivot is not positive; Solve() is then invalid.
   bool Factor();
   /// x := A^-1 x, in place, block after block as given.
   void Solve(double* x) const;
 
-  /// Of the last Factor(): a block's least pivot over what it was before other blocks were
-  /// eliminated. 0 where that failed, 1 for blocks that it did not come to.
+  /// Results of the last Factor(): a block's smallest pivot over its value before the elimination
+  /// of other blocks. 0 if the block failed, 1 if it was not reached.
   double ratio(int block) const { return ratios_[order_[block]]; }
   /// Blocks of the elimination tree down from this one, itself included.
   int eliminated(int block) const { return columns_[order_[block]].eliminated; }
@@ -75,13 +73,13 @@ class BlockCholesky {
   void SolveColumns(double* x) const;
 
   int size_ = 0;
-  int uniform_ = 0;  ///< rows of every block; 0 where they differ
+  int uniform_ = 0;  ///< rows of every block; 0 if they differ
   double numbers_ = 0.0, operations_ = 0.0;
   std::vector<int> order_;  ///< column of each block
   std::vector<Column> columns_;
   std::vector<Below> below_;
   std::vector<Left> left_;
-  std::vector<int> number_of_;      ///< by column: where the present one has its row in L_
+  std::vector<int> number_of_;      ///< by column: index in L_ of the present column's row
   std::vector<double> L_, ratios_;  ///< ratios_ by column
 };
 

@@ -1,7 +1,7 @@
-// Eigen's decompositions of double matrices that tell a rank, a null space or the least solution,
-// compiled once for all who need one: they serve where matrices and right sides are MatrixXd and
-// VectorXd themselves. Singular values by these are for matrices with hundreds of rows, for which
-// Jacobi's of singular_values.h takes too long.
+// Eigen's decompositions of double matrices for rank, null space or minimum-norm solution, compiled
+// once for all users: matrices and right sides are MatrixXd and VectorXd themselves. Use these
+// singular values for matrices with hundreds of rows, for which the Jacobi method of
+// singular_values.h takes too long.
 #pragma once
 
 #include <Eigen/QR>
@@ -19,8 +19,8 @@ extern template void Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>::_s
 
 namespace loopbench {
 
-/// As many orthonormal columns as the factored matrix has independent ones at most: those of Q that
-/// span its range.
+/// Returns the columns of Q that span the range of the factored matrix: orthonormal, at most as
+/// many as its independent columns.
 Eigen::MatrixXd ThinQ(const Eigen::HouseholderQR<Eigen::MatrixXd>& qr);
 
 }  // namespace loopbench

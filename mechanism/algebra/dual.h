@@ -2,9 +2,9 @@
 // evaluated with them computes its own derivatives to round-off (forward differentiation; A.
 // Griewank, A. Walther, Evaluating Derivatives, 2008, ch. 3).
 //
-// Comparisons look at values alone, so that a program takes the same branches as with `double`; a
-// derivative is then that of the branch. That of sqrt(0), which does not exist, is zero: it does no
-// harm to a force |v| v of no speed.
+// Comparisons use values alone, so that a program takes the same branches as with `double` and
+// derivatives belong to that branch. The derivative of sqrt(0), which does not exist, is set to
+// zero: this suits a force |v| v at zero speed.
 #pragma once
 
 #include <Eigen/Core>
@@ -89,7 +89,7 @@ struct Dual {
   }
   friend Dual abs(const Dual& x) { return x.value < 0.0 ? -x : x; }
   friend Dual round(const Dual& x) { return std::round(x.value); }
-  /// Of x over a constant.
+  /// Remainder of x over a constant.
   friend Dual remainder(const Dual& x, const Dual& y) {
     return {std::remainder(x.value, y.value), x.partials};
   }

@@ -1,6 +1,6 @@
-// Eigen's factorisations of matrices of any size, compiled once per scalar for all who need them: a
-// file that instantiates one by itself takes the compiler seconds longer. They serve where the
-// matrix given to `compute` or to the constructor is of the types below.
+// Eigen's factorisations of matrices of any size, compiled once per scalar for all users: each
+// instantiation elsewhere costs seconds of compile time. For matrices of the types below in
+// `compute` or the constructor.
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -1,7 +1,6 @@
-// Which (space, scalar) pairs the templates are compiled for: double, unless the build has put
-// other macros before everything else (harness/precision/scalars.h). The mechanism model, all that
-// the equations of motion are made of, is compiled for dual numbers as well (forward_jacobian.h);
-// solvers are not.
+// (space, scalar) pairs for which templates are compiled: double, unless the build defines other
+// macros first (harness/precision/scalars.h). The mechanism model, which forms the equations of
+// motion, is also compiled for dual numbers (forward_jacobian.h); solvers are not.
 #pragma once
 
 #ifndef LOOPBENCH_FOR_EACH_SCALAR

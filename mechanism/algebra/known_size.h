@@ -16,13 +16,13 @@ template <int first, int... others, class Call>
   }
 }
 
-/// The same of a size that is a constant already.
+/// Does the same for a size that is already constant.
 template <int... known, int n, class Call>
 [[gnu::always_inline]] inline auto WithSize(std::integral_constant<int, n> size, const Call& call) {
   return call(size);
 }
 
-/// What `call` was given, if it was a constant, else 0.
+/// Returns the argument of `call` if it was a constant, else 0.
 template <class Size>
 inline constexpr int kKnownSize = 0;
 template <int n>

@@ -1,6 +1,6 @@
-// Numbers side by side, as many as one instruction takes: 8 with AVX-512, 4 with AVX, else 2. The
-// compilers' own vectors (GCC, clang): + - * / take them like numbers, lane by lane, and a number
-// beside them stands for all lanes. A template over T = double or Lanes is one kernel for both.
+// SIMD lanes, as many as one instruction takes: 8 with AVX-512, 4 with AVX, else 2. The compilers'
+// own vectors (GCC, clang): + - * / work lane by lane, and a scalar operand applies to all lanes. A
+// template over T = double or Lanes is one kernel for both.
 #pragma once
 
 #include <bit>
@@ -22,13 +22,13 @@ inline constexpr int kLanes = 2;
 #endif
 
 using Lanes [[gnu::vector_size(kLanes * sizeof(double))]] = double;
-/// The bits of such numbers, and what comparing them gives: all ones for true.
+/// Bit patterns of such numbers and comparison results: all ones for true.
 using LaneBits [[gnu::vector_size(kLanes * sizeof(double))]] = std::int64_t;
 
 template <class T>
 using BitsOf = std::conditional_t<std::is_same_v<T, double>, std::int64_t, LaneBits>;
 
-/// What comparing them gives: bool, or for each lane all ones or none.
+/// Comparison result: bool, or for each lane all ones or zeros.
 template <class T>
 using TruthOf = std::conditional_t<std::is_same_v<T, double>, bool, LaneBits>;
 inline bool Any(bool truth) { return truth; }
@@ -38,7 +38,7 @@ inline bool Any(const LaneBits& truth) {
   return any != 0;
 }
 
-/// As many numbers as T has, from and to memory that need not be aligned.
+/// Loads and stores as many numbers as T has; memory need not be aligned.
 template <class T>
 inline T Load(const double* from) {
   T value;
@@ -50,7 +50,7 @@ inline void Store(const T& value, double* to) {
   std::memcpy(to, &value, sizeof(T));
 }
 
-/// One lane of a struct of Lanes, which is a struct of numbers.
+/// Extracts one lane of a struct of Lanes as a struct of numbers.
 template <template <class> class Struct>
 inline void SetLane(Struct<Lanes>& pack, int lane, const Struct<double>& one) {
   static_assert(sizeof(pack) == kLanes * sizeof(one));
@@ -116,11 +116,11 @@ inline double Smallest(const Lanes& a) {
 /// Angles [rad] beyond which SinCos() must not be asked.
 inline constexpr double kLargestAngle = 1e6;
 
-/// Sine and cosine of |x| <= kLargestAngle, wrong by at most 1.1 units in the last place (1.02 is
-/// the most of some millions of trials), the same bits in every lane and for one number. The
-/// quarter turns are taken off in three parts, of which multiples up to 2^20 are exact (W. J. Cody,
-/// W. Waite, Software Manual for the Elementary Functions, 1980); coefficients for what is left, at
-/// most pi/4, are those of fdlibm (Sun Microsystems, 1993, k_sin.c and k_cos.c).
+/// Returns sine and cosine of |x| <= kLargestAngle with an error of at most 1.1 units in the last
+/// place (1.02 in some millions of trials); the same bits in every lane and for a single number.
+/// Quarter turns are subtracted in three parts, whose multiples up to 2^20 are exact (W. J. Cody,
+/// W. Waite, Software Manual for the Elementary Functions, 1980). Coefficients for the rest, at
+/// most pi/4, are from fdlibm (Sun Microsystems, 1993, k_sin.c and k_cos.c).
 template <class T>
 LOOPBENCH_INLINE void SinCos(const T& x, T& sine, T& cosine) {
   using Bits = BitsOf<T>;

@@ -1,7 +1,7 @@
-// Cholesky factors of matrices of a few rows, A = L L^T, where Eigen's general forms take longer to
-// find out how small they are than to work. Numbers stand by columns; only lower triangles are read
-// and written, and diagonals of L hold their reciprocals. The sizes 2, 4 and 5, rows of one pin or
-// two in the plane and of one in space, are constants.
+// Cholesky factors of matrices of a few rows, A = L L^T, for which Eigen's general forms have too
+// much overhead. Storage is by columns; only lower triangles are read and written, and diagonals of
+// L hold their reciprocals. The sizes 2, 4 and 5 are constants: rows of one or two planar pins and
+// of one in space.
 #pragma once
 
 #include <algorithm>
@@ -63,7 +63,7 @@ void SolveLowerTransposed(const S* L, Size size, T* x) {
   });
 }
 
-/// x := L x, L being as it is: an inverse, for instance.
+/// Computes x := L x for a general L, such as an inverse.
 template <class S>
 void MultiplyLower(const S* L, int size, S* x) {
   WithSize<2, 4, 5>(size, [=](auto n) {
@@ -87,7 +87,7 @@ void MultiplyLowerTransposed(const S* L, int size, S* x) {
   });
 }
 
-/// L^-1 in L's place, with the diagonal that it has.
+/// Replaces L by L^-1, including its diagonal.
 template <class S>
 void InvertLower(S* L, int size) {
   WithSize<2, 4, 5>(size, [=](auto n) {

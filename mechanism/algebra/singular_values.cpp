@@ -26,7 +26,7 @@ S Product(const MatrixX<S>& A, Index p, Index q) {
   return A.col(p).dot(A.col(q));
 }
 
-/// A column from some row on, times the reflection I - tau v v^T, v[0] = 1.
+/// Applies the reflection I - tau v v^T, v[0] = 1, to a column from some row on.
 template <class S>
 void Reflect(const S* v, const S& tau, Index size, S* column) {
   const Eigen::Map<const VectorX<S>> rest(v + 1, size - 1);
@@ -58,7 +58,7 @@ void SingularValues<S>::Decompose(const MatrixX<S>& A, bool vectors) {
     qr_ = A;
   }
   const Index size = qr_.cols();
-  // squares of what is nearly the largest number, or the smallest, would be none
+  // squares near the largest or smallest number would overflow or underflow
   S scale = S(0);
   for (Index i = 0; i < qr_.size(); ++i) {
     using std::abs;
@@ -109,7 +109,7 @@ void SingularValues<S>::TriangulariseWithPivots() {
   }
 }
 
-/// True when a pair of columns was turned: their cosine was above the round-off of a product of
+/// Returns true if a pair of columns was rotated: its cosine exceeded the round-off of a product of
 /// columns, which grows as the root of their size.
 template <class S>
 bool SingularValues<S>::Sweep(bool vectors) {
@@ -121,7 +121,7 @@ bool SingularValues<S>::Sweep(bool vectors) {
     for (Index q = p + 1; q < W_.cols(); ++q) {
       if (squares_[p] < LeastSquare<S>() || squares_[q] < LeastSquare<S>()) continue;
       const S product = Product(W_, p, q);
-      // not so for what is not a number either
+      // also skips NaN
       if (!(abs(product) > negligible * sqrt(squares_[p]) * sqrt(squares_[q]))) continue;
       turned = true;
       Rotate(p, q, product, vectors);

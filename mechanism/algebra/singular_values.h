@@ -5,9 +5,9 @@
 //   A P = Q R,   R^T J = W = U' Sigma,   A = (Q J) Sigma (P U')^T,
 //
 // where the rotations J make the columns of W orthogonal to each other. Columns are compared with
-// their own lengths, not with the whole matrix, so that small singular values of a graded matrix
-// keep their digits, which those of bidiagonal or two-sided methods lose. In every scalar, and in a
-// source of its own: Eigen's decompositions take the compiler half a minute per scalar.
+// their own lengths, not with the whole matrix. Small singular values of a graded matrix thus keep
+// their digits; bidiagonal or two-sided methods lose them. In every scalar, in a separate source:
+// Eigen's decompositions compile for half a minute per scalar.
 #pragma once
 
 #include "mechanism/algebra/space.h"
@@ -17,11 +17,11 @@ namespace loopbench {
 template <class S>
 class SingularValues {
  public:
-  /// A = U diag(sigma) V^T with U and V square and orthogonal, sigma descending and not negative.
-  /// Allocates only where the shape of A is another than before. What is not finite yields what is
-  /// not finite.
+  /// Computes A = U diag(sigma) V^T with U and V square and orthogonal, sigma descending and not
+  /// negative. Allocates only if the shape of A has changed. Non-finite input yields non-finite
+  /// output.
   void Compute(const MatrixX<S>& A);
-  /// The same without U and V.
+  /// Does the same without U and V.
   void ComputeValues(const MatrixX<S>& A);
 
   const VectorX<S>& sigma() const { return sigma_; }  ///< min(rows, columns) of them

@@ -1,6 +1,6 @@
-// Vectors and matrices of a few numbers, as kinematics has them: loops of a known length that the
-// compiler unrolls, and nothing else. Eigen is for what is larger or of a size known at run time:
-// expressions of such sizes took half of the time to compile the files that hold them.
+// Vectors and matrices of a few numbers for kinematics: loops of a known length that the compiler
+// unrolls. Eigen is for larger or run-time sizes: its expressions of small sizes took half of the
+// compile time of the files that contain them.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@ namespace loopbench {
 #define LOOPBENCH_INLINE [[gnu::always_inline]] inline
 #define LOOPBENCH_UNROLL _Pragma("GCC unroll 9")
 
-/// rows x columns numbers, by columns. Not initialised unless told to be.
+/// Matrix of rows x columns numbers, stored by columns. Not initialised by default.
 template <class S, int rows, int columns = 1>
 struct Small {
   static constexpr int kSize = rows * columns;
@@ -21,7 +21,7 @@ struct Small {
   S at[kSize];
 
   Small() = default;
-  /// All numbers, row by row.
+  /// Takes all numbers, row by row.
   template <std::convertible_to<S>... Numbers>
   requires(sizeof...(Numbers) == kSize) LOOPBENCH_INLINE explicit(kSize == 1)
       Small(const Numbers&... numbers) {
@@ -107,7 +107,7 @@ struct Small {
     using std::sqrt;
     return sqrt(squaredNorm());
   }
-  /// Whether all numbers are zero but for rounding, where others are about one.
+  /// Returns true if all numbers are zero up to rounding, relative to one.
   bool isZero() const {
     using std::abs;
     for (const S& number : at) {
@@ -115,7 +115,7 @@ struct Small {
     }
     return true;
   }
-  /// Of length one; what has no length stays zero.
+  /// Returns the vector scaled to length one; a zero vector stays zero.
   Small normalized() const {
     const S length = norm();
     return length > S(0) ? *this / length : *this;

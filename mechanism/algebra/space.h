@@ -2,8 +2,8 @@
 //
 // Notation (docs/glossary.md): p_WB position of B's centre of mass from the ground origin, R_WB
 // orientation of B, V = [w; v] velocity of a body at a point, F = [moment; force] at a point; all
-// in ground axes unless the name says otherwise. In the plane w and moments have one component, in
-// space three; "Dim" is the number of components of a motion: 3 or 6.
+// in ground axes unless the name has another suffix. In the plane w and moments have one component,
+// in space three; "Dim" is the number of components of a motion: 3 or 6.
 #pragma once
 
 #include <Eigen/Core>
@@ -92,7 +92,7 @@ LOOPBENCH_INLINE Pose<Spatial, S> Inverse(const Pose<Spatial, S>& X_AB) {
   return X;
 }
 
-/// Orientation of the quaternion w x y z of any length; that of no length turns nothing.
+/// Returns the orientation of a quaternion w x y z of any length; zero length gives the identity.
 template <class S>
 Rotation<Spatial, S> FromQuaternion(const S* q) {
   using std::sqrt;

@@ -1,5 +1,5 @@
 // Velocities, accelerations and forces of bodies as pairs of an angular and a linear part, in the
-// plane and in space. Each is a type of its own: what has no meaning does not compile.
+// plane and in space. Each has its own type: meaningless operations do not compile.
 #pragma once
 
 #include "mechanism/algebra/small_matrix.h"
@@ -11,14 +11,14 @@ using Angular = Small<S, Space::kRot>;
 template <class Space, class S>
 using Linear = Small<S, Space::kLin>;
 
-/// What a pair is. A direction, a column of a joint's H or D, becomes any of the three by being
-/// multiplied with a speed, an acceleration or a force.
+/// Type tags of a pair. A direction, a column of a joint's H or D, becomes a velocity, an
+/// acceleration or a force when multiplied with a speed, an acceleration or a force.
 struct VelocityKind {};
 struct AccelerationKind {};
 struct ForceKind {};
 struct DirectionKind {};
 
-/// What is shifted as a velocity is, and what as a force.
+/// Pairs that shift like a velocity, and pairs that shift like a force.
 template <class Kind>
 concept KindOfMotion = !std::same_as<Kind, ForceKind>;
 template <class Kind>
@@ -35,7 +35,7 @@ struct SpatialVector {
   SpatialVector() = default;
   LOOPBENCH_INLINE SpatialVector(const Angular<Space, S>& about, const Linear<Space, S>& along)
       : angular(about), linear(along) {}
-  /// A direction serves as any kind.
+  /// Converts a direction to any kind.
   template <std::same_as<DirectionKind> Other>
   LOOPBENCH_INLINE SpatialVector(const SpatialVector<Space, S, Other>& direction)
       : angular(direction.angular), linear(direction.linear) {}
@@ -69,7 +69,7 @@ struct SpatialVector {
   requires HaveProduct<Kind, Other> LOOPBENCH_INLINE S
   dot(const SpatialVector<Space, S, Other>& other)
   const { return angular.dot(other.angular) + linear.dot(other.linear); }
-  /// Of all components, whatever their units: for sizes and tolerances.
+  /// Squared norm over all components regardless of units: for sizes and tolerances.
   S squaredNorm() const { return angular.squaredNorm() + linear.squaredNorm(); }
   S norm() const {
     using std::sqrt;
@@ -168,16 +168,16 @@ LOOPBENCH_INLINE Small<S, 3> CrossAngular(const Small<S, 3>& a, const Small<S, 3
   return a.cross(b);
 }
 
-/// Velocity of a body at c + r from that at c: [w; v + w x r]. Accelerations likewise, without the
-/// centripetal part, and directions of motion.
+/// Returns the velocity of a body at c + r from its velocity at c: [w; v + w x r]. Also for
+/// accelerations, without the centripetal part, and directions of motion.
 template <class Space, class S, KindOfMotion Kind>
 LOOPBENCH_INLINE SpatialVector<Space, S, Kind> ShiftMotion(const SpatialVector<Space, S, Kind>& V,
                                                            const Linear<Space, S>& r) {
   return {V.angular, V.linear + Cross<S>(V.angular, r)};
 }
 
-/// The same force at c instead of c + r: [moment + r x f; f]. The transpose of ShiftMotion().
-/// Directions of forces likewise.
+/// Returns the same force at c instead of c + r: [moment + r x f; f]. The transpose of
+/// ShiftMotion(). Also for directions of forces.
 template <class Space, class S, KindOfForce Kind>
 LOOPBENCH_INLINE SpatialVector<Space, S, Kind> ShiftForce(const SpatialVector<Space, S, Kind>& F,
                                                           const Linear<Space, S>& r) {
@@ -195,8 +195,8 @@ LOOPBENCH_INLINE SpatialVector<Space, S, Kind> Rotate(const Rotation<Space, S>& 
   }
 }
 
-/// The product of a block and a pair, as the kind that the caller knows it to be: an inertia takes
-/// velocities to momenta and accelerations to forces, its inverse goes back.
+/// Returns the product of a block and a pair, as the kind given by the caller: an inertia maps
+/// velocities to momenta and accelerations to forces, its inverse maps back.
 template <class Result, class Space, class S, class Kind>
 LOOPBENCH_INLINE Result Apply(const Block<Space, S>& A, const SpatialVector<Space, S, Kind>& x) {
   Result product;
@@ -210,7 +210,7 @@ LOOPBENCH_INLINE Result Apply(const Block<Space, S>& A, const SpatialVector<Spac
   return product;
 }
 
-/// The same for a block of which only the rotational part and the linear diagonal are not zero.
+/// Does the same for a block with only a rotational part and a linear diagonal.
 template <class Result, class Space, class S, class Kind>
 LOOPBENCH_INLINE Result ApplyDiagonal(const Block<Space, S>& A,
                                       const SpatialVector<Space, S, Kind>& x) {

@@ -19,9 +19,9 @@ using Square = Eigen::Ref<MatrixX<S>>;
 template <class S>
 using Column = Eigen::Ref<VectorX<S>>;
 
-/// A = Q T Q^T with T tridiagonal. Leaves T's diagonal in `diagonal` and what is above it in place;
-/// below, column k has the v and A(k, k) the tau of its reflection I - tau v v^T of the rows from
-/// k + 1 on. `work` has room for a column.
+/// A = Q T Q^T with T tridiagonal. Leaves T's diagonal in `diagonal` and its superdiagonal in
+/// place. Below, column k has the v and A(k, k) the tau of its reflection I - tau v v^T of the rows
+/// from k + 1 on. `work` has room for a column.
 template <class S>
 void MakeTridiagonal(Square<S> A, Column<S> diagonal, Column<S> work) {
   using std::sqrt;
@@ -103,8 +103,8 @@ void QrStep(Column<S> d, Column<S> e, Index first, Index last, Square<S> U) {
   }
 }
 
-/// Diagonalises T of diagonal d, beside it e, with U := U G. Gives up after thirty steps for each
-/// eigenvalue, of which two are usual.
+/// Diagonalises T with diagonal d and off-diagonal e, with U := U G. Stops after thirty steps for
+/// each eigenvalue; two are usual.
 template <class S>
 void Diagonalise(Column<S> d, Column<S> e, Square<S> U) {
   using std::abs;

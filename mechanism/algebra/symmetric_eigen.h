@@ -8,9 +8,9 @@
 
 namespace loopbench {
 
-/// A = U diag(lambda) U^T with lambda ascending, for some 9 n^3 operations. Errors are round-off of
-/// the largest eigenvalue. A is destroyed; all sizes must be set. What is not finite yields what is
-/// not finite.
+/// Computes A = U diag(lambda) U^T with lambda ascending, in about 9 n^3 operations. Errors are
+/// round-off of the largest eigenvalue. A is destroyed; all sizes must be set. Non-finite input
+/// yields non-finite output.
 template <class S>
 void SymmetricEigen(Eigen::Ref<MatrixX<S>> A, Eigen::Ref<MatrixX<S>> U,
                     Eigen::Ref<VectorX<S>> lambda);

@@ -7,8 +7,8 @@ namespace loopbench {
 namespace {
 
 constexpr int kOver = -1;
-/// Looks at an atomic before a thread sleeps, some 20 to 60 us where there is a pause to make:
-/// rounds of one evaluation follow each other within a few, and to be woken takes as long.
+/// Number of polls of an atomic before a thread sleeps, about 20 to 60 us with pauses: rounds of
+/// one evaluation follow within a few, and waking takes as long.
 constexpr int kLooks = 1000;
 
 void Pause() {

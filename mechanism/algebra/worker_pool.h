@@ -1,11 +1,10 @@
-// Threads that share the pieces of one piece of work, and wait for the next one.
+// Threads that share the pieces of a task and wait for the next task.
 //
-// Workers spin for some microseconds after their work, which is longer than what lies between two
-// rounds of one right-hand side, and then sleep. Which thread does which piece is fixed by their
-// numbers alone, so pieces find in its cache what they left there. What is computed must not
-// depend on it: pieces write to places of their own, and what they add up is added by the caller,
-// in their order. A process that forks has no workers in its child: a pool is to be made where it
-// is used.
+// Workers spin for some microseconds after their work, longer than the time between two rounds of
+// one right-hand side, and then sleep. Numbers alone assign pieces to threads, so pieces find their
+// data in the cache. Results must not depend on the assignment: each piece has its own output, and
+// the caller adds sums up in order. After a fork the child has no workers: create a pool in the
+// process that uses it.
 #pragma once
 
 #include <atomic>
@@ -16,8 +15,8 @@ namespace loopbench {
 
 class WorkerPool {
  public:
-  /// `threads` at work, the caller's among them: threads - 1 are started. Throws std::system_error
-  /// where the system refuses one.
+  /// Starts threads - 1 workers; the caller is one of the `threads`. Throws std::system_error if
+  /// the system cannot start one.
   explicit WorkerPool(int threads);
   ~WorkerPool();
   WorkerPool(const WorkerPool&) = delete;
@@ -29,7 +28,7 @@ class WorkerPool {
   /// all are done. From one thread at a time; `do_piece` must not throw. Allocates nothing.
   template <class Work>
   void ForEach(int pieces, const Work& do_piece) {
-    // one function for one thread and for many: what is compiled twice may round differently
+    // one function for any number of threads: two compiled versions may round differently
     const auto range = [](const void* work, int first, int last) {
       for (int i = first; i < last; ++i) (*static_cast<const Work*>(work))(i);
     };
@@ -51,7 +50,7 @@ class WorkerPool {
 
   std::vector<std::thread> workers_;
   Round round_;  ///< written before rounds_ grows, read after
-  /// Begun so far; -1: all is over. What many look at has cache lines of its own.
+  /// Rounds begun so far; -1: finished. Shared by many threads, hence on its own cache lines.
   alignas(64) std::atomic<int> rounds_ = 0;
   alignas(64) std::atomic<int> at_work_ = 0;  ///< workers that have yet to do their share
 };

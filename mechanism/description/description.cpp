@@ -24,7 +24,7 @@ std::string CheckBody(const BodyDescription& body) {
   return "";
 }
 
-/// A planar scene turns about z only: anything that tips or leaves the plane is refused.
+/// A planar problem turns about z only: rejects tilts and offsets from the plane.
 std::string CheckPlanarJoint(const JointDescription& joint) {
   if (!TraitsOf(joint.type).in_plane) {
     return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) +

@@ -1,8 +1,8 @@
-// What a user says about a mechanism: plain data, SI units, angles in rad, no algorithm.
+// User's description of a mechanism: plain data, SI units, angles in rad, no algorithm.
 //
-// A planar scene is described with the same 3-vectors as a spatial one (z = 0, rotation about z),
-// so that one description can be compiled into either space (mechanism.h). Index 0 of `bodies` is
-// always Ground.
+// A planar problem uses the same 3-vectors as a spatial one (z = 0, rotation about z), so that one
+// description can be compiled into either space (mechanism.h). Index 0 of `bodies` is always
+// Ground.
 #pragma once
 
 #include <Eigen/Core>
@@ -45,13 +45,13 @@ struct JointDescription {
   JointType type = JointType::kRevolute;
   JointSide from;  ///< P and F
   JointSide to;    ///< Q and M
-  /// Joint axis in the axes of both frames before alignment: the joint's own axis (JointTraits) is
-  /// turned onto it. Zero means the own axis as it is.
+  /// Joint axis in the axes of both frames before alignment, which turns the joint's own axis
+  /// (JointTraits) onto it. Zero means the own axis, unchanged.
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();
   double parameter = 0.0;  ///< of its kind (JointParameter): a pitch [m/rad], a length [m]
   bool cut = false;        ///< never part of the spanning tree (if the graph allows)
-  /// Constrained directions, counted in the order of joint.h's D from 0, that the joint does not
-  /// impose because the others do (redundancy.h). Of cut joints only; none of a user's file.
+  /// Constrained directions, counted from 0 in the order of joint.h's D, that the joint does not
+  /// impose because they are redundant (redundancy.h). Only for cut joints; never in a user's file.
   std::vector<int> released;
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
@@ -64,8 +64,8 @@ struct JointValues {
 
 /// Partial initial data; the rest is assembled (assembly.h).
 struct InitialDescription {
-  std::vector<JointValues> coordinates;  ///< guesses, or exact where the joint is held
-  std::vector<JointValues> speeds;       ///< all of them are held
+  std::vector<JointValues> coordinates;  ///< guesses, or exact if the joint is fixed
+  std::vector<JointValues> speeds;       ///< all of them are fixed
   std::vector<int> held;                 ///< joints whose coordinates the assembly must not move
 };
 
@@ -77,23 +77,23 @@ struct MechanismDescription {
   std::vector<JointDescription> joints;
   std::vector<ForceDescription> forces;
   InitialDescription initial;
-  /// Names of speeds that a fixed coordinate reduction takes as independent: joint names for joint
-  /// coordinates ("OA"), "<body>.angle", "<body>.x", ... for absolute ones. Those that do not
-  /// belong to the coordinate set in use are skipped; none at all means: chosen at the start.
+  /// Names of independent speeds of a fixed coordinate reduction: joint names for joint coordinates
+  /// ("OA"), "<body>.angle", "<body>.x", ... for absolute ones. Names of another coordinate set are
+  /// skipped; without names, they are chosen at the start.
   std::vector<std::string> independent;
   /// Accuracy of points, axes and initial values [rad, or lengths of the mechanism]: loops that
   /// close within it are closed, and constraints that differ by less depend on each other.
   double accuracy = 1e-5;
-  /// Whether released directions hold within `accuracy` only, so that they are no constraints.
+  /// True if released directions hold within `accuracy` only, so that they are no constraints.
   bool rounded = false;
 };
 
 /// A copy in which all constrained directions are imposed, unless the description is rounded.
 MechanismDescription Unreleased(const MechanismDescription& description);
 
-/// First thing that makes the description unusable, as text ("" when it is usable): masses and
-/// inertias not positive, joints of a body with itself, forces or values on joints of another size,
-/// a planar scene with parts out of plane, non-finite numbers.
+/// Returns the first error of the description as text ("" if it is valid): masses and inertias not
+/// positive, joints of a body with itself, forces or values on joints of another size, a planar
+/// problem with parts out of plane, non-finite numbers.
 std::string Validate(const MechanismDescription& description);
 
 }  // namespace loopbench

@@ -1,9 +1,9 @@
-// Forces: a struct each, and behind it what it is made of.
+// Forces: a struct for each kind, followed by its parameters.
 //
-// Readers, schemas, validation, change of scale, `explain` and the compile step know the parts of a
-// force alone: a joint, points of bodies, numbers with their units, a vector, a function of time.
-// What a force does with them stands in mechanism/model/force_NAME.h. Other programs add kinds of
-// their own (mechanism/model/registry.h).
+// Readers, schemas, validation, change of scale, `explain` and preprocessing use only the
+// parameters of a force: a joint, points of bodies, numbers with units, a vector, a function of
+// time. Its mechanics is in mechanism/model/force_NAME.h. User-defined kinds:
+// mechanism/model/registry.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -28,8 +28,8 @@ struct BodyPoint {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< in body axes from the body's origin [m]
 };
 
-/// What a number of a force is: its unit at a joint that turns and its unit elsewhere, with the
-/// powers of length in them, a force counting as one. By these it grows when all lengths do and
+/// Dimension of a number of a force: its unit at a rotating joint, its unit elsewhere, and its
+/// power of length, a force counting as one. Numbers scale by this power when all lengths scale and
 /// angles move as before (similarity.h).
 struct Quantity {
   std::string_view of_angle, of_length;
@@ -55,7 +55,7 @@ inline constexpr Quantity kForcePerSpeed = {"N s/m", "N s/m", 0, 0};
 inline constexpr Quantity kForcePerSpeedSquared = {"N s^2/m^2", "N s^2/m^2", -1, -1};
 }  // namespace quantity
 
-/// Whether files must give a part: always, at least one of those marked so, or not at all.
+/// Requirement on a part in files: always, at least one of the parts marked so, or optional.
 enum class Need { kAlways, kOneOf, kNot };
 
 struct ForceNumber {
@@ -67,11 +67,11 @@ struct ForceNumber {
   bool any_sign = false;  ///< else it must not be negative
 };
 
-/// The parts of one force; what it has not is null or empty.
+/// Parts of one force; missing ones are null or empty.
 struct ForceParts {
-  std::string_view name, sentence;  ///< in files; what it is
-  int* joint = nullptr;             ///< one with one coordinate, along which it acts
-  /// Where it acts: on one body, which is not Ground, or between two different ones, from and to.
+  std::string_view name, sentence;  ///< name in files; description
+  int* joint = nullptr;             ///< joint with one coordinate, along which the force acts
+  /// Points of action: on one body other than Ground, or between two different bodies, from and to.
   std::vector<BodyPoint*> points = {};
   TimeFunctionDescription* value = nullptr;  ///< of time: an effort
   Eigen::Vector3d* force = nullptr;          ///< a vector [N], in axes of ground or of the body
@@ -138,8 +138,8 @@ inline ForceParts PartsOf(PointForce& f) {
 
 /// Spring and damper between points of two bodies: with their distance d, the tension
 ///   T = preload + stiffness (d - length) + damping ddot
-/// pulls them together (T < 0 pushes them apart). Where the points meet, d = 0, there is no
-/// direction to pull in and no force: an equilibrium, by the symmetry of all directions, and
+/// pulls them together (T < 0 pushes them apart). If the points coincide, d = 0, there is no
+/// direction and no force: an equilibrium, by the symmetry of all directions, and
 /// unless T is proportional to d a jump that an integrator meets as such.
 struct SpringDamper {
   BodyPoint from, to;      ///< of different bodies; one may be Ground
@@ -176,7 +176,7 @@ inline ForceParts PartsOf(Drag& f) {
                       {"quadratic", &f.quadratic, quantity::kForcePerSpeedSquared, Need::kOneOf}}};
 }
 
-/// What compiles a kind of another program (mechanism/model/registry.h).
+/// Compiles a user-defined kind of force (mechanism/model/registry.h).
 struct ForceCompiler;
 
 /// A force of such a kind: its own struct, of which the parts are known.
@@ -201,21 +201,21 @@ class OtherForce {
 using ForceDescription =
     std::variant<JointTorque, JointSpring, JointDamper, PointForce, SpringDamper, Drag, OtherForce>;
 
-/// Parts of a force, which stays where it is while they are used. Who may not change it takes them
-/// of a copy.
+/// Returns the parts of a force, which must not move while they are used. For a const force, use a
+/// copy.
 inline ForceParts PartsOf(ForceDescription& force) {
   return std::visit([](auto& one) { return PartsOf(one); }, force);
 }
 
-/// One force of each kind, of which nothing is said: the built-in kinds, then those of other
-/// programs. They stay where they are.
+/// Returns one default force of each kind: the built-in kinds, then user-defined ones. References
+/// stay valid.
 const std::deque<ForceDescription>& ForceKinds();
-/// RegisterForce() is what programs call: a kind needs an element too.
+/// Adds a kind. Programs call RegisterForce() instead: a kind needs an element too.
 void AddForceKind(OtherForce force);
 
 struct MechanismDescription;
-/// "" or what makes a force unusable: joints with several coordinates, points of bodies that do not
-/// exist or of Ground, negative numbers, parts out of the plane, non-finite numbers.
+/// Returns "" or the reason why a force is invalid: joints with several coordinates, points of no
+/// body or of Ground, negative numbers, parts out of the plane, non-finite numbers.
 std::string ValidateForce(const MechanismDescription& description, ForceDescription force);
 
 }  // namespace loopbench

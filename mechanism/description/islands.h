@@ -1,4 +1,4 @@
-// Which bodies have to do with each other: the graph of bodies and joints without Ground.
+// Connected components: the graph of bodies and joints without Ground.
 #pragma once
 
 #include <vector>
@@ -13,12 +13,12 @@ struct Island {
   bool grounded = false;    ///< a joint leads to Ground; otherwise the part floats
 };
 
-/// What makes two bodies one island.
+/// Connections that put two bodies into one island.
 enum class Connection { kJoints, kJointsAndForces };
 
-/// The islands in the order of their first bodies; every body but Ground is in exactly one.
+/// Returns the islands in the order of their first bodies; each body except Ground is in just one.
 ///
-/// Forces that this file does not know are taken to connect all bodies.
+/// User-defined forces are assumed to connect all bodies.
 std::vector<Island> FindIslands(const MechanismDescription& description,
                                 Connection connection = Connection::kJointsAndForces);
 

@@ -23,8 +23,8 @@ struct Frame {
 /// The frame of a side in body axes, the joint's axis not included.
 Frame PoseOf(const JointSide& side);
 
-/// Turns a joint's own axis (JointTraits) onto the described one, by the shortest rotation. The
-/// joint's frames are those of PoseOf() times this.
+/// Returns the shortest rotation of a joint's own axis (JointTraits) onto the described one. The
+/// joint's frames are the frames of PoseOf() times this.
 Eigen::Matrix3d AxisAlignment(const JointDescription& joint);
 
 }  // namespace loopbench

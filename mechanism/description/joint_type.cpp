@@ -72,7 +72,7 @@ std::deque<JointTraits>& Rows() {
   return rows;
 }
 
-/// "angle" and "wx" are of rotations, "qw" has no unit, what is left are lengths.
+/// Returns the unit: "angle" and "wx" are rotations, "qw" has no unit, all others are lengths.
 std::string_view UnitOf(std::string_view word, bool speed) {
   if (word.front() == 'q') return "";
   const bool turns = word.front() == 'a' || word.front() == 'w';

@@ -1,6 +1,5 @@
-// The kinds of joints, a row each: what files and users call it and its coordinates, and what is
-// to know of it besides how it moves. That stands in mechanism/model/joint.h, and a test holds the
-// two together.
+// The kinds of joints: names of the kind and its coordinates for files and users, and properties
+// other than its motion. The motion is in mechanism/model/joint.h; a test compares the two.
 #pragma once
 
 #include <deque>
@@ -12,7 +11,7 @@ namespace loopbench {
 enum class SpaceKind { kPlanar, kSpatial };
 std::string_view ToString(SpaceKind space);
 
-/// What a joint leaves free. Kinds of other programs have the numbers after these.
+/// Kinds of joints, by free motions. User-defined kinds have the numbers after these.
 enum class JointType {
   kRevolute,
   kPrismatic,
@@ -32,14 +31,14 @@ struct SideWords {
   std::string_view from = "", to = "";
 };
 
-/// A number that a kind has beside its frames (JointDescription::parameter).
+/// A number of a kind besides its frames (JointDescription::parameter).
 struct JointParameter {
   std::string_view key = "";  ///< in files; empty for kinds without one
   std::string_view meaning = "", unit = "";
   bool positive = false;
 };
 
-/// What is left of a joint in a plane across z or x of its frames, as `turns` and `slides` ask.
+/// Remainder of a joint in a plane across z or x of its frames, as `turns` and `slides` require.
 struct InPlaneOf {
   bool possible = false;
   bool turns = false;    ///< about z of its frames, which must be normal to the plane
@@ -49,9 +48,9 @@ struct InPlaneOf {
 
 struct JointTraits {
   std::string_view name;
-  bool in_plane = false;  ///< planar scenes may have it
-  /// The axis of its own frames that JointDescription::axis names: 'x' (slides along it), 'z'
-  /// (turns about it, or is normal to its plane), or '-' for kinds without one.
+  bool in_plane = false;  ///< planar problems may have it
+  /// The axis of its own frames given by JointDescription::axis: 'x' (slides along it), 'z' (turns
+  /// about it, or is normal to its plane), or '-' for kinds without one.
   char own_axis = '-';
   /// Coordinates and speeds that users give (none of a rod, which is never followed), in the order
   /// of files. Units follow from the words (ValueWords()). Empty speeds: as the coordinates.
@@ -65,14 +64,14 @@ struct JointTraits {
   JointParameter parameter = {};
 };
 
-/// All kinds in the order of JointType: the built-in ones, then those of other programs
-/// (mechanism/model/registry.h). Rows stay where they are.
+/// Returns all kinds in the order of JointType: the built-in ones, then user-defined ones
+/// (mechanism/model/registry.h). References stay valid.
 const std::deque<JointTraits>& AllJointTraits();
-/// Adds a row, whose texts live as long as the program, and gives its number. RegisterJoint() is
-/// what programs call: a kind needs functions too.
+/// Adds an entry, whose texts must live as long as the program, and returns its number. Programs
+/// call RegisterJoint() instead: a kind needs functions too.
 JointType AddJointTraits(const JointTraits& traits);
 
-/// Whether a kind comes with Loopbench, and so exists in all scalars.
+/// Returns true for built-in kinds, which exist in all scalars.
 bool IsBuiltIn(JointType type);
 
 const JointTraits& TraitsOf(JointType type);

@@ -25,13 +25,13 @@ MechanismDescription Chain(int num_bars);
 /// `angle` from +x, turning at `speed` [rad/s] on the parallel branch.
 MechanismDescription Ladder(int num_windows, double angle, double speed);
 
-/// `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r = 1, 2,
-/// .. stands at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
+/// Returns `num_storeys` rows of `num_windows` parallelograms of unit bars as in Ladder. Storey r =
+/// 1, 2, .. is at `angle` + 0.1 (r - 1) from +x and turns at r `speed` [rad/s].
 MechanismDescription Grid(int num_storeys, int num_windows, double angle, double speed);
 
-/// Unit bars as in Ladder, the first hanging from Ground, the others in pairs from the tips of
-/// those before, bent to either side by 0.4 rad and all turning at `speed` [rad/s] against what
-/// they hang from.
+/// Returns unit bars as in Ladder: the first hangs from Ground, the others in pairs from the tips
+/// of the previous ones, bent to either side by 0.4 rad. All rotate at `speed` [rad/s] relative to
+/// their parents.
 MechanismDescription Tree(int num_bars, double speed);
 
 /// A disc (radius 1 m, 1 kg) pinned to Ground at its centre, with `num_arms` arms of `num_bars`

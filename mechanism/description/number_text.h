@@ -6,7 +6,7 @@
 
 namespace loopbench {
 
-/// With so many significant digits, as "%.*g" prints it.
+/// Returns the number with so many significant digits, as "%.*g" prints it.
 inline std::string NumberText(double value, int digits) {
   char text[32];
   std::snprintf(text, sizeof text, "%.*g", digits, value);

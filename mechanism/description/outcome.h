@@ -1,4 +1,4 @@
-// How an evaluation or a run ended. A numerical failure is a result with a name, not an exception.
+// Outcome of an evaluation or a run. A numerical failure is a named result, not an exception.
 #pragma once
 
 #include <string_view>
@@ -14,7 +14,7 @@ enum class Outcome {
   kStepLimit,           ///< more steps than allowed
   kTimeLimit,           ///< more CPU time than allowed
   kInconsistentStart,   ///< positions or speeds that satisfy the loops were not found
-  kInconsistentMotion,  ///< prescribed motions ask for what the loops forbid
+  kInconsistentMotion,  ///< prescribed motions contradict the loop constraints
   kLocked,              ///< no speed is free and none is prescribed: nothing can move
   kNewtonFailure,       ///< an implicit step's equations were not solved, however short the step
   kInexpressible,       ///< a peer does not have one of its joints or forces

@@ -23,7 +23,7 @@ bool Keep(const ForceParts& force, const Renumbering& renumbering) {
   return moves && !lost && !on_itself;
 }
 
-/// Names of independent speeds that still exist. A list with a gap is of no use: all or none.
+/// Returns the names of independent speeds if all still exist, else none.
 std::vector<std::string> KeptNames(const MechanismDescription& old, const Renumbering& kept) {
   for (const std::string& name : old.independent) {
     const std::string owner = name.substr(0, name.rfind('.'));
@@ -66,7 +66,7 @@ MechanismDescription Select(const MechanismDescription& description,
   }
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (renumbering.joints[j] < 0) continue;
-    // And a new member of a joint: what it says must survive a change of the frames' bodies.
+    // Add new members of a joint here; they must stay valid if its frames' bodies change.
     const auto& [joint_name, type, from, to, axis, parameter, cut, released, motions] = joints[j];
     JointDescription joint{joint_name, type, from, to, axis, parameter, cut, released, motions};
     joint.from.body = renumbering.bodies[from.body];

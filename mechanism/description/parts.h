@@ -7,19 +7,19 @@
 
 namespace loopbench {
 
-/// What became of the parts of a description: new indices, -1 for those that are gone.
+/// New indices of a description's parts after a selection, -1 for removed ones.
 struct Renumbering {
   std::vector<int> bodies, joints;
 };
 
-/// A part of a description: the bodies with index >= 0 in `bodies`, the joints likewise; forces,
-/// initial values and names of independent speeds that belong to them. `renumbering` has the new
+/// Returns a part of a description: the bodies and joints with index >= 0 in `bodies` and `joints`,
+/// and their forces, initial values and names of independent speeds. `renumbering` has the new
 /// indices, in the old order.
 MechanismDescription Select(const MechanismDescription& description,
                             const Renumbering& renumbering);
 
-/// One island by itself, named "whole#1", "whole#2", .. (or as the whole, if it is the only one),
-/// and where its bodies and joints are in the whole.
+/// A separate island, named "whole#1", "whole#2", .. (or like the whole, if it is the only one),
+/// and the indices of its bodies and joints in the whole.
 struct Part {
   MechanismDescription description;
   std::vector<int> bodies, joints;
@@ -29,9 +29,9 @@ struct Part {
 std::vector<Part> Split(const MechanismDescription& description,
                         const std::vector<Island>& islands);
 
-/// Each set of bodies that joints connect: for analyses of geometry, which springs between parts do
-/// not concern. Of forces only those along joints are left, because a joint that has one stays in
-/// the tree, and ranks belong to a tree.
+/// Returns each set of bodies connected by joints, for analyses of geometry, which springs between
+/// parts do not affect. Only forces along joints are kept, because their joints stay in the tree,
+/// and ranks depend on the tree.
 std::vector<Part> SplitByJoints(MechanismDescription description);
 
 }  // namespace loopbench

@@ -1,5 +1,5 @@
-// What every row has that a program adds before it calls loopbench::Main(): a joint kind or a force
-// (mechanism/model/registry.h), a level (mechanism/formulation/level.h), a formulation
+// Common data of every entry that a program adds before it calls loopbench::Main(): a joint kind or
+// a force (mechanism/model/registry.h), a level (mechanism/formulation/level.h), a formulation
 // (harness/config/formulations.h) or an observer (harness/observers/registry.h).
 #pragma once
 
@@ -14,12 +14,12 @@ struct NewRow {
   bool is_taken = false;  ///< the name
   bool has_sentence = true;
   bool has_factories = true;
-  int alignment = 0;  ///< EIGEN_MAX_STATIC_ALIGN_BYTES where the row was compiled
+  int alignment = 0;  ///< EIGEN_MAX_STATIC_ALIGN_BYTES at compilation of the entry
 };
 
-/// Throws std::invalid_argument for a name that is no word or is taken, a row without a sentence or
-/// a factory, or one compiled with another alignment of Eigen's types than this library: then they
-/// differ in memory, and the target loopbench::loopbench was not linked, which would have said so
+/// Throws std::invalid_argument if a name is no word or already used, or if the sentence or factory
+/// is missing. Also throws if the entry has another alignment of Eigen's types than this library.
+/// Memory layouts then differ because the target loopbench::loopbench was not linked
 /// (cmake/install.cmake).
 void RequireSound(const NewRow& row);
 

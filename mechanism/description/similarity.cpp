@@ -42,7 +42,7 @@ class Scaling {
   }
 
  private:
-  /// Whether a coordinate or speed is one: else it is an angle.
+  /// Returns true if a coordinate or speed is a length, false if it is an angle.
   bool IsLength(std::size_t joint, int coordinate, bool speeds) const {
     const auto words = ValueWords(scene_.joints[joint].type, scene_.space, speeds);
     return coordinate < std::ssize(words) && words[coordinate].is_length();

@@ -1,14 +1,14 @@
-// The same mechanism at another size.
+// A mechanism scaled to another size.
 #pragma once
 
 #include "mechanism/description/description.h"
 
 namespace loopbench {
 
-/// All lengths times `factor` > 0, with gravity, forces and springs such that every angle moves in
-/// time as before: masses stay, accelerations and forces scale with the factor, moments and
-/// moments of inertia with its square. Coordinates of joints that are lengths, rods and pitches
-/// scale too. What changes is how lengths compare with angles, with tolerances and with rounding.
+/// Scales all lengths by `factor` > 0, with gravity, forces and springs such that every angle keeps
+/// its motion in time. Masses stay, accelerations and forces scale with the factor, moments and
+/// moments of inertia with its square. Joint coordinates that are lengths, rods and pitches scale
+/// too. Only the ratios of lengths to angles, tolerances and rounding change.
 MechanismDescription AtScale(const MechanismDescription& description, double factor);
 
 }  // namespace loopbench

@@ -1,4 +1,4 @@
-// Functions of time as they are described: what is wrong with one, and the spline of a table.
+// Described functions of time: validation, and the spline of a table.
 #include <algorithm>
 #include <cmath>
 #include <functional>

@@ -1,4 +1,4 @@
-// A given function of time with two derivatives: prescribed motions s(t) and torques tau(t).
+// A prescribed function of time with two derivatives: motions s(t) and torques tau(t).
 //
 //   polynomial   c_0 + c_1 t + c_2 t^2 + ..          a constant, a constant speed, ..
 //   harmonic     mean + amplitude sin(omega t + phase)
@@ -6,7 +6,7 @@
 //                beyond both ends (so it has two continuous derivatives everywhere), or straight
 //                lines, whose end values hold beyond them
 //
-// At the knots of a table a derivative jumps, which costs an integrator its order: it stops there.
+// At the knots of a table a derivative jumps, which reduces an integrator's order: steps end there.
 #pragma once
 
 #include <string>
@@ -33,8 +33,8 @@ struct TimeTable {
 
 using TimeFunctionDescription = std::variant<Polynomial, Harmonic, TimeTable>;
 
-/// "" or what is wrong with it: lists empty, of unequal length or not ascending, numbers not
-/// finite.
+/// Returns "" or the error: lists that are empty, of unequal length or not ascending, or non-finite
+/// numbers.
 std::string Validate(const TimeFunctionDescription& description);
 
 /// Value and derivatives by time.
@@ -52,7 +52,7 @@ class TimeFunction {
   template <class S>
   TimeValue<S> At(S t) const;
 
-  /// Times at which some derivative jumps; empty but for tables.
+  /// Returns the times at which some derivative jumps; empty except for tables.
   const std::vector<double>& knots() const;
   const TimeFunctionDescription& description() const { return description_; }
 

@@ -30,8 +30,8 @@ class DisjointSets {
   std::vector<int> parent_;
 };
 
-/// Low numbers want to stay in the tree. 0: follows a given motion or a thread exactly there, 1:
-/// held, 2: guessed, 3: carries a force or a speed, 4: neutral, 5: marked "cut".
+/// Low numbers prefer the tree. 0: follows a prescribed motion or a thread exactly there, 1: fixed,
+/// 2: guessed, 3: carries a force or a speed, 4: neutral, 5: marked "cut".
 std::vector<int> CutPreference(const MechanismDescription& description) {
   std::vector<int> preference(description.joints.size(), 4);
   const auto keep = [&](int joint) { preference[joint] = 3; };
@@ -59,7 +59,7 @@ std::vector<bool> ChooseTreeJoints(const MechanismDescription& description) {
   std::vector<bool> chosen(order.size(), false);
   for (int j : order) {
     const JointDescription& joint = description.joints[j];
-    if (joint.type == JointType::kRod) continue;  // it has no coordinates to follow
+    if (joint.type == JointType::kRod) continue;  // no coordinates to follow
     chosen[j] = connected.Unite(joint.from.body, joint.to.body);
   }
   return chosen;

@@ -1,18 +1,18 @@
-// From the user's graph (bodies and joints, with cycles) to what is computed: a spanning forest
-// rooted in Ground, and the joints left over, which become constraints.
+// From the user's graph (bodies and joints, with cycles) to the computed one: a spanning forest
+// rooted in Ground, and the remaining joints, which become constraints.
 //
 // Coordinates decide the forest (docs/decisions/002):
 //   joint     the forest is made of the user's joints; one joint per independent loop is cut.
 //             A part that does not reach Ground hangs on a virtual free joint.
 //   absolute  every body hangs on a virtual free joint from Ground, and every user joint is a
 //             constraint.
-// After that no algorithm asks which set is in use.
+// No other algorithm depends on the coordinate set.
 //
-// Properties: every body but Ground is reached by exactly one edge, parents before children; edges
-// keep the order of the user's joints as far as that allows; the result is a function of the
-// description alone. Which joint of a loop is cut: rods, then joints marked "cut", then joints
-// without force and initial value, then those with a force or a speed, guessed, held, and at last
-// helical and driven ones; among equals the one listed last.
+// Properties: every body except Ground is reached by exactly one edge, parents before children.
+// Edges keep the order of the user's joints as far as possible. The result depends only on the
+// description. Order of joints to cut: rods, joints marked "cut", joints without force and initial
+// value, joints with a force or a speed, guessed, fixed, and last helical and driven ones; among
+// equals the last listed.
 #pragma once
 
 #include <vector>

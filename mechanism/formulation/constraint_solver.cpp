@@ -44,8 +44,8 @@ template <class Space, class S>
 int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows) {
   int user_tree_rows = 0;
   if (mechanism.coordinates() == Coordinates::kAbsolute) {
-    // every user joint is a constraint here; those of a spanning forest never depend on each other,
-    // and they are what turns the speeds of free bodies into joint speeds
+    // every user joint is a constraint here; those of a spanning forest are always independent and
+    // convert the speeds of free bodies into joint speeds
     user_tree_rows = mechanism.num_u() - mechanism.num_joint_speeds();
   }
   return mechanism.num_rows() - user_tree_rows - dependent_rows;

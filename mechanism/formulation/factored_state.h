@@ -1,7 +1,7 @@
 // A mechanism at one time, position and speed, with a solver's factors of that position.
 //
-// (q, u) have one owner, its kinematics: levels and the right-hand side read and change them here,
-// solvers where they are let. Factors are made when somebody needs them, once per position.
+// The kinematics owns (q, u). Levels and the right-hand side read and change them here, solvers
+// where permitted. Factors are computed on demand, once per position.
 #pragma once
 
 #include <memory>
@@ -26,7 +26,7 @@ class FactoredState {
 
   const VectorX<S>& q() const { return kinematics_.q(); }
   const VectorX<S>& u() const { return kinematics_.u(); }
-  /// Where directions released by AcceptReleased() serve badly, others are released at this
+  /// If the directions released by AcceptReleased() are unsuitable, releases others at this
   /// position.
   void SetPositions(const Eigen::Ref<const VectorX<S>>& q);
   /// Positions must be current.
@@ -49,8 +49,8 @@ class FactoredState {
   SelfStress<Space, S>* stress() const { return stress_.get(); }
   /// Adds to speeds the share of the released directions (self_stress.h), after Factor().
   void ShareSpeeds(VectorX<S>& u);
-  /// Releases the directions that serve best at the current positions from now on. The equations
-  /// stay the same to first order in the drift. Whether others are released than before.
+  /// Releases the most suitable directions at the current positions from now on. The equations stay
+  /// the same to first order in the drift. Returns true if the directions changed.
   bool AcceptReleased();
   /// Releases the mechanism's choice again: runs do not depend on runs before.
   void ForgetReleased() { released_ = mechanism().released(); }
@@ -64,8 +64,8 @@ class FactoredState {
   std::vector<Released> released_;  ///< by AcceptReleased()
 };
 
-/// D^T mismatch of all constraints by row, and its largest parts in `largest`, released directions
-/// included.
+/// Returns D^T times the violations of all constraints by row, and the largest violations in
+/// `largest`, released directions included.
 template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
                        Correction<S>& largest);

@@ -9,18 +9,18 @@
 //
 //   M udot_x - J^T lambda_x = -d/dx (M udot + h - J^T lambda),   J udot_x = -d/dx (J udot - gamma).
 //
-// The left-hand sides are O(n) (TreeDynamics::Residual); the equations are solved with the factors
-// that the solver has from the system's last evaluation, be it a sweep, an LU or a partition. At
-// velocity level the speeds that the right-hand side uses have derivatives of the same kind: the
-// solver's Correct() of what a direction makes constraints miss at velocity level. Levels of other
-// programs that do anything else to the right-hand side have no derivative, and say so.
+// The left-hand sides are O(n) (TreeDynamics::Residual). The equations are solved with the solver's
+// factors from the last evaluation: a sweep, an LU or a partition. At velocity level the speeds of
+// the right-hand side have similar derivatives: Correct() of the change that a direction causes in
+// the velocity violation. User-defined levels with other changes of the right-hand side have no
+// derivative (has_derivative).
 //
-// How often a measured angle has turned round (Kinematics::AcceptStep) is of no consequence here: a
-// moment along H changes with H only along D, which lambda takes up.
+// The turn count of a measured angle (Kinematics::AcceptStep) has no effect here: a moment along H
+// changes with H only along D, which lambda absorbs.
 //
-// What is left out: the derivative of softening weights (direction_weights.h), and at velocity
-// level that of the metric of the projection, whose effect is as small as the change of speeds it
-// makes. The derivative is exact where nothing is softened and speeds satisfy the constraints.
+// Omitted: the derivative of regularization weights (direction_weights.h), and at velocity level
+// the derivative of the projection's metric, whose effect is as small as the change of speeds. The
+// derivative is exact without regularization if speeds satisfy the constraints.
 #pragma once
 
 #include "mechanism/algebra/dual.h"

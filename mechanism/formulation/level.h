@@ -1,13 +1,13 @@
-// Levels of enforcement: what the right-hand side and accepted steps do about constraints beyond
-// accelerations that satisfy them (docs/decisions/003). They are written over any ConstraintSolver.
+// Enforcement levels: treatment of constraints in right-hand side and accepted steps beyond
+// accelerations (docs/decisions/003). They are written over any ConstraintSolver.
 //
 //   acceleration   nothing                                         this class as it is
 //   velocity       speeds of the right-hand side satisfy J u = -b  level_velocity.cpp
 //   position       Newton's method after each accepted step        level_position.cpp
 //   baumgarte      J udot = gamma - feedback                       level_baumgarte.cpp
 //
-// A program of somebody else registers its own before it calls loopbench::Main(), and from then on
-// its name is valid wherever "velocity" is:
+// A program registers a user-defined level before it calls loopbench::Main(); its name is then
+// valid wherever "velocity" is:
 //
 //   RegisterLevel(LevelRowOf<HalfVelocity>({.name = "half-velocity", .sentence = "half of ..."}));
 #pragma once
@@ -23,12 +23,12 @@
 
 namespace loopbench {
 
-/// What a level made of an accepted step.
+/// Effect of a level on an accepted step.
 enum class Accepted {
   kAsItWas,
   kProjected,    ///< the state was changed
   kModeChanged,  ///< the right-hand side was
-  kFailed,       ///< a projection did not succeed: the next evaluation will say why
+  kFailed,       ///< a projection did not succeed: the next evaluation gives the reason
 };
 
 template <class Space, class S>
@@ -41,35 +41,34 @@ class Level {
   virtual Outcome SetSpeeds(FactoredState<Space, S>& state,
                             const Eigen::Ref<const VectorX<S>>& carried);
 
-  /// What constraint accelerations are asked to miss at the state, by row; empty for nothing.
-  /// Stands until the next call.
+  /// Returns Baumgarte feedback added to the constraint accelerations, one value per constraint
+  /// row; empty if none. Valid until the next call.
   virtual const VectorX<S>& Feedback(const Kinematics<Space, S>&) { return nothing_; }
 
   /// After an accepted step of length h, SetSpeeds() being done.
   virtual Accepted Accept(FactoredState<Space, S>&, S /*h*/) { return Accepted::kAsItWas; }
 
-  /// The same by a solver's short cut, of a state that is known by (q, u) alone, which it changes.
-  /// False, as here, where there is none: then Accept() is asked.
+  /// Projects by a solver's fast path a state given by (q, u) alone, and changes it. Returns false
+  /// (the default) if there is none: Accept() is then called.
   virtual bool Project(ConstraintSolver<Space, S>&, std::span<S> /*q*/, std::span<S> /*u*/) {
     return false;
   }
 
-  /// Which right-hand side it is, if a solver may have a short cut for the whole of it: that of
-  /// level acceleration or that of level velocity. A level that does not say so has every
-  /// right-hand side made from its parts.
+  /// Returns the right-hand side's type if a solver may have a fast path for it: level acceleration
+  /// or level velocity. Otherwise the right-hand side is computed from its parts.
   std::optional<SpeedsUsed> right_hand_side() const { return right_hand_side_; }
 
-  /// What derivatives of the right-hand side have to know (forward_jacobian.h): whether SetSpeeds()
-  /// makes speeds satisfy the loops by the solver's Correct(), and the gains of a Feedback() that
-  /// is AddFeedback(). A level for which this is not all says so (LevelTraits::has_derivative).
+  /// Data for derivatives of the right-hand side (forward_jacobian.h): true if SetSpeeds() makes
+  /// speeds satisfy the loops by the solver's Correct(); gains if Feedback() is AddFeedback().
+  /// Levels with other changes set LevelTraits::has_derivative to false.
   bool changes_speeds() const { return changes_speeds_; }
   const BaumgarteGains& gains() const { return gains_; }
 
-  /// What the last Accept() took away; 0 where a level takes nothing. Records have it at levels
-  /// that leave nothing (DriftGrowth::kNone).
+  /// Returns the correction of the last Accept(); 0 for levels without correction. Records have it
+  /// at levels without drift (DriftGrowth::kNone).
   const Correction<S>& correction() const { return correction_; }
 
-  /// Whether Accept() has nothing to do at any step.
+  /// Returns true if Accept() never changes a step.
   bool takes_steps_as_they_are() const { return takes_steps_as_they_are_; }
 
  protected:
@@ -94,8 +93,8 @@ template <class Space, class S>
 std::unique_ptr<Level<Space, S>> MakeLevel(const Mechanism<Space, S>& mechanism,
                                            const FormulationOptions& options);
 
-/// What makes them, in the order of Enforcement: all in double, the built-in ones in other scalars.
-/// RegisterLevel() alone adds to it.
+/// Factories of levels, in the order of Enforcement: all in double, the built-in ones in other
+/// scalars. Only RegisterLevel() adds entries.
 template <class Space, class S>
 std::deque<LevelFactory<Space, S>>& LevelFactories();
 

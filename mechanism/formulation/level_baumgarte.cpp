@@ -1,4 +1,4 @@
-// Level baumgarte: mismatches of positions and speeds come back as constraint accelerations.
+// Level baumgarte: violations of positions and speeds return as constraint accelerations.
 #include <algorithm>
 
 #include "mechanism/algebra/instantiate.h"
@@ -8,9 +8,9 @@ namespace loopbench {
 
 namespace {
 
-/// Automatic gain of Baumgarte's stabilisation times the step. Stages are off the constraints by
-/// more than steps are, and 1/h times that is an error of low order: the smaller the factor, the
-/// less of it. With this one a mismatch decays within some twenty steps.
+/// Automatic gain of Baumgarte stabilisation times the step. Stages violate the constraints more
+/// than steps do, and 1/h times that is an error of low order, which grows with this factor. With
+/// this value a violation decays within about twenty steps.
 constexpr double kGainTimesStep = 0.05;
 
 template <class Space, class S>

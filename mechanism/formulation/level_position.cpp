@@ -1,5 +1,5 @@
-// Level projection: after each accepted step Newton's method on the mismatch of positions, then one
-// step on that of speeds.
+// Level projection: after each accepted step Newton's method on the position violation, then one
+// step on the velocity violation.
 #include <algorithm>
 #include <limits>
 
@@ -14,7 +14,7 @@ template <class Space, class S>
 class PositionLevel final : public Level<Space, S> {
  public:
   explicit PositionLevel(const Mechanism<Space, S>& mechanism)
-      // what rounding leaves of poses that went through all bodies
+      // round-off of poses that pass through all bodies
       : goal_(S(4) * std::numeric_limits<S>::epsilon() * S(mechanism.num_bodies())),
         length_(mechanism.length()),
         violation_(VectorX<S>::Zero(mechanism.num_rows())),
@@ -67,7 +67,7 @@ class PositionLevel final : public Level<Space, S> {
       state.SetPositions(moved_);
       PositionViolation(kinematics, violation_, now);
       ++correction.iterations;
-      if (!(size(now) < before)) {  // round-off, or a direction that is softened: as it was
+      if (!(size(now) < before)) {  // round-off, or a regularized direction: unchanged
         state.SetPositions(q_);
         break;
       }

@@ -1,4 +1,4 @@
-// What an integrator needs to know of a problem.
+// Interface of a problem for an integrator.
 #pragma once
 
 #include <optional>
@@ -8,7 +8,7 @@
 
 namespace loopbench {
 
-/// What a Jacobian of the problem's own has cost.
+/// Work for a Jacobian computed by the problem.
 struct JacobianWork {
   int derivatives = 0;       ///< evaluations of f
   int dual_evaluations = 0;  ///< evaluations with dual numbers, several columns at once
@@ -27,10 +27,10 @@ class Ode {
   /// Number of components of y; constant during a run.
   virtual int size() const = 0;
 
-  /// How many of the last components of y are quadratures: integrals along the motion, such as the
-  /// work of a force, on which f does not depend. Fewer than size(), constant during a run. They
-  /// have no part in the choice of steps: the other components have the same bits with and without
-  /// them, and their own error is not controlled.
+  /// Returns the number of last components of y that are quadratures: integrals along the motion,
+  /// such as the work of a force, on which f does not depend. Fewer than size(), constant during a
+  /// run. They do not affect the choice of steps: the other components have the same bits with and
+  /// without them. Their own error is not controlled.
   virtual int num_quadratures() const { return 0; }
 
   /// Writes f(t, y) to `ydot`. Where f jumps in time (IntegratorOptions::stop_times) it is taken
@@ -39,10 +39,10 @@ class Ode {
   /// ...). The integrator checks for NaN and infinity itself, so no implementation need do so.
   virtual Outcome Derivative(S t, std::span<const S> y, std::span<S> ydot) = 0;
 
-  /// For implicit methods: writes df_i/dy_j to `jacobian`[i + size() * j], i < size() and
-  /// j < size() - num_quadratures(), where the entries are zero, and returns what it took. Nothing,
-  /// as here, asks for difference quotients of f. It may be an approximation: that makes Newton's
-  /// iteration slower, not the solution wrong.
+  /// For implicit methods: writes df_i/dy_j to `jacobian`[i + size() * j], i < size() and j <
+  /// size() - num_quadratures(), where the entries are zero, and returns its work. Empty (the
+  /// default) requests difference quotients of f. An approximation only slows Newton's iteration;
+  /// it does not falsify the solution.
   virtual std::optional<JacobianWork> Jacobian(S /*t*/, std::span<const S> /*y*/,
                                                std::span<S> /*jacobian*/) {
     return std::nullopt;

@@ -1,4 +1,4 @@
-// What users choose of a formulation: level of enforcement, kind of solver, gains.
+// User options of a formulation: level of enforcement, kind of solver, gains.
 #pragma once
 
 #include <deque>
@@ -11,17 +11,17 @@ namespace loopbench {
 
 class SideBySide;
 
-/// At which level the constraints hold in the right-hand side (docs/decisions/003; level.h). Levels
-/// of other programs follow.
+/// Level of the constraints in the right-hand side (docs/decisions/003; level.h). User-defined
+/// levels follow.
 enum class Enforcement {
   kAcceleration,  ///< accelerations satisfy the constraints, speeds are integrated as they come
   kVelocity,      ///< speeds used in the right-hand side satisfy them too
   kPosition,      ///< as kAcceleration, and after each accepted step positions, then speeds are
                   ///< projected back to the constraints
-  kBaumgarte,     ///< as kAcceleration, with feedback of the mismatch of positions and speeds
+  kBaumgarte,     ///< as kAcceleration, with feedback of position and velocity violations
 };
 
-/// How drift of positions grows with accepted steps at a level.
+/// Growth of position drift with accepted steps at a level.
 enum class DriftGrowth {
   kSquare,     ///< errors of speeds stay and are integrated
   kLinear,     ///< errors of positions stay
@@ -29,31 +29,30 @@ enum class DriftGrowth {
   kForgotten,  ///< as kSquare, over the steps that feedback remembers
 };
 
-/// What a level is called and what it lets one expect; what it does stands in level.h.
+/// Name, description and expected drift growth of an enforcement level (behaviour: level.h).
 struct LevelTraits {
   std::string name;      ///< in files and tables: a-z, 0-9, '-' and '_'
-  std::string sentence;  ///< what `explain` says of it, after "name: "
+  std::string sentence;  ///< text of `explain`, after "name: "
   DriftGrowth growth = DriftGrowth::kSquare;
   std::string abbreviation = {};  ///< in tables of a terminal; empty: the name
-  /// Whether its Level's changes_speeds() and gains() say all by which the right-hand side differs
-  /// from that of `acceleration`: then there is a derivative of it (forward_jacobian.h). Without
-  /// one, implicit profiles have to make difference quotients, and are refused otherwise.
+  /// True if changes_speeds() and gains() of its Level fully describe the difference from the
+  /// right-hand side of `acceleration`. Its derivative then exists (forward_jacobian.h). Without
+  /// it, implicit profiles need difference quotients and are rejected otherwise.
   bool has_derivative = false;
 };
 
-/// All levels in the order of Enforcement: the built-in ones, then those of other programs in the
-/// order of their registration (level.h), whose enumerators are the next values. They stay where
-/// they are.
+/// Returns all levels in the order of Enforcement: the built-in ones, then user-defined ones
+/// (level.h) in the order of registration with the next enumerators. References stay valid.
 const std::deque<LevelTraits>& Levels();
 std::vector<std::string> LevelNames();
 const LevelTraits& TraitsOf(Enforcement level);
-/// Nothing for a name that is not registered: stores may hold records of other programs.
+/// Returns nothing for an unregistered name: stores may hold records of other programs.
 std::optional<Enforcement> FindLevel(std::string_view name);
-/// Whether it comes with Loopbench, in all scalars.
+/// Returns true for built-in levels, which exist in all scalars.
 constexpr bool IsBuiltIn(Enforcement level) { return level <= Enforcement::kBaumgarte; }
 
-/// Gains [1/s] of Baumgarte's stabilisation: a mismatch e of positions obeys
-/// e'' + 2 alpha e' + beta^2 e = 0 (Baumgarte 1972; alpha = beta damps it critically).
+/// Gains [1/s] of Baumgarte stabilisation: a position violation e obeys e'' + 2 alpha e' + beta^2 e
+/// = 0 (Baumgarte 1972; alpha = beta damps it critically).
 struct BaumgarteGains {
   double alpha = 0.0, beta = 0.0;
 
@@ -62,8 +61,8 @@ struct BaumgarteGains {
 
 enum class SolverKind {
   kAsPublished,    ///< plain factorisations; a lost pivot ends the run as `singular`
-  kRankRevealing,  ///< rank from geometry, degenerating directions softened (loop_solver.h);
-                   ///< for reduction: the independent set is chosen, and chosen again when it ages
+  kRankRevealing,  ///< rank from geometry, degenerating directions regularized (loop_solver.h); for
+                   ///< reduction: the independent set is chosen, and chosen again if it degrades
 };
 
 std::string_view ToString(Enforcement level);
@@ -77,12 +76,12 @@ struct FormulationOptions {
   /// 1/h hold steps back; gains that follow shorter steps magnify round-off by 1/h^2, which makes
   /// steps shorter still (docs/theory/constraints-and-drift.md).
   std::optional<BaumgarteGains> gains = std::nullopt;
-  /// That may work on one right-hand side, where a formulation has work for them. The same bits for
-  /// any number.
+  /// Maximum number of threads for one right-hand side, if the formulation can use them. The bits
+  /// do not depend on it.
   int threads = 1;
-  /// Solvers use the text that serves all scalars alone: no short cuts, no sparse factors.
+  /// Solvers use only the code common to all scalars: no fast paths, no sparse factors.
   bool general = false;
-  /// Runs beside which this one goes on (side_by_side.h), if any; it must outlive the solver.
+  /// Other runs of its batch (side_by_side.h), if any; must outlive the solver.
   SideBySide* beside = nullptr;
 };
 

@@ -1,6 +1,5 @@
-// Runs that go on side by side in one thread, each on its own way, with a step length of its own.
-// Where several wait for work of the same kind, it is done for all of them at once, in lanes
-// (mechanism/algebra/lanes.h).
+// Batched runs in one thread, each with its own trajectory and step length. If several wait for
+// work of the same kind, it is done for all of them at once, in lanes (mechanism/algebra/lanes.h).
 #pragma once
 
 #include <memory>
@@ -8,12 +7,11 @@
 
 namespace loopbench {
 
-/// What a solver does for several runs at once.
+/// Work that a solver does for several runs at once.
 class Together {
  public:
   virtual ~Together() = default;
-  /// All that its runs have asked for since it was done last. While runs are suspended nothing may
-  /// be thrown.
+  /// Does all work requested since the last call. Must not throw while runs are suspended.
   virtual void Do() noexcept = 0;
 };
 
@@ -25,7 +23,7 @@ class SideBySide {
   /// `works` are done.
   virtual void Meet() = 0;
 
-  /// What solvers of these runs have put there for the others to find.
+  /// Works shared by the solvers of these runs.
   std::vector<std::unique_ptr<Together>> works;
 };
 

@@ -127,7 +127,7 @@ Outcome System<Space, S>::Accelerate() {
   return drives_ == nullptr ? Outcome::kFinished : JudgeDrives();
 }
 
-/// Jacobians are made from what Examine() leaves behind.
+/// Jacobians use the results of Examine().
 template <class Space, class S>
 bool System<Space, S>::MayTakeShortCut() const {
   const bool shares = mechanism_.is_redundant() && options_.enforcement != Enforcement::kPosition;
@@ -204,7 +204,7 @@ Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u
   return outcome_;
 }
 
-/// In space measured angles go on from the last step's (Kinematics::AcceptStep()).
+/// In space measured angles continue from the last step's (Kinematics::AcceptStep()).
 template <class Space, class S>
 bool System<Space, S>::NeedsNoReview() const {
   return Space::kRot == 1 && by_short_cut_ && MayTakeShortCut() && kinematics().released().empty();
@@ -220,10 +220,10 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
     return is_projected;
   }
   step_end_version_ = kinematics().position_version();
-  if (Look(t, y) != Outcome::kFinished) return false;  // the next evaluation will say why
+  if (Look(t, y) != Outcome::kFinished) return false;  // the next evaluation gives the reason
   const S h = t - accepted_t_;
   const Accepted accepted = is_projected ? Accepted::kProjected : level_->Accept(state_, h);
-  if (accepted == Accepted::kFailed) return false;  // likewise
+  if (accepted == Accepted::kFailed) return false;  // as above
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();
   accepted_t_ = t;
@@ -289,7 +289,7 @@ std::optional<JacobianWork> System<Space, S>::Jacobian(S t, std::span<const S> y
     }
     JacobianWork work{.derivatives = 0, .dual_evaluations = jacobian_->evaluations()};
     if (!IsAt(t, y)) {
-      if (Examine(t, y, scratch_) != Outcome::kFinished) return std::nullopt;  // it will say why
+      if (Examine(t, y, scratch_) != Outcome::kFinished) return std::nullopt;  // gives the reason
       work.derivatives = 1;
     }
     Eigen::Map<Eigen::MatrixXd> all(jacobian.data(), size(), size() - num_quadratures());

@@ -1,5 +1,5 @@
-// A mechanism as an integrator sees it: its state and its derivative, by one formulation, which is
-// a solver (constraint_solver.h) and a level of enforcement (level.h).
+// A mechanism as an ODE: its state and its derivative, by one formulation, which consists of a
+// solver (constraint_solver.h) and a level of enforcement (level.h).
 //
 //   Derivative(t, y)   the right-hand side, y = (q, speeds that the state carries), by whatever way
 //                      is the shortest,
@@ -8,9 +8,9 @@
 //   BeginStep(t, y)    at accepted steps, the only call that may project the state or change the
 //                      mode (an independent set, angles, gains). Everything else is a pure function
 //                      of (t, q, u, mode): calling it in any order gives the same bits.
-// After construction O-DCA allocates nothing in any of them, the dense baselines nothing in a
-// derivative unless Eigen's workspace for one product exceeds a mebibyte (some 300 unknowns) or,
-// in reduction's null space, 48 rows; what BeginStep() does is said by each solver.
+// After construction O-DCA allocates nothing in any of them. The dense baselines allocate nothing
+// in a derivative unless Eigen's workspace for one product exceeds a mebibyte (about 300 unknowns)
+// or, in reduction's null space, 48 rows. Each solver documents BeginStep().
 #pragma once
 
 #include <memory>
@@ -23,11 +23,11 @@
 
 namespace loopbench {
 
-/// What the last evaluation met.
+/// Diagnostics of the last evaluation.
 struct Diagnostics : Conditioning {
   Outcome outcome = Outcome::kFinished;
   long softened_evaluations = 0;  ///< since the system was made
-  long mode_changes = 0;          ///< likewise; projections are none
+  long mode_changes = 0;          ///< as above; projections do not count
 };
 
 template <class Space>
@@ -46,8 +46,8 @@ class System final : public Ode<S> {
   const Mechanism<Space, S>& mechanism() const { return mechanism_; }
   const FormulationOptions& options() const { return options_; }
   const ConstraintSolver<Space, S>& solver() const { return *solver_; }
-  /// To solve with the factors of the last Examine() or Evaluate(), as long as nothing else is
-  /// asked.
+  /// Returns the solver, for use of the last factors of Examine() or Evaluate() until the next
+  /// call.
   ConstraintSolver<Space, S>& solver() { return *solver_; }
   const Level<Space, S>& level() const { return *level_; }
 
@@ -66,30 +66,29 @@ class System final : public Ode<S> {
     return carried == nullptr ? i : (*carried)[i];
   }
 
-  /// From now on the integrator's state ends with the work [J] supplied and the work dissipated
-  /// since the start: quadratures, so that the motion has the same bits with and without them.
+  /// Appends to the integrator's state the work [J] supplied and the work dissipated since the
+  /// start: quadratures, so that the motion has the same bits with and without them.
   void IntegrateWork(bool wanted) { with_work_ = wanted; }
-  /// state_size(), and two with work. Where prescribed motions leave no state, the work itself is
-  /// what is integrated.
+  /// Returns state_size(), plus two with work. If prescribed motions leave no state, only the work
+  /// is integrated.
   int size() const override { return state_size() + (integrates_work() ? 2 : 0); }
   int num_quadratures() const override { return with_work_ && state_size() > 0 ? 2 : 0; }
 
-  /// dy/dt, with that of the works where `ydot` has room for them. On failure it is unspecified.
-  /// Where the solver has a short cut, nothing else is known of (t, y) afterwards, and what
-  /// kinematics() and all that follows from it are of is not said.
+  /// Computes dy/dt, and the rates of work if `ydot` has room for them; unspecified on failure.
+  /// After a solver's fast path, kinematics() and everything derived from it are unspecified.
   Outcome Derivative(S t, std::span<const S> y, std::span<S> ydot) override;
-  /// The same without a short cut, so with other rounding: kinematics(), udot(), diagnostics(),
-  /// multipliers and powers are then those of (t, y).
+  /// Computes the same without a fast path, so with other rounding: kinematics(), udot(),
+  /// diagnostics(), multipliers and powers then belong to (t, y).
   Outcome Examine(S t, std::span<const S> y, std::span<S> ydot);
 
-  /// Makes Derivative() evaluate `compiled`, and where that has no branch the text of Examine().
-  /// Null: neither. In double only, after Start().
+  /// Makes Derivative() evaluate `compiled`, or the code of Examine() if it has no branch. Null
+  /// turns both off. In double only, after Start().
   void UseCompiled(std::unique_ptr<CompiledDerivative> compiled) {
     compiled_ = std::move(compiled);
   }
   const CompiledDerivative* compiled() const { return compiled_.get(); }
 
-  /// The Jacobian that Jacobian() is to give, or null for none. Of this system, after Start().
+  /// Sets the Jacobian of this system for Jacobian(), or null for none. After Start().
   void UseJacobian(std::unique_ptr<ForwardJacobian<Space>> jacobian);
   std::optional<JacobianWork> Jacobian(S t, std::span<const S> y, std::span<S> jacobian) override;
 
@@ -99,7 +98,7 @@ class System final : public Ode<S> {
   /// Positions and all speeds of a state at time t; kinematics() is current afterwards. `y` may
   /// have more at its end.
   Outcome FromState(S t, std::span<const S> y);
-  /// The same by the solver's short cut where it has one, so with other rounding of the speeds.
+  /// Does the same by the solver's fast path, if any, so with other rounding of the speeds.
   Outcome Look(S t, std::span<const S> y);
   const VectorX<S>& q() const { return state_.q(); }
   const VectorX<S>& u() const { return state_.u(); }
@@ -108,9 +107,9 @@ class System final : public Ode<S> {
   /// Self-stresses at the last positions; null without redundant constraints.
   const SelfStress<Space, S>* stress() const { return state_.stress(); }
 
-  /// Accepts the step that ended in `y` at time t. True when the state was projected or the mode
-  /// changed, and with it perhaps the state's meaning: then `y` is rewritten and the integrator
-  /// must restart. After a projection that failed `y` is as it was; the next evaluation says why.
+  /// Accepts the step that ended in `y` at time t. Returns true if the state was projected or the
+  /// mode (and perhaps the state's meaning) changed: `y` is then rewritten and the integrator must
+  /// restart. If a projection failed, `y` is unchanged; the next evaluation gives the reason.
   bool BeginStep(S t, std::span<S> y);
 
   /// Multipliers lambda of all constraint rows; D lambda is the force on Q. The last call must have
@@ -128,15 +127,15 @@ class System final : public Ode<S> {
   std::string Why() const;
 
  private:
-  /// Whether the right-hand side is what a solver may have a short cut for.
+  /// Returns true if a solver may have a fast path for the right-hand side.
   bool MayTakeShortCut() const;
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();
-  /// The latter. At level projection, whose accepted steps end on the constraints, inertia carries
-  /// a mechanism across singular configurations; what trial stages miss there is not judged.
+  /// Judges the latter. At level projection, whose accepted steps satisfy the constraints, inertia
+  /// carries a mechanism across singular configurations; violations at trial stages are not judged.
   Outcome JudgeDrives();
-  /// Whether constraints depend on each other that usually do not.
+  /// Returns true if usually independent constraints are dependent.
   bool IsSingular() const;
   int FirmRank(const Kinematics<Space, S>& at) const;
   void NoteRankAhead();
@@ -146,12 +145,12 @@ class System final : public Ode<S> {
   void PutPower(std::span<S> rates);
   /// udot_ and, unless null, lambda at the current state, with the shares of released directions.
   void SolveAccelerations(VectorX<S>* lambda);
-  /// Solves for accelerations from f and c, for solvers without a short cut.
+  /// Solves for accelerations from f and c, for solvers without a fast path.
   void SolveFormed(VectorX<S>* lambda);
-  /// Whether the step that the last Derivative() ended changes nothing, and nothing has to be known
-  /// of it.
+  /// Returns true if accepting the last Derivative()'s step changes nothing and needs no data from
+  /// it.
   bool NeedsNoReview() const;
-  /// Whether the last evaluation was the derivative at this (t, y).
+  /// Returns true if the last evaluation was the derivative at this (t, y).
   bool IsAt(S t, std::span<const S> y) const;
 
   const Mechanism<Space, S>& mechanism_;
@@ -169,9 +168,9 @@ class System final : public Ode<S> {
   const VectorX<S>* feedback_ = nullptr;  ///< of the last evaluation, the level's
   bool lambda_is_current_ = false;
   bool shares_ = false;  ///< whether released directions drift unless self_stress.h corrects udot
-  /// Of the kinematics' positions, set by BeginStep(): the last stage of a step, its projection and
-  /// the next evaluation have the same positions and share what is assembled there. Any other
-  /// evaluation assembles anew.
+  /// Version of the kinematics' positions set by BeginStep(): the last stage of a step, its
+  /// projection and the next evaluation have the same positions and share the assembled matrices.
+  /// Any other evaluation assembles again.
   long step_end_version_ = -1;
   bool by_short_cut_ = false;  ///< the last Derivative() was
   S accepted_t_ = S(0);
@@ -181,7 +180,7 @@ class System final : public Ode<S> {
 
   std::unique_ptr<CompiledDerivative> compiled_;
   std::unique_ptr<ForwardJacobian<Space>> jacobian_;
-  /// Where the last derivative was, for jacobian_: positions' version (-1: nowhere), time, state.
+  /// State of the last derivative, for jacobian_: positions' version (-1: none), time, state.
   long derivative_version_ = -1;
   S derivative_t_ = S(0);
   std::vector<S> derivative_y_, scratch_;

@@ -1,4 +1,4 @@
-// Prescribed motions of a system: whether its accelerations follow them, and what they ask of
+// Prescribed motions of a system: whether its accelerations follow them, and their requirements on
 // singular configurations (docs/theory/singular-configurations.md).
 #include <algorithm>
 #include <cmath>
@@ -10,13 +10,13 @@
 
 namespace loopbench {
 
-/// Rank as conditioning() counts it, of directions that are not softened at all. Double only: other
-/// scalars have no spectrum.
+/// Returns the rank as conditioning() counts it, of directions without any regularization. Double
+/// only: other scalars have no spectrum.
 template <class Space, class S>
 int System<Space, S>::FirmRank([[maybe_unused]] const Kinematics<Space, S>& at) const {
   if constexpr (std::is_same_v<S, double>) {
     const LoopSpectrum loops = SpectrumOfLoops(at);
-    // one loop is softened to twice this width, and loops that are closed one by one to some more
+    // one loop is regularized to twice this width, loops closed one by one to somewhat more
     const double least = 10.0 * std::sqrt(DirectionWeights<S>::kTheta) * loops.largest;
     const auto firm = static_cast<int>((loops.singular_values.array() > least).count());
     return LoopRank(mechanism_, mechanism_.num_rows() - firm);
@@ -30,8 +30,8 @@ bool System<Space, S>::IsSingular() const {
          FirmRank(kinematics()) < drives_->usual_rank();
 }
 
-/// Steps ahead along the speeds by some widths of softening. Constraints that depend on each other
-/// everywhere do so there to second order; constraints of a singular start do not.
+/// Steps ahead along the speeds by some widths of regularization. Constraints that are dependent
+/// everywhere stay so to second order; constraints of a singular start do not.
 template <class Space, class S>
 void System<Space, S>::NoteRankAhead() {
   S speed = S(0);
@@ -50,8 +50,8 @@ void System<Space, S>::NoteRankAhead() {
   drives_->NoteRank(FirmRank(there));
 }
 
-/// Near a singular position, at the distance sigma on a branch, constraints look like x y = 0. With
-/// a closure error e it is x y = e, which turns off the branch where sigma^2 is of the size of e.
+/// Near a singular configuration, at the distance sigma on a branch, constraints look like x y = 0.
+/// With a closure error e it is x y = e, which leaves the branch where sigma^2 is of the size of e.
 template <class Space, class S>
 bool System<Space, S>::IsOffBranch() const {
   if (options_.enforcement == Enforcement::kPosition ||
@@ -65,7 +65,7 @@ bool System<Space, S>::IsOffBranch() const {
       e = std::max({e, miss.angular.norm(), miss.linear.norm() / mechanism_.length()});
     }
     const int rank = mechanism_.num_rows() - LoopRank(mechanism_, 0) + drives_->usual_rank();
-    // pivots, of the size of sigma or of its square, say when to look
+    // pivots, of the size of sigma or of its square, decide when to check
     if (rank == 0 || solver_->conditioning().rcond > 100.0 * std::sqrt(e)) return false;
     const LoopSpectrum loops = SpectrumOfLoops(kinematics());
     const double sigma = loops.singular_values[rank - 1] / loops.largest;

@@ -53,9 +53,9 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
   SetFree(kinematics);
 }
 
-/// n_Q - n_P - g is what (7) has beside the accelerations at centres of mass and H udot, at Mo in
-/// ground axes. Its components along D are c0, to which feedback adds; those along H belong to
-/// udot.
+/// n_Q - n_P - g is the part of (7) besides the accelerations at centres of mass and H udot, at Mo
+/// in ground axes. Its components along D are c0, to which feedback adds; components along H belong
+/// to udot.
 template <class Space, class S>
 void BodyEquations<Space, S>::SetState(const Kinematics<Space, S>& kinematics,
                                        const VectorX<S>& feedback) {

@@ -1,15 +1,15 @@
-// The equations of constraint_solver.h body by body, for solvers that neither form h and gamma nor
+// The equations of constraint_solver.h body by body, for solvers that form neither h and gamma nor
 // the mass matrix of the forest:
 //
 //   A = b + M^-1 sum of c phi        each body: its wrenches, and those of its joints
 //   sum of c^T A + c0 = 0            each joint with constrained directions
 //
-// All accelerations are at centres of mass, centripetal terms left out. A joint from P to Q carries
-// D phi on Q and -D phi on P at Mo (13), which is at the centres of mass
+// All accelerations are at centres of mass, without centripetal terms. A joint from P to Q carries
+// D phi on Q and -D phi on P at Mo (13); at the centres of mass this is
 //
 //   c_Q =  S(r_Q)^T D,    c_P = -S(r_P)^T D,    c0 = D^T (n_Q - n_P - g),    n = [0; w x (w x r)]
 //
-// and demands D^T (A_Q - A_P - g) = 0 at Mo (12). Numbers in brackets are the O-DCA paper's.
+// and demands D^T (A_Q - A_P - g) = 0 at Mo (12). Equation numbers: the O-DCA paper's.
 #pragma once
 
 #include <span>
@@ -28,14 +28,14 @@ class BodyEquations {
   /// b and c0 of ConstraintSolver::Solve(): a force along a tree joint is a pair of wrenches.
   void SetForce(const Kinematics<Space, S>& kinematics, const VectorX<S>& force,
                 const VectorX<S>& target);
-  /// Of ConstraintSolver::Accelerate(): b from the wrenches of applied forces less w x I w.
+  /// For ConstraintSolver::Accelerate(): b from the wrenches of applied forces less w x I w.
   void SetState(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback);
-  /// Of what the motions of `kinematics` miss, nothing else acting.
+  /// Sets the velocity violation of `kinematics` as the only load.
   void SetMissed(const Kinematics<Space, S>& kinematics);
 
   std::span<const Acceleration<Space, S>> b() const { return b_; }
   std::span<const Components<Space, S>> c0() const { return c0_; }
-  /// For the solution: of all bodies, Ground's zero.
+  /// For the solution: of all bodies, with Ground's zero.
   std::span<Acceleration<Space, S>> A() { return A_; }
 
   /// x of the tree joints from A.
@@ -51,7 +51,7 @@ class BodyEquations {
   std::vector<Wrench<Space, S>> wrenches_;
   std::vector<Acceleration<Space, S>> b_, A_;
   std::vector<Components<Space, S>> c0_;
-  VectorX<S> known_;  ///< of x: what does not come from A
+  VectorX<S> known_;  ///< part of x that does not come from A
 };
 
 }  // namespace loopbench

@@ -8,8 +8,8 @@ namespace loopbench {
 
 namespace {
 
-/// Directions of a joint in its own axes from those it has, which are ground axes where nothing is
-/// released of them.
+/// Transforms directions of a joint to its own axes; unless some are released, they are given in
+/// ground axes.
 template <class Space, class S>
 MatrixX<S> ToOwnAxes(const Kinematics<Space, S>& kinematics, const Joint<Space, S>& joint,
                      const JointState<Space, S>& state) {

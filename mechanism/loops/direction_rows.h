@@ -1,4 +1,4 @@
-// What all cut joints constrain, as rows whose lengths and angles compare: geometry alone.
+// Constraint rows of all cut joints, scaled so that lengths and angles compare: geometry alone.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,7 @@ namespace loopbench {
 /// joint's own axes, imposed directions before released ones. In double, whatever the scalar.
 struct DirectionRows {
   Eigen::MatrixXd rows;
-  Eigen::VectorXd mismatch;           ///< of positions, scaled likewise: of unit masses, so [m]
+  Eigen::VectorXd mismatch;           ///< of positions, scaled with unit masses, so [m]
   Eigen::LLT<Eigen::MatrixXd> mass;   ///< L
   std::vector<int> first, count;      ///< rows of each constraint, in the order of constraints()
   std::vector<Eigen::MatrixXd> free;  ///< of each constraint: free responses, unscaled

@@ -53,7 +53,7 @@ void DirectionWeights<S>::Weigh(const VectorX<S>& lambda) {
   for (Eigen::Index i = 0; i < size; ++i) {
     const S known = std::max(lambda[i], S(0)) / least;
     const S ratio = std::min(S(std::max(pivots_[i], S(0)) / theta), S(known * known));
-    // expm1 keeps the weight's relative accuracy where it is small
+    // expm1 keeps the relative accuracy of small weights
     weights_[i] = -expm1(-ratio * ratio);
     if (weights_[i] >= S(1) / S(2)) ++rank_;
   }

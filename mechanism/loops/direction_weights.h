@@ -1,4 +1,4 @@
-// How far each direction of the loops' constraints is enforced, from geometry alone.
+// Enforcement weight of each direction of the loop constraints, from geometry alone.
 //
 // For the geometric response of loop_solver.h, with eigenvalues lambda_1 <= lambda_2 <= ...,
 //
@@ -6,16 +6,16 @@
 //   w_i = 1 - exp(-r_i^2),      r_i = min(p_i / theta, (lambda_i / lambda_least)^2)
 //
 // with theta = (2e-4)^2 and lambda_least = (2e-6)^2 of the largest eigenvalue, which counts as 1e-2
-// at least, because within a rigid part all of X_g is round-off.
+// at least because within a rigid part all of X_g is round-off.
 //
-// The p_1 <= p_2 <= ... are what each joint could respond once the joints before it are closed: the
-// eigenvalues of its block in the Cholesky factorisation by blocks. They fall with the square of
-// the distance from a singular position, as the lambda do, and have the same product, but lie
-// closer together: a row of n windows has an eigenvalue of 2 / n^2 in its best position, and by
-// that 40 windows would be softened twenty times as far away as one. Closed along the row, its p
-// know nothing of n; in an order drawn by chance the least fall with 1 / n. A joint by itself has
-// p_1 .. = lambda_1 .. . Where a small eigenvalue hides behind moderate p, lambda_least softens it
-// while a hundredth of it is known.
+// The p_1 <= p_2 <= ... are the responses left to each joint once the joints before it are closed:
+// the eigenvalues of its block in the block Cholesky factorisation. They fall with the square of
+// the distance from a singular configuration, like the lambda, and have the same product, but lie
+// closer together. A row of n windows has an eigenvalue of 2 / n^2 in its best position; by this
+// criterion 40 windows would be regularized twenty times as far away as one. Closed along the row,
+// its p do not depend on n; in random order the smallest fall with 1 / n. A single joint has p_1 ..
+// = lambda_1 .. . If a small eigenvalue hides behind moderate p, lambda_least regularizes it while
+// a hundredth of it is accurate.
 #pragma once
 
 #include <span>
@@ -52,7 +52,7 @@ class DirectionWeights {
   /// Directions enforced with a weight of at least one half.
   int rank() const { return rank_; }
   S smallest() const { return smallest_; }
-  /// The largest eigenvalue, or what it counts as.
+  /// Returns the largest eigenvalue, bounded below.
   S largest() const { return largest_; }
 
  private:

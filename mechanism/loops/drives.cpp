@@ -97,9 +97,9 @@ bool Drives<Space, S>::NoteRank(int rank) {
   return has_grown;
 }
 
-/// Of joints that have come apart, accelerations are inconsistent by as much as their positions
-/// are, or as the products of speeds with what these miss. Where a drive rests, that is as much as
-/// the speeds themselves, and little beside those before.
+/// Accelerations of joints with drift are inconsistent by their position violation, or by the
+/// products of speeds with the velocity violation. If a driver rests, that is the size of the
+/// speeds themselves, and small next to the others.
 template <class Space, class S>
 bool Drives<Space, S>::IsDrift(const Kinematics<Space, S>& kinematics) {
   S position = S(0), missed = S(0);
@@ -113,11 +113,11 @@ bool Drives<Space, S>::IsDrift(const Kinematics<Space, S>& kinematics) {
          worst_ <= S(kOfMismatch) * (position * size_ + missed * SpeedOf(kinematics));
 }
 
-/// The directions of prescribed coordinates are columns H_k of the kind's motion map that stand in
-/// D, and the drive's relative motion is H_k times its rate. A cut joint's drive carries the force
+/// The directions of prescribed coordinates are columns H_k of the kind's motion map placed in D,
+/// and the driver's relative motion is H_k times its rate. A cut joint's driver carries the force
 /// H_k lambda, whose power is lambda |H_k|^2 times the rate. For a tree joint, F_ is summed from
-/// the leaves of the tree inwards and moved to Mo; the component of that along H_k is the drive's.
-/// All in ground axes, wrenches of bodies at their centres of mass.
+/// the leaves of the tree inwards and moved to Mo; its component along H_k is the driver's. All in
+/// ground axes, wrenches of bodies at their centres of mass.
 template <class Space, class S>
 S Drives<Space, S>::Power(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                           const VectorX<S>& lambda) {

@@ -1,8 +1,7 @@
-// What prescribed motions do to a mechanism: whether it can follow them, and the power they take.
+// Prescribed motions: whether the mechanism can follow them, and the power they need.
 //
-// Drives may ask for what the loops forbid: two cranks of one four-bar, each with a motion of its
-// own. Solvers that tolerate redundant constraints then meet them halfway; the accelerations left
-// over tell.
+// Drivers may contradict the loops: two cranks of one four-bar, each with its own motion. Solvers
+// that accept redundant constraints then return a compromise; the residual acceleration reveals it.
 #pragma once
 
 #include <algorithm>
@@ -17,29 +16,28 @@ class Drives {
  public:
   explicit Drives(const Mechanism<Space, S>& mechanism);
 
-  /// Whether accelerations `udot` satisfy every constraint. What is left may be kFollowed of the
-  /// largest term in the sum (accelerations, and products of speeds, which stand alone where shafts
-  /// turn evenly), plus kRoundOff of the largest that forces would give a body by itself (in a loop
-  /// that stands still all others are zero), plus as much as drift explains: redundant constraints
-  /// of joints that have drifted apart contradict each other by that much. `feedback`, where not
-  /// empty, is what constraint accelerations were asked to miss (Baumgarte), by row. Speeds must be
-  /// current.
+  /// Returns true if accelerations `udot` satisfy every constraint. The residual may be kFollowed
+  /// of the largest term in the sum (accelerations, and products of speeds, which dominate if
+  /// shafts turn evenly), plus kRoundOff of the largest acceleration of a free body under forces
+  /// (in a loop at rest all others are zero), plus the effect of drift: redundant constraints of
+  /// joints with drift contradict each other by that much. `feedback`, if not empty, is the
+  /// Baumgarte feedback by row. Speeds must be current.
   bool Followed(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                 const VectorX<S>& feedback);
 
-  /// Whether the motion decides the branch in a singular configuration, after Followed() there. No
-  /// more may be left than errors of speeds leave on a branch, and inertia must outweigh forces:
-  /// softened directions have accelerations of their own for as long as the mechanism takes across
-  /// the width of softening, and must not be turned by much of it.
+  /// Returns true if the motion decides the branch in a singular configuration, after Followed()
+  /// there. The residual must be within the effect of speed errors on a branch, and inertia must
+  /// outweigh forces. Regularized directions have their own accelerations while the mechanism
+  /// crosses the width of regularization; these must not turn it much.
   bool DecidesBranch(const Kinematics<Space, S>& kinematics) const;
 
-  /// Notes the rank of the loops' constraints at an accepted step. True where it has grown: a run
-  /// that began in a singular configuration has left that.
+  /// Stores the rank of the loops' constraints at an accepted step. Returns true if it has grown: a
+  /// run that began in a singular configuration has left it.
   bool NoteRank(int rank);
   /// The largest so far.
   int usual_rank() const { return usual_rank_; }
 
-  /// From an accepted step on whose branch closure errors have decided.
+  /// Called after an accepted step on a branch chosen by closure errors.
   void LeaveBranch() { has_left_branch_ = true; }
   bool has_left_branch() const { return has_left_branch_; }
 
@@ -48,29 +46,29 @@ class Drives {
     return static_cast<int>(std::ranges::max_element(missed_) - missed_.begin());
   }
 
-  /// Power [W] that drives put into the mechanism: force along each times its prescribed rate.
-  /// Those of cut joints are multipliers (`lambda`, rows as in TreeDynamics::Jacobian()); those of
-  /// tree joints are what the bodies outward of them need beyond other forces.
+  /// Returns the power [W] that drivers supply: force along each times its prescribed rate. Forces
+  /// of cut joints are multipliers (`lambda`, rows as in TreeDynamics::Jacobian()); forces of tree
+  /// joints are the loads of the bodies outward of them beyond other forces.
   S Power(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda);
 
  private:
-  /// Solvers leave some 1e-12 of a consistent system; what is inconsistent leaves much more.
+  /// Solvers leave about 1e-12 of a consistent system; inconsistent systems leave much more.
   static constexpr double kFollowed = 1e-6;
   static constexpr double kRoundOff = 1e-10;
-  /// Times the relative mismatch of positions and speeds.
+  /// Factor on the relative violation of positions and speeds.
   static constexpr double kOfMismatch = 10.0;
-  /// Beyond this the mismatch is no drift: speeds that drives contradict miss each other in full.
-  /// Stages of a step miss by some 1e-5 at rtol 1e-9; of 68 contradictions in 600 random mechanisms
-  /// one missed by less than 1e-2, none by less than this.
+  /// A larger violation is no drift: contradictory drivers violate speeds in full. Stages of a step
+  /// have violations of about 1e-5 at rtol 1e-9. Of 68 contradictions in 600 random mechanisms one
+  /// was below 1e-2, none below this.
   static constexpr double kMostDrift = 1e-3;
 
   /// Largest residual in a singular configuration, relative to the largest term. Accepted steps
   /// leave up to 0.02 at rtol 1e-4.
   static constexpr double kLeftOnBranch = 0.1;
-  /// Largest deflection across the width of softening, relative to that width.
+  /// Largest deflection across the width of regularization, relative to that width.
   static constexpr double kTurned = 0.1;
 
-  /// Whether what is left is explained by joints that have come apart.
+  /// Returns true if constraint drift explains the residual.
   bool IsDrift(const Kinematics<Space, S>& kinematics);
 
   TreeDynamics<Space, S> dynamics_;

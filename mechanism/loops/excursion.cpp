@@ -95,7 +95,7 @@ bool Excursion<Space>::Close(int rank, double distance, const VectorX<double>& u
   DirectionRows here = RowsOfDirections(kinematics_);
   bool closed = here.mismatch.norm() < closed_;
   for (int i = 0; i < kMostIterations && !closed; ++i) {
-    // far below the least singular value on the way to a singular position
+    // far below the least singular value on approach to a singular configuration
     double threshold = 1e-9;
     if (rank > 0 && rank < std::min(here.rows.rows(), here.rows.cols())) {
       const auto pivots = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(here.rows)
@@ -133,7 +133,7 @@ template <class Space>
 StepKind Excursion<Space>::Step(double distance, int seed) {
   const int n = mechanism_->num_u();
   if (n == 0 || rank_ == n) return StepKind::kFellBack;
-  // no special speed: an irrational mixture, less what the constraints forbid
+  // a generic speed: an irrational mixture, less the components that the constraints remove
   VectorX<double> y(n);
   for (int i = 0; i < n; ++i) y[i] = std::cos(1.0 + seed * std::sqrt(2.0) + (i + seed) * (i + 0.5));
   if (course_.size() == n) y = course_ * (3.0 / course_.norm()) + y / y.norm();
@@ -153,7 +153,7 @@ StepKind Excursion<Space>::Step(double distance, int seed) {
   const bool closed =
       Close(rank_, distance, u, q, travelled) || Close(n, distance, u, q, travelled);
   bend_ = (travelled - u).cwiseQuotient(units_).norm() / u.cwiseQuotient(units_).norm();
-  // a way that keeps its direction is a motion; one that comes back to a tenth was none
+  // a direction that is kept is a motion; a return to a tenth of the distance is none
   const bool moved = closed && Size(travelled) > 0.1 * distance;
   if (moved) {
     q_ = q;

@@ -1,10 +1,9 @@
-// Other positions that a mechanism's loops admit: a walk from one to the next.
+// Walk to other positions that satisfy a mechanism's loops.
 //
-// One position cannot tell a constraint that is redundant everywhere from one that is lost only
-// there, nor a speed that leads somewhere from one that leads nowhere: at a stretched four-bar two
-// speeds satisfy every constraint and no motion does. So the mechanism is moved a little way along
-// a speed that the constraints permit, and its loops are closed again. Dense: for analyses before a
-// run.
+// A single position cannot distinguish a redundant constraint from one lost only there, nor a speed
+// of finite motion from an infinitesimal one: at a stretched four-bar two speeds satisfy every
+// constraint and no motion does. So the mechanism moves a small distance along an admissible speed,
+// and its loops are closed again. Dense: for analyses before a run.
 #pragma once
 
 #include "mechanism/algebra/decompositions.h"
@@ -18,14 +17,14 @@ inline constexpr int kMostAnalysedSpeeds = 2000;
 enum class StepKind {
   kMoved,      ///< to another position that closes all loops
   kFellBack,   ///< the only position found nearby is the one it came from
-  kNotClosed,  ///< none was found
+  kNotClosed,  ///< no closed position was found
 };
 
 template <class Space>
 class Excursion {
  public:
-  /// From the position q of a mechanism in joint coordinates without prescribed motions, which must
-  /// outlive this. Loops count as closed within `accuracy` [rad or lengths], or within round-off.
+  /// Starts at the position q of a mechanism in joint coordinates without prescribed motions, which
+  /// must outlive this. Loops count as closed within `accuracy` [rad or lengths] or round-off.
   Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
             double accuracy = 0.0);
 
@@ -34,9 +33,8 @@ class Excursion {
   /// continued, and closes the loops again. The position stays as it was unless it moved.
   StepKind Step(double distance, int seed);
 
-  /// How far the last step ended from where its speed led, over the way it was to go: of the order
-  /// of the distance at a regular position of the loops, of order one where the speed leads
-  /// nowhere.
+  /// Returns the deviation of the last step from its speed's direction, over the intended distance:
+  /// of the order of the distance at a regular position, of order one for an infinitesimal motion.
   double bend() const { return bend_; }
   /// Forgets the direction of the steps so far.
   void TurnAnywhere() { course_.resize(0); }
@@ -50,7 +48,7 @@ class Excursion {
   int rank() const { return rank_; }
   /// Smallest pivot that counts over the largest: how far this position is from losing rank.
   double conditioning() const { return conditioning_; }
-  /// Largest pivot that does not count, likewise: how far redundant constraints are independent.
+  /// Returns the largest neglected pivot: a measure of the independence of redundant constraints.
   double excess() const { return excess_; }
   int freedom() const { return mechanism_->num_u() - rank_; }
 
@@ -66,7 +64,7 @@ class Excursion {
   const Mechanism<Space, double>* mechanism_;
   Kinematics<Space, double> kinematics_;
   VectorX<double> q_, units_;  ///< units of speeds: 1, or the mechanism's length
-  double closed_ = 0.0;        ///< scaled mismatches below this are round-off [m]
+  double closed_ = 0.0;        ///< scaled violations below this are round-off [m]
   DirectionRows here_;
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver_;
   VectorX<double> course_;  ///< L^T u of the last step that moved

@@ -9,8 +9,8 @@ namespace loopbench {
 
 namespace {
 
-/// By joint: whether its bodies are connected in another way too. A joint that alone holds what
-/// hangs on it bears no self-stress, however small its pivot is beside what it holds.
+/// Returns by joint: true if its bodies are also connected otherwise. A joint that alone holds its
+/// outward bodies bears no self-stress, however small its pivot.
 template <class Space>
 std::vector<bool> OnLoops(const Mechanism<Space, double>& mechanism) {
   struct Step {
@@ -156,7 +156,7 @@ bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, M
   for (int block = 0; block < static_cast<int>(joints_.size()); ++block) {
     const double ratio = X_.ratio(block), of_limit = ratio * inverse_shares_[block];
     rcond_ = std::min(rcond_, ratio);
-    // not so for what is not a number
+    // NaN also passes
     if (on_loops_[static_cast<std::size_t>(block)] && !(of_limit >= worst_on_loops)) {
       worst_on_loops = of_limit;
     }

@@ -6,9 +6,9 @@
 // the bodies. X has a block for every two joints on one body, so its factors (block_cholesky.h) are
 // linear in size for chains, ladders and trees. A body with k joints makes k^2 blocks.
 //
-// Rank is not decided here. Pivots are those of K^-1 X K^-T, where K K^T is the free response of
-// each joint (loop_solver.h), so they say the same as there: below kSuspicious the loops may have
-// lost rank, and others have to look. The limit is ShareOfLimit() of that.
+// This file does not decide rank. Pivots belong to K^-1 X K^-T, where K K^T is the free response of
+// each joint, with the meaning of loop_solver.h: below kSuspicious the loops may have lost rank,
+// and another method must check. ShareOfLimit() is the pivot over that limit.
 #pragma once
 
 #include <memory>
@@ -26,27 +26,27 @@ inline constexpr double kMostOfResponse = 2e8;
 template <class Space>
 class JointResponse {
  public:
-  /// Null where X would have more numbers than `most`. `mechanism` must outlive this.
+  /// Returns null if X would exceed `most` numbers. `mechanism` must outlive this.
   static std::unique_ptr<JointResponse> Make(const Mechanism<Space, double>& mechanism,
                                              double most);
 
-  /// False where rank or digits are in doubt, or a number is not finite. Equations are solved with
-  /// physical masses.
+  /// Returns false if rank or digits are uncertain, or a number is not finite. Equations are solved
+  /// with physical masses.
   bool Factor(const Kinematics<Space, double>& kinematics, Masses masses = Masses::kPhysical);
   /// A of all bodies, and phi().
   void Solve(std::span<const Acceleration<Space, double>> b,
              std::span<const Components<Space, double>> c0,
              std::span<Acceleration<Space, double>> A);
 
-  /// Whether the rank of the last Factor() was not in doubt: pivots of joints on no loop tell of
-  /// digits alone, lost where a light body holds many.
+  /// Returns true if the last Factor() had a certain rank. Small pivots of joints on no loop only
+  /// mean lost digits, for a light body that holds many.
   bool has_rank() const { return has_rank_; }
 
   std::span<const Components<Space, double>> phi() const { return phi_; }
-  /// The least pivot of the last Factor(), and the joint nearest to its limit, -1 where all are 1.
+  /// Least pivot of the last Factor(), and the joint nearest to its limit, -1 if all are 1.
   double rcond() const { return rcond_; }
   int worst_joint() const { return worst_joint_; }
-  /// Whether all numbers that X is made of were finite.
+  /// Returns true if all numbers in X were finite.
   bool IsFinite() const;
   /// Multiply-adds of factors and one solution.
   double operations() const { return X_.operations(); }
@@ -59,7 +59,7 @@ class JointResponse {
     int first = 0;  ///< in c_ and Mc_
     int row = 0;    ///< in x_
   };
-  /// Two sides on one body, and where the block of their joints is.
+  /// Two sides on one body, and the index of the block of their joints.
   struct Pair {
     int first = 0, second = 0;  ///< sides: its rows, its columns
     double* block = nullptr;
@@ -84,8 +84,8 @@ class JointResponse {
   int worst_joint_ = -1;
 };
 
-/// Whether pivots leave no doubt that all constraints are independent at this position, by geometry
-/// alone; false says nothing.
+/// Returns true if pivots prove all constraints independent at this position, by geometry alone;
+/// false proves nothing.
 template <class Space>
 bool AreIndependent(const Kinematics<Space, double>& kinematics);
 

@@ -1,5 +1,5 @@
-// Letters are those of loop_solver.h, where the formulas stand. Rows of X, and so all vectors here,
-// are components along the directions D of the joints, [rad or m] per [N m or N].
+// Symbols and formulas are defined in loop_solver.h. Rows of X, and so all vectors here, are
+// components along the directions D of the joints, [rad or m] per [N m or N].
 #include "mechanism/loops/loop_solver.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
   inverse_norms_.setOnes(size_);
 }
 
-/// X_free = K K^T by Cholesky; what is kept is K^-1, lower triangular.
+/// Factors X_free = K K^T by Cholesky and stores K^-1, lower triangular.
 template <class S>
 void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
   const Part& part = parts_[joint];
@@ -69,10 +69,10 @@ S LoopSolver<S>::Cholesky(const ConstRef& A) {
   if (size_ <= kSmallTriangle) {
     using std::max;
     small_ = A;
-    return max(S(0), FactorLower(small_.data(), size_));  // 0 for what is not a number
+    return max(S(0), FactorLower(small_.data(), size_));  // 0 for NaN
   }
   cholesky_.compute(A);
-  // a factorisation that broke off has no smallest pivot: it met one that is not positive
+  // a failed factorisation has no smallest pivot: it met a non-positive one
   if (cholesky_.info() != Eigen::Success) return S(0);
   const S smallest = cholesky_.matrixLLT().diagonal().minCoeff();
   return smallest * smallest;
@@ -112,9 +112,8 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   rcond_ = std::max(eigenvalues_[0], S(0)) / weights_.largest();
 }
 
-/// "softened": U and w_i stay from the geometry. The diagonal of R + diag(R_ii (1 / w_i - 1)) is
-/// R_ii / w_i = N_i^2, so dividing by N from both sides leaves ones on it. inverse_norms_ are
-/// the 1 / N_i.
+/// Regularized: U and w_i are geometric. The diagonal of R + diag(R_ii (1 / w_i - 1)) is R_ii / w_i
+/// = N_i^2, so dividing by N from both sides leaves ones on it. inverse_norms_ are the 1 / N_i.
 template <class S>
 bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
   using std::sqrt;
@@ -153,7 +152,7 @@ void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
   for (Eigen::Index c = 0; c < B.cols(); ++c) SolveLower(small_.data(), size_, B.col(c).data());
 }
 
-/// The same factors transposed, in the opposite order.
+/// Applies the same factors transposed, in the opposite order.
 template <class S>
 void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
   if (form_ != Form::kGeometric) {

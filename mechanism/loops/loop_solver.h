@@ -1,20 +1,20 @@
 // The one place where loop closures are solved and their rank is decided (docs/decisions/005).
 //
 // A loop closure is X phi = rhs, X = C Z C^T symmetric positive semidefinite: the response of the
-// mechanism, seen across one or several joints, to forces in those joints. It is X of the paper's
-// (16), chi of (42) and the inverse of X in (66). Rows are components along the joints' directions
-// D, so points and axes are those that D is given in. X loses rank exactly when a self-stress
-// exists, at a singular position or through redundant constraints.
+// mechanism across one or several joints to forces in those joints. It is X of the paper's (16),
+// chi of (42) and the inverse of X in (66). Rows are components along the joints' directions D and
+// have the points and axes of D. X loses rank exactly when a self-stress exists, at a singular
+// configuration or through redundant constraints.
 //
-// Every solve has the form X^+ = T^T T, and T is what is applied. The ways to T:
+// Every solve has the form X^+ = T^T T and applies T. The choices of T:
 //
 // *Plain*, the factorisation of the paper's time. Fails when a pivot is lost in round-off.
 //
 //     X = L L^T,      T = L^-1
 //
-// *Scaled*, each joint on its own scale K, where K K^T = X_free is the response of the joint's two
-// bodies alone. The eigenvalues of what is factored lie in [0, number of joints]. Where a pivot is
-// below kSuspicious, the next two take the place of this.
+// *Scaled*, each joint by its own scale K, where K K^T = X_free is the response of the joint's two
+// bodies alone. The eigenvalues of the factored matrix lie in [0, number of joints]. If a pivot is
+// below kSuspicious, the next two replace this one.
 //
 //     K^-1 X K^-T = L L^T,      T = L^-1 K^-1
 //
@@ -24,8 +24,8 @@
 //     K_g^-1 X_g K_g^-T = U diag(lambda) U^T
 //     T = diag(sqrt(w_i / lambda_i)) U^T K_g^-1
 //
-// *Softened*, the physical X with directions U and weights w from the geometry. A degenerating
-// direction grows soft, and the least are left out.
+// *Regularized*, the physical X with directions U and weights w from the geometry. A degenerating
+// direction becomes compliant, and the smallest are omitted.
 //
 //     R = U^T K_g^-1 X K_g^-T U
 //     R + diag(R_ii (1 / w_i - 1)) = N L L^T N,      N_i^2 = R_ii / w_i
@@ -45,10 +45,10 @@
 
 namespace loopbench {
 
-/// The share of the usual limit on pivots that holds where a joint closes an assembly of so many
-/// bodies. More than eight answer like one of their mass, whatever their position, and their pivots
-/// are that much smaller. A thousandth is the least: there, at 1e-7, geometry would begin to soften
-/// (kTheta: weights of 0.998 where its largest eigenvalue is 1, of 0.8 where it is 2).
+/// Returns the share of the usual pivot limit for a joint that closes an assembly of so many
+/// bodies. More than eight respond like a single body of their mass in any position, with smaller
+/// pivots. A thousandth is the minimum: there, at 1e-7, geometry would begin to regularize (kTheta:
+/// weights of 0.998 where its largest eigenvalue is 1, of 0.8 where it is 2).
 constexpr double ShareOfLimit(int bodies) { return std::clamp(8.0 / bodies, 1e-3, 1.0); }
 
 /// Room for intermediate matrices; many solvers may share one, not at the same time.
@@ -96,7 +96,7 @@ class LoopSolver {
 
   /// Directions enforced with a weight of at least one half; size() unless geometric.
   int rank() const { return IsGeometric() ? weights_.rank() : size_; }
-  /// Smallest weight; 1 unless geometric or softened.
+  /// Smallest weight; 1 unless geometric or regularized.
   S smallest_weight() const { return IsGeometric() ? weights_.smallest() : S(1); }
   /// Smallest pivot over the scale, or the ratio of extreme geometric eigenvalues.
   S rcond() const { return rcond_; }
@@ -110,7 +110,7 @@ class LoopSolver {
   bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kSoftened; }
   /// K^-1 X K^-T, in the scratch.
   auto Scaled(const ConstRef& X);
-  /// A = L L^T; its smallest pivot, the square of the smallest diagonal, or 0 where it has none.
+  /// Factors A = L L^T; returns its smallest pivot (smallest diagonal squared), or 0 on failure.
   S Cholesky(const ConstRef& A);
   void ScaleRows(Eigen::Ref<MatrixX<S>> B) const;
 
@@ -118,7 +118,7 @@ class LoopSolver {
   Form form_ = Form::kNone;
   std::vector<Part> parts_;          ///< the joints
   std::vector<S> inverse_scales_;    ///< K^-1 of each joint, by columns
-  MatrixX<S> small_;                 ///< L as lower_triangle.h has it, where that serves
+  MatrixX<S> small_;                 ///< L as in lower_triangle.h, for small sizes
   Eigen::LLT<MatrixX<S>> cholesky_;  ///< L elsewhere
   MatrixX<S> directions_;            ///< U
   VectorX<S> eigenvalues_, inverse_norms_;

@@ -1,17 +1,17 @@
-// Which speeds of the forest move the two sides of a cut joint against each other.
+// Speeds of the forest that move the two sides of a cut joint relative to each other.
 #pragma once
 
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench {
 
-/// Calls sink(index into u, V) for each speed of the forest between the two sides of a cut joint,
-/// with what one unit of that speed adds to V_Q - V_P at the joint's Mo. A speed of a joint at p_j
-/// moves all that is outward of it, the point p of the cut joint included:
+/// Calls sink(index into u, V) for each speed of the forest between the two sides of a cut joint; V
+/// is the change of V_Q - V_P at the joint's Mo per unit of that speed. A speed of a joint at p_j
+/// moves everything outward of it, including the point p of the cut joint:
 ///
 ///   V = S(p - p_j) H_i        + on the way from Ground to Q, - on the way to P
 ///
-/// Where the ways are one, neither moves against the other.
+/// On the common part of both paths, neither side moves relative to the other.
 template <class Space, class S, class Sink>
 void ForEachSpeedOfLoop(const Kinematics<Space, S>& kinematics, int index, const Sink& sink) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
@@ -20,7 +20,7 @@ void ForEachSpeedOfLoop(const Kinematics<Space, S>& kinematics, int index, const
   const auto& tree = mechanism.tree();
   int to_Q = mechanism.step_of_body(cut.to), to_P = mechanism.step_of_body(cut.from);
   while (to_Q != to_P) {
-    // a step comes after those that it goes out from: the later one is on one way only
+    // a step comes after its inward step: the later one is on one path only
     const bool on_Q = to_Q > to_P;
     int& s = on_Q ? to_Q : to_P;
     const TreeStep& step = tree[s];

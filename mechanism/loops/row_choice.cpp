@@ -19,7 +19,7 @@ void RowChoice::Take(std::size_t joint, int row) {
   const double norm = left_.row(row).norm();
   if (!(norm > 0.0)) return;
   const Eigen::RowVectorXd unit = left_.row(row) / norm;
-  // twice: what is left of nearly dependent rows must be orthogonal, too
+  // twice: the remainder of nearly dependent rows must be orthogonal, too
   for (int pass = 0; pass < 2; ++pass) {
     const Eigen::VectorXd along = left_ * unit.transpose();
     left_.noalias() -= along * unit;

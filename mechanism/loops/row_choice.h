@@ -21,16 +21,16 @@ class RowChoice {
  public:
   RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas);
 
-  /// One row of a joint (index into the quotas).
+  /// Takes one row of a joint (index into the quotas).
   void Take(std::size_t joint, int row);
-  /// Rows that have no choice: those of joints that keep all, and prescribed ones.
+  /// Takes rows without a choice: rows of joints that keep all, and prescribed ones.
   void TakeFixed();
   /// More rows by pivoting, of those `allowed`, until `total` are taken. The least norm that a row
   /// had left when it was taken.
   double TakeBest(int total, const std::function<bool(int row)>& allowed);
 
   const std::vector<bool>& taken() const { return is_taken_; }
-  /// What was not taken, as directions of `joints` (one per quota).
+  /// Returns the rows not taken, as directions of `joints` (one per quota).
   std::vector<Released> NotTaken(const std::vector<int>& joints) const;
 
  private:

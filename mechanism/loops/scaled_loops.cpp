@@ -12,7 +12,7 @@ namespace loopbench {
 
 namespace {
 
-/// B, and what it is made of.
+/// B and its factors.
 struct Scaling {
   Eigen::MatrixXd B, rows;
   Eigen::LLT<Eigen::MatrixXd> L;

@@ -15,7 +15,7 @@
 
 namespace loopbench {
 
-/// Where the softening weight of direction_weights.h is one half for one joint: 2e-4 sqrt(sqrt(ln
+/// Ratio at which the weight of direction_weights.h is one half for one joint: 2e-4 sqrt(sqrt(ln
 /// 2)).
 inline constexpr double kRankRatio = 1.825e-4;
 
@@ -31,7 +31,7 @@ struct ScaledLoops {
 /// Singular values of B alone.
 struct LoopSpectrum {
   Eigen::VectorXd singular_values;  ///< the largest first
-  double largest = 0.0;             ///< what they are compared with: the first, or at least 0.1
+  double largest = 0.0;             ///< reference for comparisons: the first, or at least 0.1
   int rank = 0;
 };
 template <class Space>

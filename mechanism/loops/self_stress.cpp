@@ -1,4 +1,4 @@
-// Names are those of self_stress.h. Columns of J are the speeds a along H, then b along D.
+// Symbols are defined in self_stress.h. Columns of J are the speeds a along H, then b along D.
 #include "mechanism/loops/self_stress.h"
 
 #include <algorithm>
@@ -74,7 +74,7 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
 }
 
 /// In joint coordinates the forest is the tree of the mechanism, in absolute ones a forest of
-/// joints that release nothing. All other constraints close loops.
+/// joints without released directions. All other constraints close loops.
 template <class Space, class S>
 void SelfStress<Space, S>::Span() {
   const auto& joints = mechanism_->joints();
@@ -201,7 +201,7 @@ S SelfStress<Space, S>::FactorRows() {
   for (int j = 0; j < r_; ++j) {
     for (int i = j; i < r_; ++i) gram_(i, j) = Dot(rows_, i, rows_, j);
   }
-  // at a singular position T is that of regularised rows
+  // at a singular configuration T belongs to regularized rows
   const S trace = gram_.trace();
   gram_.diagonal().array() += S(64) * std::numeric_limits<S>::epsilon() * trace;
   const S pivot = FactorInPlace(gram_) / trace;

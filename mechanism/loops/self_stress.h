@@ -1,9 +1,9 @@
-// Self-stresses of redundant constraints, and the equations that keep their rank off the loops.
+// Self-stresses of redundant constraints, and loop equations of structural rank.
 //
-// Of the m rows of J only r are independent at any admissible position: r is structural
+// Only r of the m rows of J are independent at any admissible position: r is structural
 // (redundancy.h). W (m x d, d = m - r, orthonormal) spans the self-stresses, J^T W = 0, and U their
-// complement, the range of J. The drift e of the constraints lies in that range to first order:
-// e = U eta, in a basis U that the motion carries along without turning it. Then
+// complement, the range of J. The drift e of the constraints lies in that range to first order: e =
+// U eta, in a basis U transported with the motion without rotation. Then
 //
 //   U^T (e'' + W' W'^T e) = eta'',      W' the rate of W with W^T W' = 0,
 //
@@ -19,14 +19,14 @@
 //
 //   W ~ [-J_D^T W_c; W_c],      W_c = [-T; 1],      U ~ [1; T^T] if nothing but W_c is there.
 //
-// D are the directions that joints of the forest constrain; in joint coordinates there are none.
-// Each joint imposes its part of U: direction k becomes D_k + sum_q T_kq D_q over directions q that
-// it releases. For one loop in joint coordinates that is all, and solvers solve (1). Otherwise a
-// solution x0 misses c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong
-// to one joint, and rho has to lie along W. It is x0 + y with U_b^T J y = U_b^T W W^T rho.
-// Multipliers have a part along W then, whose force J^T W W^T lambda is of first order in e, too.
-// In joint coordinates it is taken away. In absolute ones it stays: without it, Bennett's linkage
-// drifted three times as far.
+// D are the directions constrained by joints of the forest; joint coordinates have none. Each joint
+// imposes its part of U: direction k becomes D_k + sum_q T_kq D_q over its released directions q.
+// For one loop in joint coordinates this is complete, and solvers solve (1). Otherwise a solution
+// x0 violates c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong to one
+// joint, and rho must lie along W. The solution is x0 + y with U_b^T J y = U_b^T W W^T rho.
+// Multipliers then have a part along W, whose force J^T W W^T lambda is also of first order in e.
+// In joint coordinates this part is removed. In absolute ones it stays: without it, Bennett's
+// linkage drifted three times as far.
 //
 // Rates of W follow from J^T W = 0: W'^T e = -W^T J' J^+ e, W' x = -(J^+)^T J'^T W x.
 // Multiplication by J' and its transpose are sums along the loops, not matrices.
@@ -72,7 +72,7 @@ class SelfStress {
 
   /// W' W'^T e for the imposed rows; speeds must be current.
   const VectorX<S>& Feedback(const Kinematics<Space, S>& kinematics);
-  /// Whether solvers of the imposed rows solve (1). Otherwise the following have to be asked.
+  /// Returns true if solvers of the imposed rows solve (1). Otherwise use the following functions.
   bool is_exact() const { return is_exact_; }
   /// U_b^T W W^T rho of speeds, rho = J u + b, for the imposed rows.
   const VectorX<S>& ShareOfSpeeds(const Kinematics<Space, S>& kinematics);
@@ -92,7 +92,7 @@ class SelfStress {
     int num_u = 0, num_columns = 0;
     Basis<Space, S> rate;  ///< of its directions
   };
-  /// A joint of the forest between the two sides of one that closes a loop.
+  /// A joint of the forest on the loop between the two sides of a closing joint.
   struct Link {
     int child = 0;
     S sign = S(1);
@@ -131,7 +131,7 @@ class SelfStress {
   void ProjectOnStress(VectorX<S>& z_t, VectorX<S>& z_c);
   /// e of the forest's rows and of the loops'.
   void Measure(const Kinematics<Space, S>& kinematics);
-  /// U_b^T W W^T rho, in the rows of the mechanism, for what released rows miss.
+  /// Returns U_b^T W W^T rho, in the rows of the mechanism, for the violation of released rows.
   const VectorX<S>& Share();
   /// U_b^T of numbers of forest and loops, by the mechanism's rows, out of scale.
   void ToRows(const VectorX<S>& forest, const VectorX<S>& loops, VectorX<S>& rows) const;

@@ -1,7 +1,6 @@
 // Everything is in ground axes. Motions, accelerations and wrenches of a body are at its centre of
-// mass, those of a joint at Mo (joint.h). With S(r) the shift of a motion by r, S(r)^T brings a
-// wrench back: [m; f] at c + r is [m + r x f; f] at c. Numbers in brackets are the O-DCA paper's
-// equations.
+// mass, those of a joint at Mo (joint.h). With S(r) the shift of a motion by r, S(r)^T shifts a
+// wrench back: [m; f] at c + r is [m + r x f; f] at c. Equation numbers refer to the O-DCA paper.
 #include "mechanism/loops/tree_dynamics.h"
 
 #include "mechanism/algebra/instantiate.h"
@@ -18,7 +17,7 @@ struct Arms {
   Arms(const TreeStep& step, const JointState<Space, S>& state)
       : parent(step.sign > 0 ? state.r_P : state.r_Q),
         child(step.sign > 0 ? Linear<Space, S>(-state.r_Q) : Linear<Space, S>(-state.r_P)) {}
-  /// The same from the centres that the masses are at.
+  /// Computes the same from the centres of these masses.
   Arms(const TreeStep& step, const Kinematics<Space, S>& kinematics, Masses masses)
       : Arms(step, kinematics.joints()[step.joint]) {
     if (masses == Masses::kPhysical) return;
@@ -235,8 +234,9 @@ void TreeDynamics<Space, S>::NeededWrenches(const Kinematics<Space, S>& kinemati
   }
 }
 
-/// Inwards, child before parent: a joint transmits what all bodies outward of it need, and H^T of
-/// that at Mo is the force along its coordinates. Leaves in F_ of a body the sum for its subtree.
+/// Inwards, child before parent: a joint transmits the total load of all bodies outward of it. H^T
+/// of this load at Mo is the force along its coordinates. Leaves in F_ of a body the sum for its
+/// subtree.
 template <class Space, class S>
 void TreeDynamics<Space, S>::AlongForest(const Kinematics<Space, S>& kinematics,
                                          VectorX<S>& force) {
@@ -286,8 +286,8 @@ void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX
   }
 }
 
-/// gamma = -D^T (A_Q - A_P - g) with the accelerations that udot = 0 gives: what is
-/// missing in that is J udot.
+/// Computes gamma = -D^T (A_Q - A_P - g) with the accelerations for udot = 0; the missing part is J
+/// udot.
 template <class Space, class S>
 void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics,
                                           VectorX<S>& gamma) const {

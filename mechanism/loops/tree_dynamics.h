@@ -2,7 +2,7 @@
 //
 //   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u + b(q, t) = 0.
 //
-// b, from prescribed motions, is zero without them, and h and gamma then know no time.
+// b, from prescribed motions, is zero without them, and h and gamma then do not depend on time.
 //
 // M by the composite-rigid-body method, h by one outward and one inward pass (Featherstone, Rigid
 // Body Dynamics Algorithms, ch. 5 and 6), J row by row from D^T (V_Q - V_P) at the joint's point.
@@ -25,8 +25,8 @@ class TreeDynamics {
   /// Mass matrix of the forest (num_u x num_u, both triangles).
   void MassMatrix(const Kinematics<Space, S>& kinematics, Masses masses, MatrixX<S>& M);
 
-  /// h: what the speeds alone cost, minus applied forces. Leaves the accelerations for udot = 0 in
-  /// place for JacobianBias().
+  /// Computes h: velocity-dependent terms minus applied forces. Keeps the accelerations for udot =
+  /// 0 for JacobianBias().
   void Bias(const Kinematics<Space, S>& kinematics, VectorX<S>& h);
 
   /// J (num_rows x num_u).
@@ -43,8 +43,8 @@ class TreeDynamics {
   std::span<const Wrench<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
                                                  const VectorX<S>& udot, const VectorX<S>& lambda);
 
-  /// What udot and lambda leave of the equations above: M udot + h - J^T lambda in `force`,
-  /// J udot - gamma in `constraint`. O(n). Takes the place of what Bias() left.
+  /// Computes residuals of the equations above for udot and lambda: M udot + h - J^T lambda in
+  /// `force`, J udot - gamma in `constraint`. O(n). Overwrites the accelerations kept by Bias().
   void Residual(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                 const VectorX<S>& lambda, VectorX<S>& force, VectorX<S>& constraint);
 
@@ -52,15 +52,14 @@ class TreeDynamics {
   void BodyAccelerations(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                          std::span<Acceleration<Space, S>> A) const;
 
-  /// What udot alone gives to them: the part of these accelerations that is linear in it. The same
-  /// for speeds.
+  /// Computes the part of these accelerations that is linear in udot. Also for speeds.
   void Motions(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                std::span<Acceleration<Space, S>> A) const;
   /// M x, in O(n) and without M.
   void MassTimes(const Kinematics<Space, S>& kinematics, const VectorX<S>& x, VectorX<S>& force);
 
  private:
-  /// Accelerations with what speeds and time add to them, or without.
+  /// Computes accelerations with or without the terms of speeds and time.
   template <bool kWithBias>
   void Outward(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,
                std::span<Acceleration<Space, S>> A) const;
@@ -85,8 +84,8 @@ template <class Space, class S>
 Wrench<Space, S> InertialForce(const Kinematics<Space, S>& kinematics, int body,
                                const Acceleration<Space, S>& A);
 
-/// b: what the constraints would miss if all free speeds were zero. `zero` has num_u zeros; the
-/// motions of `kinematics` are left at them where there are prescribed motions.
+/// Computes b: the constraint violation if all free speeds were zero. `zero` has num_u zeros. With
+/// prescribed motions, the motions of `kinematics` keep these zeros.
 template <class Space, class S>
 void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias);
 
@@ -96,7 +95,7 @@ template <class Space, class S>
 Acceleration<Space, S> RelativeAcceleration(const Kinematics<Space, S>& kinematics, int joint,
                                             std::span<const Acceleration<Space, S>> A);
 
-/// Those components, one per direction, imposed ones first.
+/// Returns the components along the directions, imposed ones first.
 template <class Space, class S>
 Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
                                        std::span<const Acceleration<Space, S>> A);

@@ -6,7 +6,7 @@
 namespace loopbench {
 
 void RequireDense(const std::string& what, double numbers) {
-  constexpr double kMost = 1e18;  // bytes: what size_t holds, and no machine has
+  constexpr double kMost = 1e18;  // bytes: fits size_t, and exceeds every machine
   const double bytes = numbers * static_cast<double>(sizeof(double));
   // volatile: a block that is never used would not be asked for
   void* volatile block = bytes < kMost ? std::malloc(static_cast<std::size_t>(bytes)) : nullptr;

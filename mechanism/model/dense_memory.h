@@ -1,4 +1,4 @@
-// Memory that dense matrices are going to ask for.
+// Memory requests of dense matrices.
 #pragma once
 
 #include <new>
@@ -6,7 +6,7 @@
 
 namespace loopbench {
 
-/// Thrown where a process may not have the memory of matrices whose cause is known.
+/// Thrown if memory of matrices with a known cause is not available.
 class TooDense : public std::bad_alloc {
  public:
   explicit TooDense(const std::string& message) : message_(message) {}
@@ -16,13 +16,11 @@ class TooDense : public std::bad_alloc {
   std::string message_;
 };
 
-/// Numbers up to which solvers keep dense matrices ready for positions that their sparse factors
-/// leave in doubt: 160 MB.
+/// Maximum size of dense matrices that solvers keep ready for uncertain sparse factors: 160 MB.
 inline constexpr double kKeptReady = 2e7;
 
-/// Asks for the memory of so many numbers in one piece and gives it back untouched. A process that
-/// may not have it learns so now, by name, and not hours later in the middle of its work. Throws
-/// TooDense with "`what` asks for N GB".
+/// Allocates memory for so many numbers at once and frees it untouched. A process without enough
+/// memory thus fails at once, not hours later. Throws TooDense with "`what` asks for N GB".
 void RequireDense(const std::string& what, double numbers);
 
 }  // namespace loopbench

@@ -1,5 +1,5 @@
-// What a force does, compiled for one space and scalar: a specialisation of ForceElement for each
-// struct of mechanism/description/force.h, in force_NAME.h. Here is what they share.
+// Compiled forces for one space and scalar: a specialisation of ForceElement for each struct of
+// mechanism/description/force.h, in force_NAME.h. This file holds their common parts.
 //
 // Everything is in ground axes. A wrench on a body is [moment; force] at its centre of mass; a
 // force f at the point r from there adds [r x f; f]. These are the active forces of the paper
@@ -26,10 +26,9 @@ struct Power {
   S dissipated = S(0);  ///< dampers and drag; >= 0
 };
 
-/// Made from a force and its description, which is valid. It derives from ForceDefaults and has
-/// AddWrenches(kinematics, wrenches), to which it adds [moment; force] body by body, and what else
-/// differs from the defaults. What it does has either a potential or power: else the energy balance
-/// does not close.
+/// Built from a force and its valid description. Derives from ForceDefaults and has
+/// AddWrenches(kinematics, wrenches), which adds [moment; force] body by body, and any overrides.
+/// Its effect needs either a potential or power: otherwise the energy balance does not close.
 template <class Space, class S, class Description>
 class ForceElement;
 
@@ -37,7 +36,7 @@ template <class Space, class S>
 struct ForceDefaults {
   /// Potential energy [J].
   S Potential(const Kinematics<Space, S>&) const { return S(0); }
-  /// Adds what it supplies or dissipates; called only where has_power().
+  /// Adds supplied or dissipated power; called only if has_power().
   void AddPower(const Kinematics<Space, S>&, Power<S>&) const {}
   bool has_power() const { return false; }
   /// Times [s] at which it is not smooth.

@@ -13,7 +13,7 @@
 
 namespace loopbench {
 
-/// One of all kinds.
+/// A force of any kind.
 template <class Space, class S, class Descriptions = ForceDescription>
 struct AnyForceElement;
 template <class Space, class S, class... Descriptions>
@@ -21,7 +21,7 @@ struct AnyForceElement<Space, S, std::variant<Descriptions...>> {
   using Type = std::variant<ForceElement<Space, S, Descriptions>...>;
 };
 
-/// All of a mechanism, in the order of the description.
+/// All forces of a mechanism, in the order of the description.
 template <class Space, class S>
 class ForceElements {
  public:
@@ -45,7 +45,7 @@ class ForceElements {
   }
 
   bool empty() const { return elements_.empty(); }
-  /// Whether any of them has no potential.
+  /// Returns true if any force has no potential.
   bool has_power() const {
     bool any = false;
     ForEach([&](const auto& element) { any = any || element.has_power(); });

@@ -1,5 +1,5 @@
-// Forces of kinds that other programs have registered (registry.h): their elements behind virtual
-// functions, in double and in dual numbers.
+// User-defined kinds of forces (registry.h): their elements behind virtual functions, in double and
+// in dual numbers.
 #pragma once
 
 #include <any>
@@ -14,7 +14,7 @@
 
 namespace loopbench {
 
-/// What ForceElement does, of whatever kind.
+/// Interface of a ForceElement of any kind.
 template <class Space, class S>
 class OtherElement {
  public:

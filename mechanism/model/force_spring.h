@@ -38,7 +38,7 @@ class ForceElement<Space, S, SpringDamper> : public ForceDefaults<Space, S> {
   bool has_power() const { return damping_ != S(0); }
 
  private:
-  /// Where the points meet the direction is zero, and with it all forces.
+  /// If the points coincide, the direction is zero, and with it all forces.
   struct State {
     PointState<Space, S> from, to;
     S distance, rate;

@@ -1,4 +1,4 @@
-// What the forces of a mechanism do together: wrenches, energy, power.
+// All forces of a mechanism together: wrenches, energy, power.
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/model/kinematics.h"
 
@@ -24,7 +24,7 @@ void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Spac
       [&](const auto& element) { element.AddWrenches(kinematics, wrenches); });
 }
 
-/// Kinetic: (m v^2 + w . I w) / 2 at the centre of mass. Potential: -m g . p and that of forces.
+/// Kinetic: (m v^2 + w . I w) / 2 at the centre of mass. Potential: -m g . p and the forces' own.
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();

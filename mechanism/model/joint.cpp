@@ -67,14 +67,14 @@ JointKind<Space, S> KindWith(JointType type, S parameter) {
 
 template <class Space, class S>
 Velocity<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM) {
-  if (kind.coordinates == nullptr) {  // a rod: what it is too long along itself
+  if (kind.coordinates == nullptr) {  // a rod: its excess length along itself
     return {Angular<Space, S>::Zero(), X_FM.p * (S(1) - kind.parameter / X_FM.p.norm())};
   }
   S q[7];
   kind.coordinates(X_FM, q, kind.parameter);
   const Pose<Space, S> nearest = PoseAt(kind, q);
   Velocity<Space, S> mismatch(RotationVector(Compose(X_FM, Inverse(nearest))), X_FM.p - nearest.p);
-  // A loop may wind: planar angles along it then differ by whole turns that are no mismatch.
+  // A loop may wind: planar angles along it then differ by whole turns, which are no violation.
   if constexpr (Space::kRot == 1) {
     using std::remainder;
     mismatch.angular[0] = remainder(mismatch.angular[0], S(2 * std::numbers::pi_v<S>));

@@ -1,4 +1,4 @@
-// A joint kind: one small piece of code that says how frame M of body Q moves in frame F of body P.
+// A joint kind defines the motion of frame M of body Q in frame F of body P.
 //
 // With q the coordinates and u the speeds of the joint (paper, table 1 and eq. 7-9):
 //
@@ -7,17 +7,17 @@
 //                   and of unit length in every kind but the helical one
 //   D_F(q)          its orthogonal complement, D_F^T H_F = 0: the directions of constraint forces
 //   qdot = N(q) u   kinematic rates
-//   q*(X_FM)        coordinates of the admissible pose nearest to a measured one; what is left
-//                   of the measured pose is the joint's mismatch (position drift)
+//   q*(X_FM)        coordinates of the admissible pose nearest to a measured one; the remainder
+//                   is the joint's constraint violation (position drift)
 //
 // The constraint of a joint is imposed at one point, that of P and that of Q which now coincide
 // with Mo. In ground axes, with w_rel and v_rel the measured relative motion seen from F,
 //
 //   A_Q - A_P = H udot + g,        g = Hdot u + [w_P x w_rel; 2 w_P x v_rel]              (7)
 //
-// where Hdot u is the derivative seen from F, zero for most kinds, whose H_F is constant. With that
-// g, D^T (A_Q - A_P - g) = 0 says that the mismatch, written in F axes, has no second derivative
-// (to first order in a rotation mismatch in space).
+// where Hdot u is the derivative in F, zero for most kinds, whose H_F is constant. With this g, D^T
+// (A_Q - A_P - g) = 0 means that the violation, in F axes, has zero second derivative (to first
+// order in a rotation violation in space).
 //
 // Coordinates, in F axes:
 //   revolute      angle about z
@@ -25,14 +25,14 @@
 //   weld          none
 //   free          plane: angle, x, y; space: quaternion w x y z, then x, y, z
 //   pin-in-slot   angle about z, shift along x
-//   rod           none that is followed: the distance of Mo from Fo is constant, and D is along it
+//   rod           none; the distance of Mo from Fo is constant, and D is along it
 //   cylindrical   angle about z, shift along z
 //   spherical     quaternion w x y z
 //   planar        angle about z, x, y
 //   universal     angle about x, then about the turned y
 //   helical       angle about z, along which it shifts by `pitch` times the angle
-// Speeds are their rates; with a quaternion, the angular velocity. A quaternion is normalised where
-// it is used, so its length carries no information.
+// Speeds are their rates; with a quaternion, the angular velocity. A quaternion is normalised on
+// use, so its length carries no information.
 #pragma once
 
 #include <array>
@@ -50,14 +50,14 @@ template <class Space, class S>
 struct JointKind {
   int num_q = 0;
   int num_u = 0;
-  /// Where every direction of H and D is a coordinate axis of F and constant: [H D] as a
-  /// permutation of the components of a motion. The num_u free ones come first.
+  /// If every direction of H and D is a constant coordinate axis of F: [H D] as a permutation of
+  /// the components of a motion. The num_u free ones come first.
   std::array<int, Space::kDim> axes{};
-  /// No rotation of F changes the space that D spans, nor that of H, as for a pin in the plane.
-  /// Both may then be taken in ground axes.
+  /// True if no rotation of F changes the spaces of D and H, as for a planar revolute joint. Both
+  /// may then be taken in ground axes.
   bool rotation_invariant = false;
 
-  /// What the kinds helical (pitch [m/rad]) and rod (length [m]) depend on; 0 for others.
+  /// Parameter of the kinds helical (pitch [m/rad]) and rod (length [m]); 0 for others.
   S parameter = S(0);
   /// 1 / |H|^2 of each column of H, by which u = inverse_H_squared H^T V for a relative velocity V.
   /// It is 1 in every built-in kind but the helical, whose H is [z; pitch z]; found from `basis`.
@@ -68,20 +68,20 @@ struct JointKind {
   void (*coordinates)(const Pose<Space, S>& X_FM, S* q, S parameter) = nullptr;
   void (*rates)(const S* q, const S* u, S* qdot) = nullptr;
 
-  /// Where directions are not axes: [H D] in F axes at a pose, orthogonal; null otherwise.
+  /// If directions are not axes: [H D] in F axes at a pose, orthogonal; null otherwise.
   void (*basis)(const Pose<Space, S>& X_FM, Basis<Space, S>& basis_F, S parameter) = nullptr;
-  /// And Hdot u in F axes, for a relative velocity V in F axes; null where it is zero.
+  /// Hdot u in F axes, for a relative velocity V in F axes; null if zero.
   Acceleration<Space, S> (*bias)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V) = nullptr;
 
-  /// `basis` and `bias` of a constraint whose mismatch may be more than round-off: components of
-  /// D^T V and their rates are then the first and second derivatives of the mismatch to first order
-  /// in it. Null where those above are, as for constraints on shifts or on all rotations.
+  /// `basis` and `bias` of a constraint whose violation may exceed round-off: components of D^T V
+  /// and their rates are then the first and second derivatives of the violation to first order in
+  /// it. Null if those above are, as for constraints on shifts or on all rotations.
   void (*exact_basis)(const Pose<Space, S>& X_FM, Basis<Space, S>& basis_F, S parameter) = nullptr;
   Acceleration<Space, S> (*exact_bias)(const Pose<Space, S>& X_FM,
                                        const Velocity<Space, S>& V) = nullptr;
 
-  /// The rate of `basis` [H D] for a relative velocity V, both in F axes, where angular parts alone
-  /// move; null where they do not, or it is not known.
+  /// The rate of `basis` [H D] for a relative velocity V, both in F axes, if only angular parts
+  /// move; null otherwise or if unknown.
   void (*basis_rate)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V,
                      Basis<Space, S>& rate_F) = nullptr;
   void (*exact_basis_rate)(const Pose<Space, S>& X_FM, const Velocity<Space, S>& V,
@@ -95,7 +95,7 @@ struct JointKind {
 template <class Space, class S>
 const JointKind<Space, S>& KindOf(JointType type);
 
-/// The same for one joint, with its own parameter.
+/// Does the same for one joint, with its own parameter.
 template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter);
 
@@ -108,8 +108,8 @@ Pose<Space, S> PoseAt(const JointKind<Space, S>& kind, const S* q) {
   return X_FM;
 }
 
-/// What keeps M from its nearest admissible pose, in F axes: [rotation vector; shift], the way that
-/// a velocity goes in unit time. Its components along D are the joint's mismatch, in rad and m.
+/// Returns the deviation of M from its nearest admissible pose, in F axes: [rotation vector;
+/// shift], signed like a velocity. Its components along D are the constraint violation [rad, m].
 template <class Space, class S>
 Velocity<Space, S> Mismatch(const JointKind<Space, S>& kind, const Pose<Space, S>& X_FM);
 

@@ -1,5 +1,5 @@
 // Directions H and D of the joints at the current poses, and which of them are imposed. Frames and
-// letters are those of kinematics.cpp.
+// symbols: kinematics.cpp.
 #include <algorithm>
 
 #include "mechanism/algebra/instantiate.h"
@@ -55,8 +55,8 @@ Pose<Space, S> Moved(Pose<Space, S> X, const Velocity<Space, S>& V, S time) {
   return X;
 }
 
-/// Ground axes serve for H and D where their spans do not depend on axes: nothing is prescribed or
-/// released of them.
+/// Ground axes are valid for H and D if their spans do not depend on axes: nothing is prescribed or
+/// released.
 template <class Space, class S>
 bool AnyAxes(const Joint<Space, S>& joint) {
   return joint.kind->rotation_invariant && joint.num_drives == 0 && joint.num_released == 0;
@@ -64,8 +64,8 @@ bool AnyAxes(const Joint<Space, S>& joint) {
 
 }  // namespace
 
-/// Directions that stand still are set once and for all: those whose span needs no axes, and those
-/// of joints on Ground, for which F stands where X_PF puts it. UpdatePosition() sets the others.
+/// Fixed directions are set once: directions whose span needs no axes, and directions of joints on
+/// Ground, for which X_PF fixes F. UpdatePosition() sets the others.
 template <class Space, class S>
 void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
   released_ = released;

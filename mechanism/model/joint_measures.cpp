@@ -1,4 +1,4 @@
-// What the joints measure at the current poses and motions: mismatches, coordinates, speeds.
+// Measured values of joints at the current poses and motions: violations, coordinates, speeds.
 #include <cmath>
 #include <numbers>
 
@@ -18,7 +18,7 @@ Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
   for (int k = 0; k < joint.num_drives; ++k) {
     const int drive = joint.first_drive + k, coordinate = mechanism_->drives()[drive].coordinate;
     S miss = q[coordinate] - drives_[drive].value;
-    // an angle is measured modulo a turn, and which one a helix tells by its shift
+    // an angle is measured modulo a turn; the shift of a helix determines the turn
     const bool angle = joint.kind->axes[coordinate] < Space::kRot && joint.kind->parameter == S(0);
     using std::remainder;
     if (angle) miss = remainder(miss, S(2 * std::numbers::pi_v<S>));
@@ -46,7 +46,7 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   }
   S q;
   joint.kind->coordinates(joint_poses_[index], &q, joint.kind->parameter);
-  if (joint.kind->parameter != S(0)) return q;  // a helix tells its turns
+  if (joint.kind->parameter != S(0)) return q;  // the shift of a helix determines its turns
   // Space measures an angle modulo a turn; take the one next to the last accepted.
   if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
     const S turn = 2 * std::numbers::pi_v<S>;

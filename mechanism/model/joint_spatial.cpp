@@ -87,8 +87,8 @@ struct Kinds {
   static void TiltRate(const P& X, const Velocity<Spatial, S>& V, Basis<Spatial, S>& rate_F) {
     TiltAxes<kAxes...>(V.angular.cross(X.R.col(2)), S(0), rate_F);
   }
-  /// Second derivatives of the tilts, less the part that is linear in the accelerations:
-  /// d/dt (y_F x z_M) . w = w^2 (y_F . z_M) - (w . z_M) (w . y_F), likewise about y.
+  /// Second derivatives of the tilts, less the part that is linear in the accelerations: d/dt (y_F
+  /// x z_M) . w = w^2 (y_F . z_M) - (w . z_M) (w . y_F), and the same about y.
   static Acceleration<Spatial, S> TiltBias(const P& X, const Velocity<Spatial, S>& V) {
     const Tilt tilt(X.R.col(2));
     const Angular<Spatial, S>& w = V.angular;
@@ -297,7 +297,7 @@ struct Kinds {
                 },
             .coordinates =
                 [](const P& X, S* q, S pitch) {
-                  // the shift along the axis says in which turn the angle is
+                  // the shift along the axis determines the turn of the angle
                   using std::round;
                   const S turn = 2 * std::numbers::pi_v<S>;
                   q[0] = AngleAboutZ(X);

@@ -1,6 +1,6 @@
-// Equations in brackets are those of the O-DCA paper (odca/README.md has the index). Frames: W is
-// Ground, F is fixed on body P of a joint and M on its body Q; X_AB is the pose of B in A, and R_AB
-// takes components from B axes to A axes. All vectors are in ground axes unless a name ends in _F.
+// Equation numbers refer to the O-DCA paper (odca/README.md has the index). Frames: W is Ground, F
+// is fixed on body P of a joint and M on its body Q; X_AB is the pose of B in A, and R_AB takes
+// components from B axes to A axes. All vectors are in ground axes unless a name ends in _F.
 #include "mechanism/model/kinematics.h"
 
 #include <algorithm>
@@ -24,8 +24,8 @@ void SinesOfPose(const S& angle, S& sine, S& cosine) {
   cosine = cos(angle);
 }
 
-/// Matrices of planar poses from their angles, in double as many at once as there are lanes. A pose
-/// has the same bits wherever it stands.
+/// Computes matrices of planar poses from their angles, in double as many at once as there are
+/// lanes. The bits of a pose do not depend on its lane.
 template <class S>
 void SetMatrices(std::span<Pose<Planar, S>> poses) {
   if constexpr (std::is_same_v<S, double>) {
@@ -151,7 +151,7 @@ void Kinematics<Space, S>::PlaceChild(const TreeStep& step) {
   FollowDirections(step.joint, R_WF);
 }
 
-/// A cut joint's X_FM is what the two bodies leave; its point Mo is that of Q.
+/// The two body poses give a cut joint's X_FM; its point Mo is fixed on Q.
 template <class Space, class S>
 void Kinematics<Space, S>::MeasureCut(int index) {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
@@ -176,10 +176,10 @@ void Kinematics<Space, S>::MeasureCut(int index) {
 ///   V_rel = S(r_Q) V_Q - S(r_P) V_P                                            a cut joint
 ///   g     = Hdot u + [w_P x w_rel; 2 w_P x v_rel] + D times given accelerations
 ///
-/// S(r) takes a motion from a point to the one at r from it. g is what (7) has beside H udot, for
-/// the points of P and Q that coincide with Mo: one w_P x v_rel because the axes turn with P,
-/// another one because Mo slides along P. The same lines serve joints to Ground, one side of
-/// which stands still (33-34), and both joints of a coupled loop (49-50).
+/// S(r) shifts a motion from a point to the point at r from it. g is the part of (7) besides H
+/// udot, for the points of P and Q that coincide with Mo: one w_P x v_rel because the axes turn
+/// with P, another one because Mo slides along P. The same lines serve joints to Ground, one side
+/// of which stands still (33-34), and both joints of a coupled loop (49-50).
 template <class Space, class S>
 void Kinematics<Space, S>::UpdateVelocity(const Eigen::Ref<const VectorX<S>>& u) {
   u_ = u;

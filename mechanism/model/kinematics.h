@@ -1,10 +1,10 @@
 // Poses, motions and joint frames of a mechanism at one (q, u): the workspace all formulations
 // share.
 //
-// Everything is in ground axes. Motions and wrenches of a body are taken at its centre of mass,
-// those of a joint at Mo, the origin of the frame M fixed on its body Q (see joint.h). The paper
-// generates positions and velocities by an assembly and a disassembly of their own, its first two
-// sweeps; here they are a walk along the spanning tree from Ground outwards, body after body.
+// Everything is in ground axes. Motions and wrenches of a body are taken at its centre of mass; for
+// a joint at Mo, the origin of the frame M fixed on its body Q (see joint.h). The paper computes
+// positions and velocities by its first two sweeps (assembly and disassembly). Here they are a walk
+// along the spanning tree from Ground outwards, body after body.
 #pragma once
 
 #include <span>
@@ -25,8 +25,8 @@ struct JointState {
 
   /// Column i of the motion map.
   const Direction<Space, S>& H(int i) const { return basis[i]; }
-  /// Constrained direction i: those of prescribed coordinates first, then others that are imposed,
-  /// `rows()` in all; behind them those released as redundant (redundancy.h), `directions()` in
+  /// Returns constrained direction i: prescribed coordinates first, then other imposed ones,
+  /// `rows()` in all. Directions released as redundant (redundancy.h) follow, `directions()` in
   /// all.
   const Direction<Space, S>& D(int i) const { return basis[num_u + i]; }
   int rows() const { return num_rows; }
@@ -67,7 +67,7 @@ class Kinematics {
   const VectorX<S>& q() const { return q_; }  ///< of the last UpdatePosition()
   const VectorX<S>& u() const { return u_; }  ///< of the last UpdateVelocity()
 
-  /// Counts UpdatePosition() calls: what was computed from positions is good while it stands.
+  /// Returns the number of UpdatePosition() calls; results from positions are valid while equal.
   long position_version() const { return position_version_; }
 
   const Mechanism<Space, S>& mechanism() const { return *mechanism_; }
@@ -77,8 +77,8 @@ class Kinematics {
   /// [H D] of a joint, to be changed until the next UpdatePosition().
   Basis<Space, S>& basis(int joint) { return joints_[joint].basis; }
 
-  /// Classical acceleration of the point of `body` at r from its centre of mass minus that of the
-  /// centre of mass, for zero angular acceleration: [0; w x (w x r)].
+  /// Returns the classical acceleration of the point of `body` at r from its centre of mass minus
+  /// the acceleration of the centre of mass, for zero angular acceleration: [0; w x (w x r)].
   Acceleration<Space, S> Centripetal(int body, const Linear<Space, S>& r) const;
 
   /// Rotational inertia of a body in ground axes, and its inverse.
@@ -100,8 +100,8 @@ class Kinematics {
     return poses_[mechanism_->joints()[joint].from].p + joints_[joint].r_P;
   }
 
-  /// Mismatch of a constraint in ground axes: [rotation; shift], see joint.h. D^T of it is the
-  /// constraint function whose Jacobian is tree_dynamics.h's J.
+  /// Returns the violation of a constraint in ground axes: [rotation; shift], see joint.h. D^T
+  /// times it is the constraint function whose Jacobian is tree_dynamics.h's J.
   Velocity<Space, S> ConstraintMismatch(int joint) const;
 
   /// The part of a relative motion that a constraint forbids, with directions released because
@@ -129,7 +129,7 @@ class Kinematics {
   /// Part of the mode; the positions must be updated afterwards.
   void Release(const std::vector<Released>& released);
   const std::vector<Released>& released() const { return released_; }
-  /// Which direction of its kind's D a row of a constraint imposes (not of a prescribed
+  /// Returns the direction of its kind's D that a row of a constraint imposes (not of a prescribed
   /// coordinate).
   int DirectionOf(int joint, int row) const;
 
@@ -144,7 +144,7 @@ class Kinematics {
 
   /// q of a mechanism with the same bodies, from body poses here (other coordinate set).
   VectorX<S> CoordinatesIn(const Mechanism<Space, S>& other) const;
-  /// u likewise.
+  /// Returns u for the same.
   VectorX<S> SpeedsIn(const Kinematics& other) const;
 
  private:
@@ -166,8 +166,8 @@ class Kinematics {
   std::vector<Pose<Space, S>> poses_;
   std::vector<Velocity<Space, S>> motions_;
   std::vector<JointState<Space, S>> joints_;
-  /// X_FM, of tree joints as q says, of constraints as the bodies stand. In the plane the matrix is
-  /// that of the angle only for kinds with a basis.
+  /// X_FM: of tree joints from q, of constraints from the body poses. In the plane the matrix is
+  /// the rotation of the angle only for kinds with a basis.
   std::vector<Pose<Space, S>> joint_poses_;
   std::vector<TimeValue<S>> drives_;
   std::vector<S> accepted_;  ///< last accepted coordinate of each joint
@@ -182,14 +182,14 @@ class Kinematics {
 /// body.
 template <class Space, class S>
 void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Space, S>> wrenches);
-/// The same without gravity.
+/// Does the same without gravity.
 template <class Space, class S>
 void ForcesBesideGravity(const Kinematics<Space, S>& kinematics,
                          std::span<Wrench<Space, S>> wrenches);
 
-/// Energies [J] at the current position and speed; potential is zero for centres of mass in the
-/// ground origin and springs at rest. Constant forces on points (ground axes) and joints, preloads
-/// among them, count as potentials; what AppliedPower() knows does not.
+/// Returns energies [J] at the current position and speed; potential is zero for centres of mass in
+/// the ground origin and springs at rest. Constant forces on points (ground axes) and joints, and
+/// preloads, count as potentials. Forces in AppliedPower() do not.
 template <class S>
 struct Energy {
   S kinetic = S(0);
@@ -199,7 +199,7 @@ struct Energy {
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
 
-/// What forces without a potential supply and dissipate (force_element.h).
+/// Returns the power that forces without a potential supply and dissipate (force_element.h).
 template <class Space, class S>
 Power<S> AppliedPower(const Kinematics<Space, S>& kinematics);
 

@@ -15,8 +15,8 @@ namespace loopbench {
 
 namespace {
 
-/// Joints of a body that are nearer to each other than this part of its size are on one pin, and so
-/// are those that the rounding of their places tells apart.
+/// Joints of a body nearer to each other than this fraction of its size count as coincident, as do
+/// joints separated by rounding.
 constexpr double kOnePin = 1e-9;
 
 /// A joint's frame in body axes, from the centre of mass.
@@ -37,7 +37,7 @@ Pose<Space, S> SidePose(const JointSide& side, const JointDescription& joint,
   return X;
 }
 
-/// By cofactors.
+/// Inverts by cofactors.
 template <class S>
 Small<S, 3, 3> Inverse(const Small<S, 3, 3>& A) {
   Small<S, 3, 3> cofactors;
@@ -216,7 +216,7 @@ void Mechanism<Space, S>::AddGeometry(const MechanismDescription& description) {
       if (body != kGround) joints_of[body].push_back(p);
     }
   }
-  // joints on one pin count once: how many there are says nothing about the body's shape
+  // coincident joints count once: their number does not affect the body's shape
   for (std::vector<Point>& points : joints_of) {
     S nearest = S(0);
     for (const Point& p : points) {

@@ -21,8 +21,8 @@ struct Inertia {
   Matrix rotational_inverse = Matrix::Zero();
 };
 
-/// Which masses an evaluation uses: the bodies' own, or unit masses in the middle of each body's
-/// joints, for decisions of rank that must depend on geometry alone (docs/decisions/005).
+/// Masses of an evaluation: the bodies' own, or unit masses in the middle of each body's joints,
+/// for decisions of rank that must depend on geometry alone (docs/decisions/005).
 enum class Masses { kPhysical, kGeometric };
 
 /// Small on purpose: a long chain streams all of it through the cache at every evaluation.
@@ -53,8 +53,8 @@ struct Drive {
   TimeFunction value;
 };
 
-/// Directions of one joint that it does not impose (redundancy.h), ascending, counted in D behind
-/// those of prescribed coordinates.
+/// Directions that a joint does not impose (redundancy.h), ascending, counted in D behind the
+/// directions of prescribed coordinates.
 struct Released {
   int joint = 0;
   std::vector<int> directions;
@@ -105,13 +105,13 @@ class Mechanism {
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
-  /// Directions that constraints do not impose at first, by joint; mostly none at all.
+  /// Directions that constraints do not impose at first, by joint; usually empty.
   const std::vector<Released>& released() const { return released_; }
-  /// Whether released directions are constraints that drift (self_stress.h): not of rounded input.
+  /// Returns true if released directions are constraints that drift (self_stress.h), not rounded.
   bool is_redundant() const { return !released_.empty() && !rounded_; }
   const ForceElements<Space, S>& forces() const { return forces_; }
   const Linear<Space, S>& gravity() const { return gravity_; }
-  /// Whether something supplies or dissipates power: else the total energy stays.
+  /// Returns true if power is supplied or dissipated: otherwise total energy is conserved.
   bool has_power() const { return forces_.has_power() || !drives_.empty(); }
   /// Times [s] at which derivatives of a prescribed motion or of a force jump, ascending: an
   /// integrator must not step across them.
@@ -125,7 +125,7 @@ class Mechanism {
   S length() const { return length_; }
 
   /// kGeometric: unit masses whose radius of gyration is length() of their own island (islands.h),
-  /// about geometric_centre(): parts of other sizes and far centres of mass say nothing.
+  /// about geometric_centre(): sizes of other parts and far centres of mass have no effect.
   const std::vector<Inertia<Space, S>>& bodies(Masses masses) const {
     return masses == Masses::kPhysical ? bodies_ : geometric_bodies_;
   }

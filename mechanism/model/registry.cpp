@@ -11,8 +11,8 @@
 namespace loopbench {
 namespace {
 
-/// Whether a kind's functions agree with one another in one space. They are evaluated at a few
-/// coordinates near one: what is beyond kRound is no rounding.
+/// Checks that a kind's functions agree with one another in one space. They are evaluated at a few
+/// coordinates near one: differences above kRound are errors, not rounding.
 template <class Space>
 class KindCheck {
  public:
@@ -24,7 +24,7 @@ class KindCheck {
     dual_.parameter = Dual(0.3);
   }
 
-  /// What is wrong, or "".
+  /// Returns the error, or "".
   std::string Find() {
     if (std::string wrong = Sizes(); !wrong.empty()) return wrong;
     for (int sample = 0; sample < 5 && wrong_.empty(); ++sample) At(sample);
@@ -121,7 +121,7 @@ class KindCheck {
     }
   }
 
-  /// Each column of H is the motion of M in F along its speed.
+  /// Checks that each column of H is the motion of M in F along its speed.
   void Motions(const Basis<Space, double>& basis, const Pose<Space, Dual>& X) {
     for (int k = 0; k < kind_.num_u; ++k) {
       const auto turn = [&](int i, int j) {

@@ -1,19 +1,19 @@
-// Kinds of joints and forces of other programs. A program registers its own before anything reads
-// a mechanism, best first thing in main() (examples/own-parts/), and from then on the names are
-// valid in files and messages, `explain` and tables, as those of the built-in kinds are.
+// User-defined kinds of joints and forces. A program registers them before any mechanism is read,
+// best at the start of main() (examples/own-parts/). Their names are then valid in files, messages,
+// `explain` and tables, like the built-in kinds.
 //
 //   template <class Space, class S>
-//   struct RackAndPinion { static JointKind<Space, S> Make(); };      // joint.h says what it holds
+//   struct RackAndPinion { static JointKind<Space, S> Make(); };      // contents: joint.h
 //   RegisterJoint<RackAndPinion>({.name = "rack-and-pinion", .in_plane = true, ...});
 //
 //   struct Friction { int joint; double moment, speed; };             // as in force.h, with
-//   ForceParts PartsOf(Friction& f);                                  // its parts beside it and
-//   template <class Space, class S>                                   // what it does
+//   ForceParts PartsOf(Friction& f);                                  // its parts and
+//   template <class Space, class S>                                   // its mechanics
 //   class loopbench::ForceElement<Space, S, Friction> : ForceDefaults<Space, S> { ... };
 //   RegisterForce<Friction>();
 //
 // Both are templates on the scalar: the library evaluates them in double, and in dual numbers for
-// derivatives. Runs in several scalars (harness/precision/) have the built-in kinds alone.
+// derivatives. Precision studies (harness/precision/) support only the built-in kinds.
 #pragma once
 
 #include "mechanism/description/joint_type.h"
@@ -30,11 +30,11 @@ struct JointKindSet {
   JointKind<Spatial, Dual> spatial_dual;
 };
 
-/// Adds a kind. Throws std::invalid_argument where it is not sound (description/registration.h),
-/// and for a kind that contradicts itself: its functions are evaluated, for parameter 0.3 if it has
-/// one, and H must be the derivative of the transform along the rates, D its orthogonal complement,
-/// the bias the derivative of H u, and `coordinates` must give back those of admissible poses. The
-/// texts of `traits` must outlive all use.
+/// Adds a kind. Throws std::invalid_argument if the entry is invalid (description/registration.h)
+/// or the kind is inconsistent. The check evaluates its functions, for parameter 0.3 if it has one.
+/// H must be the derivative of the transform along the rates, D its orthogonal complement, the bias
+/// the derivative of H u; `coordinates` must recover admissible poses. The texts of `traits` must
+/// outlive all use.
 JointType RegisterJoint(const JointTraits& traits, const JointKindSet& kinds,
                         int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
@@ -45,8 +45,8 @@ JointType RegisterJoint(const JointTraits& traits) {
                                 Kind<Spatial, double>::Make(), Kind<Spatial, Dual>::Make()});
 }
 
-/// Adds a kind whose compiler lives forever. Throws std::invalid_argument where it is not sound,
-/// and for parts that no reader could fill.
+/// Adds a kind whose compiler lives forever. Throws std::invalid_argument if it is invalid, and for
+/// parts that no reader could fill.
 void RegisterForce(OtherForce force, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
 /// An element of the kind behind virtual functions.
@@ -72,7 +72,7 @@ class OtherElementOf final : public OtherElement<Space, S> {
   ForceElement<Space, S, Description> element_;
 };
 
-/// Adds the kind of force that `Description` describes, of which a default one says nothing.
+/// Adds the kind of force that `Description` defines.
 template <class Description>
 void RegisterForce() {
   static constexpr auto make = []<class Space, class S>() -> MakeOtherElement<Space, S> {

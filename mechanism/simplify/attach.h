@@ -1,9 +1,8 @@
-// Bodies fixed to other bodies: the description without them, and where they went.
+// Bodies fixed to other bodies: the description without them, and their new positions.
 //
-// Welded bodies are fixed to one of their number, immovable ones to Ground. Mass, centre of mass
-// and inertia are those of the whole (parallel axes); points, joints and forces are re-expressed in
-// the carrier's axes. A joint's own frames stay where they are, so its coordinates keep their
-// meaning.
+// Welded bodies are fixed to one of them, immovable ones to Ground. Mass, centre of mass and
+// inertia are for the whole (parallel axes); points, joints and forces are re-expressed in the
+// carrier's axes. A joint's frames do not move, so its coordinates keep their meaning.
 #pragma once
 
 #include <vector>
@@ -13,7 +12,7 @@
 
 namespace loopbench {
 
-/// Where a body sits on its carrier.
+/// Position of a body on its carrier.
 struct Attachment {
   int carrier = kGround;  ///< a body that is not attached itself
   Frame X;                ///< the body's axes and origin in the carrier's

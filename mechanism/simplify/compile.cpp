@@ -15,8 +15,8 @@ namespace loopbench {
 
 namespace {
 
-/// Whether loops are cut where they were. Another joint that closes one may carry a guess, which
-/// Assemble() refuses.
+/// Returns true if loops are cut at the same joints. Another joint that closes a loop may carry a
+/// guess, which Assemble() rejects.
 bool KeepsCuts(const MechanismDescription& before, const MechanismDescription& after,
                const Renumbering& renumbering) {
   std::vector<bool> was_cut(after.joints.size(), false);
@@ -65,7 +65,7 @@ class Compiler {
  private:
   MechanismDescription& whole() { return result_.parts.front().description; }
 
-  /// True when something was attached.
+  /// Returns true if something was attached.
   bool AttachAll(const std::vector<Attachment>& attachments, const std::string& how) {
     const auto count = std::ranges::count_if(attachments, &Attachment::attached);
     if (count == 0) return false;

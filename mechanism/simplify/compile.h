@@ -1,14 +1,14 @@
-// Models only what a scene requires (docs/decisions/009): a description, simplified before it is
-// compiled into a Mechanism, and the way back to the user's bodies and joints.
+// Exact preprocessing of a problem (docs/decisions/009): simplifies a description before it is
+// compiled into a Mechanism, and maps results back to the user's bodies and joints.
 //
-// Savings, in this order, each with its switch:
+// Simplifications, in this order, each with a switch:
 //   welds      bodies joined by welds become one (welds.h);
 //   immovable  bodies that certainly cannot move become part of Ground (immovable.h);
 //   islands    parts connected through Ground at most become descriptions of their own (islands.h);
 //   planar     a spatial part that moves in parallel planes becomes planar (plane.h);
-//   redundancy constraints that say at every position what others say are released (redundancy.h).
-// The motion is the same but for rounding. What a saving does not know, a new kind of joint or
-// force, keeps it from being made.
+//   redundancy constraints redundant at every position are released (redundancy.h).
+// The motion is the same except for rounding. An unknown kind of joint or force prevents a
+// simplification.
 #pragma once
 
 #include <string>
@@ -35,17 +35,17 @@ struct CompileOptions {
   friend bool operator==(const CompileOptions&, const CompileOptions&) = default;
 };
 
-/// Where a user's body is.
+/// Image of a user's body.
 struct BodyImage {
   int part = -1;       ///< -1: fixed to Ground, at X in the user's ground axes
   int body = kGround;  ///< of that part's description
   Frame X;             ///< the user's body axes and origin in those of `body`
-  double turn = 0.0;   ///< plane: their angle, a number
+  double turn = 0.0;   ///< plane: their angle, which counts turns
 };
 
-/// Where a user's joint is.
+/// Image of a user's joint.
 struct JointImage {
-  int part = -1;  ///< -1: gone, both its bodies move as one
+  int part = -1;  ///< -1: removed, both its bodies move as one
   int joint = -1;
   bool mirrored = false;  ///< angle, and y of a planar joint, have the opposite sign
 };
@@ -59,15 +59,15 @@ struct Compiled {
   std::vector<CompiledPart> parts;  ///< at least one
   std::vector<BodyImage> bodies;    ///< by the user's body
   std::vector<JointImage> joints;   ///< by the user's joint
-  CompileOptions done;              ///< which savings found something to save
-  std::vector<std::string> report;  ///< sentences: what was done, what was dropped, why not
+  CompileOptions done;              ///< simplifications that changed something
+  std::vector<std::string> report;  ///< sentences: changes, dropped data, obstacles
 };
 
-/// Throws std::invalid_argument for a description that Validate() refuses.
+/// Throws std::invalid_argument for a description that Validate() rejects.
 Compiled Compile(const MechanismDescription& description, const CompileOptions& options = {});
 
-/// Pose of a user's body, at its origin in the user's ground axes, when its part moves as
-/// `kinematics` says. Bodies fixed to Ground take no kinematics: nullptr.
+/// Returns the pose of a user's body, at its origin in the user's ground axes, for the part's
+/// `kinematics`. Bodies fixed to Ground take no kinematics: nullptr.
 template <class Space>
 Frame UserPose(const Compiled& compiled, int body, const Kinematics<Space, double>* kinematics);
 

@@ -27,7 +27,7 @@ double SizeOf(const Travel& travel, double length) {
 
 std::string CandidateName(const JointDescription& joint) { return "joint \"" + joint.name + "\""; }
 
-/// Sets of bodies that stand still against each other: by body, the lowest body of its set.
+/// Sets of bodies at rest relative to each other: by body, the lowest body of its set.
 class Sets {
  public:
   explicit Sets(std::size_t bodies) : lowest_(bodies) {
@@ -38,7 +38,7 @@ class Sets {
     const int from = std::max(lowest_[a], lowest_[b]), to = std::min(lowest_[a], lowest_[b]);
     std::ranges::replace(lowest_, from, to);
   }
-  /// Whether all but Ground belong to Ground's.
+  /// Returns true if all bodies belong to Ground's group.
   bool AllStandStill() const {
     return std::ranges::all_of(lowest_, [](int lowest) { return lowest == kGround; });
   }
@@ -62,22 +62,21 @@ std::vector<Attachment> Attachments(const MechanismDescription& description, con
   return attachments;
 }
 
-/// What stands still, tried: the model with the taken joints' bodies as one.
+/// Trial model with the taken joints' bodies as one.
 class Freezing {
  public:
   Freezing(const MechanismDescription& description, const BodyStarts& starts, Simplified* result)
       : d_(description), starts_(starts), result_(*result), was_still_(FindStill(description)) {}
 
-  /// "" or why there is no model. Candidates are given up, those that travel furthest first, until
-  /// no joint stands still that was to move: one that a loop of joints which are now one body held
-  /// fast.
+  /// Returns "" or the reason why there is no model. Drops candidates with the largest travel
+  /// first, until no joint stops that should move: one fixed by a loop of joints within one body.
   std::string Run() {
     for (;;) {
       if (std::string fault = Build(); !fault.empty()) return fault;
       const std::size_t stopped = Stopped().size();
       if (stopped == 0) return "";
       const std::string name = Stopped().front();
-      Candidate* least = nullptr;  // that helps, or else the one that travels furthest
+      Candidate* least = nullptr;  // helps, or else travels furthest
       for (Candidate* candidate : TakenFurthestFirst()) {
         if (least == nullptr) least = candidate;
         candidate->taken = false;

@@ -119,7 +119,7 @@ class Measuring {
     return r.dot(whole_.solve(r));
   }
 
-  /// Of a point in body axes, from the centre of mass in ground axes.
+  /// Returns the arm from the centre of mass to a point in body axes, in ground axes.
   Linear<Space, double> Arm(const BodyPoint& point) const {
     Eigen::Vector3d from_com = point.at;
     if (point.body != kGround) from_com -= description_.bodies[point.body].com;
@@ -133,7 +133,7 @@ class Measuring {
            kinematics_.poses()[spring.from.body].p - Arm(spring.from);
   }
 
-  /// A spring's coordinate less that where it is free; 0 of other forces.
+  /// Returns a spring's coordinate less its free one; 0 for other forces.
   double Coordinate(const ForceDescription& force) const {
     if (const auto* joint = std::get_if<JointSpring>(&force); joint && joint->stiffness > 0.0) {
       return kinematics_.JointCoordinate(joint->joint) - FreeCoordinate(*joint);
@@ -144,7 +144,7 @@ class Measuring {
     return 0.0;
   }
 
-  /// By force, at the current speeds: what a spring's coordinate changes by.
+  /// Returns, by force, the rate of a spring's coordinate at the current speeds.
   std::vector<double> SpringRates() const {
     std::vector<double> rates;
     for (const ForceDescription& force : description_.forces) {
@@ -173,7 +173,7 @@ class Measuring {
   Eigen::LLT<MatrixXd> whole_;
 };
 
-/// Relative speed of a joint's bodies below which it stands still, per unit speed of the whole.
+/// Relative speed of a joint's bodies that counts as rest, per unit speed of the whole.
 constexpr double kStill = 1e-8;
 
 template <class Space>
@@ -198,7 +198,7 @@ std::vector<bool> StillIn(const MechanismDescription& description) {
   return still;
 }
 
-/// The description at its start with given motions left free: each begins where it is at t = 0.
+/// Returns the description at its start with prescribed motions free, from their values at t = 0.
 MechanismDescription WithoutMotions(MechanismDescription description) {
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     JointDescription& joint = description.joints[j];
@@ -234,7 +234,7 @@ Freedom MeasureFreedom(const MechanismDescription& description) {
   const bool is_driven = std::ranges::any_of(
       description.joints, [](const JointDescription& joint) { return !joint.motions.empty(); });
   if (!is_driven || !freedom.why.empty()) return freedom;
-  // what follows a given motion moves, and has energy
+  // bodies that follow a prescribed motion move and have energy
   Freedom free = Measure(WithoutMotions(description));
   if (free.why.empty()) freedom.shares = std::move(free.shares);
   return freedom;

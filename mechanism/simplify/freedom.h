@@ -1,7 +1,7 @@
-// What the joints of a description permit at its start, weighed by kinetic energy.
+// Admissible motions of a description at its start, weighted by kinetic energy.
 //
 // With N the speeds that all constraints permit (columns) and T(N x) = 1/2 x^T G x the kinetic
-// energy of a permitted motion, prescribed ones standing still,
+// energy of a permitted motion, prescribed ones at rest,
 //
 //   share of a body     the largest of its own energy over that of the whole, x^T G_b x / x^T G x,
 //   mobility of a       r^T G^-1 r with r x the rate of its coordinate (elongation): the inverse of
@@ -21,24 +21,24 @@ struct Freedom {
   std::string why;      ///< why nothing is known; else empty
   int speeds = 0;       ///< independent permitted ones
   double length = 1.0;  ///< the mechanism's own [m]
-  double rate = 0.0;    ///< of the motion as it begins, see below [rad/s]
-  /// Of kinetic energy, by body, of motions that leave given ones free; 0 where nothing moves.
+  double rate = 0.0;    ///< of the motion at the start, see below [rad/s]
+  /// Shares of kinetic energy by body, for motions with prescribed ones free; 0 if nothing moves.
   std::vector<double> shares;
-  std::vector<double> mobility;  ///< by force: [1/(kg m^2)] or [1/kg]; 0 for what is no spring
-  std::vector<double> travel;    ///< by force: a spring's coordinate less that where it is free
+  std::vector<double> mobility;  ///< by force: [1/(kg m^2)] or [1/kg]; 0 if not a spring
+  std::vector<double> travel;    ///< by force: a spring's coordinate less its free one
 };
 
 /// `rate` is the largest of: angular speeds of bodies, speeds of their centres of mass over the
-/// length, angular frequencies of given motions, and that at which gravity swings what is as long
-/// as the mechanism, sqrt(g / length).
+/// length, angular frequencies of prescribed motions, and the pendulum frequency of the mechanism's
+/// length, sqrt(g / length).
 Freedom MeasureFreedom(const MechanismDescription& description);
 
-/// Which joints no permitted speed moves at the start, by joint; joints with given motions count as
-/// free to move. All false where nothing is known.
+/// Returns joints that no admissible speed moves at the start; joints with prescribed motions count
+/// as free. All false if unknown.
 std::vector<bool> FindStill(const MechanismDescription& description);
 
-/// Where a spring pulls with no force: rest + preload / stiffness, a joint's coordinate or a
-/// distance. The stiffness must not be zero.
+/// Returns the coordinate at which a spring has no force: rest + preload / stiffness, a joint's
+/// coordinate or a distance. The stiffness must not be zero.
 double FreeCoordinate(const JointSpring& spring);
 double FreeCoordinate(const SpringDamper& spring);
 

@@ -1,32 +1,32 @@
-// The ideas that change the motion, a file each. What they return is said in model.h.
+// The approximate simplification rules, a file each. Return values: model.h.
 #pragma once
 
 #include "mechanism/simplify/model.h"
 
 namespace loopbench {
 
-/// Bodies whose joints have hardly moved in the short run become one, as they stand at the start;
-/// those that hang so on Ground become part of it. Joints with given motions are none.
+/// Merges bodies whose joints have hardly moved in the short run, in their initial poses, also with
+/// Ground. Joints with prescribed motions are excluded.
 Simplified FreezeConstantParts(const MechanismDescription& description, const ShortRun& run,
                                const SimplifyOptions& options);
 
-/// A stiff spring between two points becomes a rod as long as the spring is where it is free; one
-/// in a joint holds the joint there, and the two bodies become one. Its damper goes with it. The
-/// frequency is that at which it swings alone (freedom.h); the rate of the motion is that of the
-/// start or of the short run, or the highest frequency of the springs that are not stiff.
+/// Replaces a stiff spring between two points by a rod of its free length. A stiff joint spring
+/// fixes its joint, and the two bodies become one. Its damper is removed. The frequency is its
+/// natural frequency alone (freedom.h). The rate of the motion is taken from the start or the short
+/// run, or is the highest frequency of the springs that are not stiff.
 Simplified HoldStiffSprings(const MechanismDescription& description, const ShortRun& run,
                             const SimplifyOptions& options);
 
-/// A body with two pins and nothing else, in the plane, or with two spherical joints (or one and a
-/// universal joint) in space, becomes a rod of its name, the lightest first. Its named points at
-/// the pins stay as points "<body>.<point>" of the bodies there. Where the rod joins two bodies
-/// that nothing else carries, they float on free joints.
+/// Replaces a planar body with only two pins, or a spatial body with only two spherical joints (or
+/// one and a universal joint), by a rod of its name, the lightest first. Its named points at the
+/// pins stay as points "<body>.<point>" of the bodies there. If nothing else carries the two bodies
+/// of the rod, they float on free joints.
 Simplified LightenLinks(const MechanismDescription& description, const ShortRun& run,
                         const SimplifyOptions& options);
 
-/// A spatial description as plane.h makes a planar one, but of what is planar only nearly, and at
-/// the start: axes that are nearly normal (or parallel) to the plane are taken to be so, spherical
-/// and universal joints turn about its normal, heights stay as they are at the start.
+/// Makes a nearly planar spatial description planar at its start (exactly planar ones: plane.h).
+/// Axes nearly normal (or parallel) to the plane are taken as exact, spherical and universal joints
+/// turn about its normal, heights keep their initial values.
 Simplified FlattenNearly(const MechanismDescription& description, const ShortRun& run,
                          const SimplifyOptions& options);
 

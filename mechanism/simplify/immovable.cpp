@@ -8,7 +8,7 @@ namespace loopbench {
 
 namespace {
 
-/// Speed of a body below which it stands still, per unit speed of the whole [1/s, lengths scaled].
+/// Speed of a body that counts as rest, per unit speed of the whole [1/s, lengths scaled].
 constexpr double kStill = 1e-8;
 
 template <class Space>
@@ -26,7 +26,7 @@ class Search {
     }
     std::vector<Attachment> attachments(description_.bodies.size());
     for (const JointDescription& joint : description_.joints) {
-      // a drive between bodies that cannot move cannot be followed: that is for a run to say
+      // a driver between immovable bodies cannot be followed: the run reports it
       const bool within = rigid[joint.from.body] && rigid[joint.to.body];
       if (!joint.motions.empty() && within) return attachments;
     }
@@ -69,7 +69,7 @@ class Search {
     return Release(J, column, rigid);
   }
 
-  /// Bodies that null vectors move leave the set; all do when the null space is in doubt.
+  /// Removes bodies moved by null vectors from the set; all if the null space is uncertain.
   bool Release(const Eigen::MatrixXd& J, const std::vector<int>& column, std::vector<bool>* rigid) {
     Eigen::MatrixXd square = Eigen::MatrixXd::Zero(std::max(J.rows(), J.cols()), J.cols());
     square.topRows(J.rows()) = J;
@@ -98,7 +98,7 @@ class Search {
     for (std::size_t j = 0; j < description_.joints.size(); ++j) {
       const Joint<Space, double>& joint = mechanism_.joints()[j];
       if (!in_set(joint.from) || !in_set(joint.to)) continue;
-      // what follows a given motion holds nothing still
+      // a joint with a prescribed motion fixes nothing
       if (!description_.joints[j].motions.empty()) continue;
       const JointState<Space, double>& state = kinematics_.joints()[j];
       for (int i = 0; i < state.rows(); ++i) {

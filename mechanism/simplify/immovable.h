@@ -12,11 +12,11 @@ namespace loopbench {
 inline constexpr int kMostSpeedsForImmovable = 200;
 
 /// Smallest over largest singular value of a sub-structure's constraints that counts as certain.
-/// The assembled start is known to 1e-13 or so, a singular position would be below 1e-6.
+/// The assembled start is accurate to about 1e-13; a singular configuration would be below 1e-6.
 inline constexpr double kCertain = 1e-3;
 
-/// Attachments to Ground of all bodies that belong to a rigid sub-structure at the assembled start;
-/// nothing attached where there are none, the start cannot be assembled or forces are unknown.
+/// Returns attachments to Ground of all bodies in a rigid sub-structure at the assembled start;
+/// empty if there are none, assembly fails or forces are unknown.
 ///
 /// The rule: a set of bodies, with the joints among them and to Ground and no others, whose
 /// constraints at the start have a Jacobian of full column rank, with a ratio of singular values

@@ -12,7 +12,7 @@ namespace loopbench {
 
 namespace {
 
-/// A body with two joints, and what is at the other side of each.
+/// A body with two joints, and the bodies at their other sides.
 struct Link {
   int body = 0;
   int joints[2] = {-1, -1};
@@ -26,7 +26,7 @@ bool IsPin(SpaceKind space, JointType type) {
              : type == JointType::kSpherical || type == JointType::kUniversal;
 }
 
-/// Bodies with two joints, both of which a rod could stand for.
+/// Returns bodies with two joints that a rod can replace.
 std::vector<Link> FindLinks(const MechanismDescription& description) {
   std::vector<Link> links;
   for (int body = 1; body < static_cast<int>(description.bodies.size()); ++body) {
@@ -56,7 +56,7 @@ std::vector<Link> FindLinks(const MechanismDescription& description) {
 /// A share in the kinetic energy that is round-off.
 constexpr double kStandsStill = 1e-15;
 
-/// Why the link cannot become a rod, whatever its mass; "" if it can.
+/// Returns the reason why the link cannot become a rod, for any mass; "" if it can.
 std::string Obstacle(const MechanismDescription& description, const Link& link, double share) {
   if (link.other[0].body == link.other[1].body) return "both its ends are on one body";
   if (!(link.length > 0.0)) return "its joints are at one point";
@@ -87,7 +87,7 @@ std::pair<double, double> Lumps(const BodyDescription& body, const Link& link, L
   return {1.0 - second, second};
 }
 
-/// The description with a rod in the link's place, but for its start.
+/// Returns the description with a rod instead of the link, without its start.
 MechanismDescription WithRod(const MechanismDescription& description, const Link& link,
                              Lumping lumping) {
   MechanismDescription changed = description;
@@ -125,7 +125,7 @@ MechanismDescription WithRod(const MechanismDescription& description, const Link
   return result;
 }
 
-/// What the rod does not have: mass that nobody took, and the inertia of the link's own turning.
+/// Describes the losses of the rod: undistributed mass, and the inertia of the link's rotation.
 std::string Lost(const BodyDescription& body, const Link& link, Lumping lumping) {
   const auto [first, second] = Lumps(body, link, lumping);
   const double left = body.mass * (1.0 - first - second);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
-/// One saving of compile.h, as a model of its own.
+/// Returns one simplification of compile.h as a separate model.
 Simplified Exactly(const MechanismDescription& description, bool CompileOptions::*saving) {
   CompileOptions options = CompileOptions::None();
   options.*saving = true;
@@ -60,7 +60,7 @@ Simplified Apart(const MechanismDescription& description, const ShortRun&, const
   return result;
 }
 
-/// What runs release is no matter of files.
+/// Files cannot hold constraints released by runs.
 Simplified Redundant(const MechanismDescription& description, const ShortRun&,
                      const SimplifyOptions&) {
   Simplified result = Exactly(description, &CompileOptions::redundancy);
@@ -74,7 +74,7 @@ Simplified Redundant(const MechanismDescription& description, const ShortRun&,
   return result;
 }
 
-/// What an idea makes of the last model, where it applies.
+/// Appends the result of a rule on the last model, if it applies.
 void Append(const Idea& idea, const ShortRun& run, const SimplifyOptions& options,
             Simplified* model) {
   Simplified next = idea.apply(model->parts.front(), run, options);
@@ -150,7 +150,7 @@ Simplified Combine(const MechanismDescription& description, const std::vector<co
   Simplified model;
   model.parts = {description};
   for (const Idea* idea : ideas) Append(*idea, run, options, &model);
-  // what was simplified may have left more that cannot move, or that is one body
+  // simplified bodies may allow further welds and immovable bodies
   for (const Idea* idea : ideas) {
     if (idea->is_exact && !model.ideas.empty()) Append(*idea, run, options, &model);
   }

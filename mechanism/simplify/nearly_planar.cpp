@@ -1,4 +1,4 @@
-// What nearly moves in parallel planes, in the plane.
+// Replaces nearly planar motion by planar motion.
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 
-/// A joint at the start: its frames in ground axes, what becomes of it, and how far off that is.
+/// A joint at the start: its frames in ground axes, its planar counterpart, and the deviation.
 struct Flat {
   Frame X_WF, X_WM;
   JointType type = JointType::kRevolute;
@@ -26,8 +26,7 @@ struct Flat {
   std::string why;      ///< why the plane has nothing for it
 };
 
-/// The direction that most of the mechanism turns about: along it are revolute axes, across it
-/// those of sliders.
+/// Main axis of the mechanism: parallel to revolute axes, normal to axes of sliders.
 class Flattening {
  public:
   Flattening(const MechanismDescription& description, const BodyStarts& starts)
@@ -45,7 +44,7 @@ class Flattening {
   const std::vector<Flat>& joints() const { return joints_; }
   const Matrix3& R_WC() const { return R_WC_; }
 
-  /// How much of a spring's or rod's length is along the normal (sine).
+  /// Returns the share of a spring's or rod's length along the normal (sine).
   double Tilt(const Vector3& between) const {
     const double length = between.norm();
     return length > 0.0 ? std::abs(between.dot(R_WC_.col(2))) / length : 0.0;
@@ -138,9 +137,9 @@ class Flattening {
   Matrix3 R_WC_ = Matrix3::Identity();
 };
 
-/// All bodies have the ground's axes at the start, where every joint's frames are as they were seen
-/// along the normal: coordinates keep their values, angles within half a turn, but that axes which
-/// point the other way swap the joint's sides.
+/// All bodies have the ground's axes at the start, and every joint's frames are projected along the
+/// normal. Coordinates keep their values, angles within half a turn; axes of opposite direction
+/// swap the joint's sides.
 JointDescription Flattening::FlatJoint(const JointDescription& joint, const Flat& flat) const {
   JointDescription changed = joint;
   changed.type = flat.type;
@@ -150,7 +149,7 @@ JointDescription Flattening::FlatJoint(const JointDescription& joint, const Flat
     const Vector3 v = InPlane(axis);
     return std::atan2(v.y(), v.x());
   };
-  // of a cylindrical joint along the plane it is z that it slides along
+  // a cylindrical joint along the plane slides along z
   const bool slides_on_z =
       joint.type == JointType::kCylindrical && flat.type == JointType::kPrismatic;
   const bool is_loose = joint.type == JointType::kSpherical || joint.type == JointType::kUniversal;
@@ -219,7 +218,7 @@ BodyStarts FlatStarts(const BodyStarts& starts, const Matrix3& R_WC) {
   return flat;
 }
 
-/// "" or what keeps the description from becoming planar, whatever the limit.
+/// Returns "" or the obstacle to a planar description, for any limit.
 std::string Judged(const MechanismDescription& description, const Flattening& flattening,
                    double limit, Simplified* result) {
   std::string fault;

@@ -125,12 +125,12 @@ class Search {
 /// Without its part along z.
 Vector3 Flat(const Vector3& v) { return {v.x(), v.y(), 0.0}; }
 
-/// One joint's sides in the new axes: positions and angles within the plane.
+/// Expresses one joint's sides in the new axes: positions and angles within the plane.
 void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& normal,
                   JointDescription* joint, bool* mirrored) {
   const Frame X_PF = FrameOf(*joint, joint->from), X_QM = FrameOf(*joint, joint->to);
   const Vector3 n_F = X_PF.R.transpose() * normal[joint->from.body];
-  // any direction of the frames across n serves to measure angles; the slide must be one
+  // any direction of the frames across n can measure angles; the slide must be one
   const Vector3 across = std::abs(n_F.x()) < 0.5 ? Vector3::UnitX() : Vector3::UnitY();
   const auto flatten = [&](const Frame& X, JointSide* side) {
     const Matrix3& R = axes[side->body];

@@ -1,13 +1,13 @@
 // Spatial descriptions that are planar: every joint lets its bodies move only in planes normal to
-// one common direction n, and every body is held to ground through such joints.
+// one common direction n, and connects every body to ground by such joints.
 //
-// Then each body keeps its height along n and turns about n only, and the same motion follows from
-// a planar description in axes with z = n. What acts along n, and moments across it, only loads the
-// bearings: it does no work and is dropped. Products of inertia do so too.
+// Then each body keeps its height along n and turns about n only. A planar description in axes with
+// z = n has the same motion. Forces along n, moments across it and products of inertia only load
+// the bearings: they do no work and are dropped.
 //
-// Which joints qualify: revolute with its axis along n, prismatic with its axis across n,
-// pin-in-slot and planar with their normal along n, weld. All others do not, those that this code
-// does not know included; nor does a mechanism in which nothing turns, since n is open then.
+// Qualifying joints: revolute with its axis along n, prismatic with its axis across n, pin-in-slot
+// and planar with their normal along n, weld. All others, including user-defined ones, do not
+// qualify; nor does a mechanism without rotation, since n is undetermined.
 #pragma once
 
 #include <optional>
@@ -27,15 +27,15 @@ struct InPlane {
   std::vector<double> force_dropped;  ///< of each force, its part along n [N]
 };
 
-/// How parallel axes must be, as the sine of the angle, and how level bodies, over the arms'
-/// length: what rounding leaves of a description turned in space.
+/// Tolerance of parallel axes (sine of the angle) and of body heights (over the arms' length):
+/// rounding of a description turned in space.
 inline constexpr double kParallel = 1e-12;
 
 /// Axes with z = n, x as near to the old x (or y) as that allows; unchanged when n is z.
 Eigen::Matrix3d AxesWithNormal(const Eigen::Vector3d& n);
 
-/// Nothing when the description is planar already or does not qualify; `why` then says what was
-/// met.
+/// Returns nothing if the description is planar already or does not qualify; `why` then gives the
+/// reason.
 std::optional<InPlane> ExpressInPlane(const MechanismDescription& description, std::string* why);
 
 }  // namespace loopbench

@@ -21,10 +21,9 @@ int Positions(int speeds) { return speeds <= 40 ? 48 : 6; }
 /// singular by x^2 / 2, which must be far beyond the accuracy of rounded input.
 constexpr double kProbe = 0.01, kRoundedProbe = 0.05;
 
-/// Whether all speeds that the constraints leave free lead to motions, as they do where constraints
-/// that depend on each other do so all around. Where they do not, more constraints hold close by: a
-/// ladder of windows in line has a branch for each way that each window may open, and a walk finds
-/// few of them open.
+/// Returns true if all free speeds lead to finite motions, as for constraints that are redundant at
+/// every position. Otherwise more constraints hold nearby: a ladder of windows in line has a branch
+/// for each opening direction of each window, and a walk finds few of them open.
 template <class Space>
 bool IsRegular(const Excursion<Space>& position, double probe) {
   constexpr int kProbes = 3;

@@ -14,27 +14,26 @@
 
 namespace loopbench {
 
-/// What several admissible positions have in common.
+/// Common properties of several admissible positions.
 struct Redundancy {
   int rows = 0;           ///< constrained directions of all cut joints, drives left free
   int rank_at_start = 0;  ///< of those
-  /// The largest rank met: that of generic positions. Where positions are singular as far as one
-  /// looks, independent constraints are assumed.
+  /// The largest rank found: the rank of generic positions. If all examined positions are singular,
+  /// independent constraints are assumed.
   int rank = 0;
   /// rows - rank directions, in joints of the description; fewer where joints with prescribed
   /// coordinates would have to give them.
   std::vector<Released> released;
   std::vector<int> cut;  ///< joints that close loops: only these release
-  /// How far released constraints are independent at the start [rad or lengths], where they depend
-  /// on the others within the accuracy of the input only: they are no constraints then. Otherwise
-  /// 0.
+  /// Independence of released constraints at the start [rad or lengths], if they are redundant only
+  /// within the accuracy of the input: they are no constraints then. Otherwise 0.
   double rounding = 0.0;
 };
 
-/// The sum over the parts of a description, each looked at by itself. Of parts whose start cannot
-/// be assembled, and of those above kMostAnalysedSpeeds unless all their constraints are
-/// independent at the start (joint_response.h), only `cut` is known. Prescribed motions
-/// are left free: what they contradict is no matter of structure.
+/// Returns the sum over the parts of a description, each analysed separately. Only `cut` is known
+/// of parts whose initial assembly fails, and of parts above kMostAnalysedSpeeds unless all their
+/// constraints are independent at the start (joint_response.h). Prescribed motions are left free:
+/// their contradictions are not structural.
 Redundancy FindRedundancy(const MechanismDescription& description);
 
 /// A constrained direction of a joint in words: "the moment about x of its frame on rod", forces

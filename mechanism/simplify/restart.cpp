@@ -96,7 +96,7 @@ void AddFreeJoints(MechanismDescription* description) {
   }
 }
 
-/// All joints that are followed, with what they do.
+/// All followed joints, with their coordinates and speeds.
 template <class Space>
 InitialDescription InitialIn(const MechanismDescription& description, const BodyStarts& starts) {
   const Mechanism<Space, double> absolute(description, Coordinates::kAbsolute);

@@ -16,23 +16,23 @@ struct BodyStart {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();  ///< velocity of the origin [m/s]
 };
 
-/// By the names of bodies, Ground among them under "".
+/// Starts by body name, with Ground under "".
 using BodyStarts = std::map<std::string, BodyStart>;
 
-/// The assembled start; empty where it cannot be assembled, and `why` says why.
+/// Returns the assembled start; if assembly fails, returns an empty one and the reason in `why`.
 BodyStarts AssembledStart(const MechanismDescription& description, std::string* why);
 
-/// Gives `changed` the places and motions of these bodies as initial values: each joint that is
-/// followed has its coordinates and speeds, and parts that float have free joints named after their
-/// bodies. What the joints of `changed` do not admit is assembled from there; of speeds then only
-/// those stay that `changed` gave, and at last none.
+/// Gives `changed` the poses and motions of these bodies as initial values: all followed joints get
+/// coordinates and speeds; floating parts get free joints named after their bodies. Assembly
+/// corrects values that the joints of `changed` do not admit; then only speeds given in `changed`
+/// stay, and finally none.
 ///
-/// "" or why there is no consistent start; `changed` is then unusable. Joints that were held stay
-/// so where they are still followed.
+/// Returns "" or the reason why there is no consistent start; `changed` is then unusable. Fixed
+/// joints stay fixed if they are still followed.
 std::string StartAt(const BodyStarts& starts, MechanismDescription* changed);
 
-/// The description with the whole of its assembled start as initial values, consistent as they
-/// stand; `why` says why there is none, and it is then returned as it is.
+/// Returns the description with its complete assembled start as consistent initial values. If
+/// assembly fails, returns the description unchanged and the reason in `why`.
 MechanismDescription WithAssembledStart(const MechanismDescription& description, std::string* why);
 
 }  // namespace loopbench

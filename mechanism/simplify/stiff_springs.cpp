@@ -1,4 +1,4 @@
-// Springs much faster than the motion: rods, and joints that are held.
+// Springs much faster than the motion: rods, and fixed joints.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,7 @@ namespace loopbench {
 
 namespace {
 
-/// A spring, the frequency at which it swings alone, and the rate of what is slower [rad/s].
+/// A spring, its natural frequency alone, and the rate of slower motions [rad/s].
 struct Spring {
   int force = 0;
   double frequency = 0.0, rate = 0.0;
@@ -49,8 +49,8 @@ std::vector<Spring> FindSprings(const MechanismDescription& description, const F
   return springs;
 }
 
-/// The rate that each is held against: that of the motion, or the frequency of a slower spring that
-/// is not stiff. Such a spring is part of the motion.
+/// Sets the reference rate of each spring: the motion's rate, or the frequency of a slower spring
+/// that is not stiff. Such a spring is part of the motion.
 void SetRates(double rate, double limit, std::vector<Spring>* springs) {
   std::vector<Spring*> order;
   for (Spring& spring : *springs) order.push_back(&spring);
@@ -98,8 +98,8 @@ JointDescription RodFor(const MechanismDescription& description, const SpringDam
   return rod;
 }
 
-/// The springs of these forces held: without the forces, and without all that acts along a joint
-/// that is held. Bodies that held joints join are one.
+/// Returns the description with the springs of these forces rigid: without these forces, and
+/// without forces along a fixed joint. Bodies connected by fixed joints become one.
 MechanismDescription Held(const MechanismDescription& description, const std::vector<int>& forces) {
   MechanismDescription changed = description;
   std::vector<bool> held(description.joints.size(), false), gone(description.forces.size(), false);
@@ -130,7 +130,7 @@ MechanismDescription Held(const MechanismDescription& description, const std::ve
   return Attach(changed, attachments, &renumbering);
 }
 
-/// Why a spring cannot be held, however stiff; "" if it can.
+/// Returns the reason why a spring cannot become rigid, for any stiffness; "" if it can.
 std::string Obstacle(const MechanismDescription& description, const ForceDescription& force) {
   if (const auto* spring = std::get_if<JointSpring>(&force)) {
     return description.joints[spring->joint].motions.empty() ? ""

@@ -13,8 +13,8 @@ namespace loopbench {
 
 namespace {
 
-/// Directions that a pivoted factorisation leaves over at one position once it has found the rank:
-/// given motions that contradict each other, and what is lost only there.
+/// Directions left over by a pivoted factorisation at one position after the rank: contradictory
+/// prescribed motions, and directions lost only there.
 template <class Space>
 std::vector<RedundantDirection> FindDependent(const MechanismDescription& description,
                                               const Kinematics<Space, double>& kinematics) {
@@ -31,7 +31,7 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
       const Joint<Space, double>& joint = mechanism.joints()[index];
       const int i = row - joint.row;
       if (i < 0 || i >= joint.num_constraints()) continue;
-      // drives stand first in D
+      // drivers come first in D
       const bool drive = i < joint.num_drives;
       dependent.push_back({joint.description,
                            drive ? "what its given motion prescribes"
@@ -116,7 +116,7 @@ class Analysis {
     result_.counted_freedom = Space::kDim * result_.bodies - result_.rows;
   }
 
-  /// From a body up to Ground: the steps of the tree.
+  /// Returns the steps of the tree from a body up to Ground.
   std::vector<TreeStep> PathToGround(int body) const {
     std::vector<TreeStep> path;
     while (body != kGround) {

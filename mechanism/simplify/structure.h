@@ -1,4 +1,4 @@
-// What a description amounts to at its start: loops, freedom, rank, redundant constraints.
+// Structure of a description at its start: loops, mobility, rank, redundant constraints.
 //
 // Rank is decided on geometry alone (scaled_loops.h), at the start and at other positions that the
 // loops admit (redundancy.h). Numbers only; the harness prints them.
@@ -19,11 +19,11 @@ struct LoopPath {
   int cut_joint = 0;
   std::vector<int> joints;  ///< along the loop, the cut joint first
   std::vector<int> bodies;  ///< along the loop, the cut joint's `to` first; Ground where it passes
-  double open_shift = 0.0;  ///< mismatch of the cut joint at the start [m]
+  double open_shift = 0.0;  ///< violation at the cut joint at the start [m]
   double open_rotation = 0.0;  ///< [rad]
 };
 
-/// A constrained direction of a cut joint that says what the others say already.
+/// A redundant constraint direction of a cut joint.
 struct RedundantDirection {
   int joint = 0;
   std::string name;       ///< in words
@@ -45,39 +45,38 @@ struct Structure {
   std::vector<double> centre_distances;  ///< of centres of mass from the middle of the joints [m]
   std::vector<Island> islands;
   std::vector<LoopPath> loops;
-  Start<double> start;  ///< as Assemble() left it, also where it failed
+  Start<double> start;  ///< result of Assemble(), also if it failed
 
-  bool analysed = false;  ///< whether what follows is known
+  bool analysed = false;  ///< true if the following members are known
   int rank = 0;           ///< of the cut joints' constraints at the start
   int rank_nearby = 0;    ///< at generic positions; `rank` where motions are prescribed
-  /// Singular values of the scaled loops at the start, falling; none above kMostAnalysedSpeeds,
-  /// where `analysed` says that all constraints are independent.
+  /// Singular values of the scaled loops at the start, falling; empty above kMostAnalysedSpeeds,
+  /// where `analysed` means that all constraints are independent.
   Eigen::VectorXd singular_values;
   /// Constraints that can be dropped together; loop_rows - rank_nearby.
   std::vector<RedundantDirection> redundant;
   double rounding = 0.0;  ///< of Redundancy [lengths]
 
-  /// Of parts that are analysed by themselves, where one of them cannot move and others can.
+  /// Mobility of parts analysed separately, if one of them cannot move and others can.
   std::optional<int> freedom_of_parts;
 
   /// Independent motions that lead somewhere.
   int freedom() const { return freedom_of_parts.value_or(locked() ? 0 : joint_u - rank_nearby); }
-  /// Independent motions to first order, where the start is; more than freedom() where it is
-  /// singular.
+  /// Returns the independent motions to first order; more than freedom() if the start is singular.
   int freedom_at_start() const { return joint_u - rank; }
   bool singular_start() const {
     return rank_nearby > rank || (start.outcome == Outcome::kLocked && freedom_at_start() > 0);
   }
   /// Smallest singular value that counts, over the largest; 1 without any.
   double conditioning() const;
-  /// Nothing moves, to first order or (Start::message) at all.
+  /// Returns true if nothing moves, to first order or (Start::message) at all.
   bool locked() const {
     return analysed && !freedom_of_parts &&
            (freedom_at_start() == 0 || start.outcome == Outcome::kLocked);
   }
 };
 
-/// Throws std::invalid_argument for a description that Validate() refuses.
+/// Throws std::invalid_argument for a description that Validate() rejects.
 Structure AnalyseStructure(const MechanismDescription& description);
 
 }  // namespace loopbench

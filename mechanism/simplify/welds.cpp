@@ -34,7 +34,7 @@ class Group {
   const std::vector<int>& bodies() const { return bodies_; }
   const Attachment& at(int body) const { return at_[body]; }
 
-  /// Whether all joints within the group are welds that agree.
+  /// Returns true if all joints within the group are welds that agree.
   bool IsOneBody() const {
     for (std::size_t j = 0; j < description_.joints.size(); ++j) {
       const JointDescription& joint = description_.joints[j];

@@ -14,7 +14,7 @@ namespace loopbench {
 /// bodies other joints connect as well, is left as it is; all are where forces are unknown.
 std::vector<Attachment> FindWelded(const MechanismDescription& description);
 
-/// The same by these joints alone, which must be welds; other welds count as any joint does.
+/// Does the same with these joints alone, which must be welds; other welds count as any joint.
 std::vector<Attachment> FindWelded(const MechanismDescription& description,
                                    const std::vector<bool>& welds);
 

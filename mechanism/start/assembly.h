@@ -1,8 +1,8 @@
 // Consistent starts: positions and speeds that satisfy every loop, from partial initial data.
 //
-// Positions: those nearest to the guesses at which all loops close (closure.h). Speeds: the
-// smallest change of the speeds not given that makes J u = 0. Both work at singular positions
-// (least squares with rank decision), where they leave consistent data as they are.
+// Positions: closed positions nearest to the guesses (closure.h). Speeds: the smallest change of
+// the speeds not given that makes J u = 0. Both work at singular configurations (least squares with
+// rank decision) and leave consistent data unchanged.
 #pragma once
 
 #include <cstdint>
@@ -20,11 +20,11 @@ struct Start {
   Outcome outcome = Outcome::kFinished;  ///< or kInconsistentStart, kLocked
   std::string message;                   ///< names the loop that does not close and by how much
   VectorX<S> q, u;
-  double position_residual = 0.0;  ///< largest mismatch left [rad or m]
-  double speed_residual = 0.0;     ///< largest component of J u left [rad/s or m/s]
+  double position_residual = 0.0;  ///< largest remaining violation [rad or m]
+  double speed_residual = 0.0;     ///< largest remaining component of J u [rad/s or m/s]
 };
 
-/// Guesses and held values of the coordinates of a mechanism in joint coordinates; 0 for others.
+/// Guesses and fixed values of the coordinates of a mechanism in joint coordinates; 0 for others.
 template <class Space>
 VectorX<double> GuessedPositions(const MechanismDescription& description,
                                  const Mechanism<Space, double>& mechanism);

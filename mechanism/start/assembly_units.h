@@ -24,9 +24,8 @@ inline void ClearFixed(const std::vector<bool>& fixed, VectorX<double>* d) {
   }
 }
 
-/// Units of constraint rows and of speeds: 1 for angles, and for lengths a power of two next to the
-/// mechanism's own length, which rounds nothing. Whether a direction is a length does not depend on
-/// the position.
+/// Units of constraint rows and of speeds: 1 for angles, and for lengths the power of two next to
+/// the mechanism's length, which causes no rounding. They do not depend on the position.
 template <class Space>
 struct AssemblyUnits {
   double length = 1.0;            ///< [m]
@@ -52,12 +51,12 @@ struct AssemblyUnits {
     }
   }
 
-  /// Of a direction: H or D of a joint.
+  /// Unit of a direction: H or D of a joint.
   double Of(const Direction<Space, double>& direction) const {
     return direction.angular.isZero() ? length : 1.0;
   }
 
-  /// Of all constraint rows and, below them, of free coordinates of cut joints.
+  /// Scales all constraint rows and, below them, free coordinates of cut joints.
   VectorX<double> With(const Kinematics<Space, double>& kinematics,
                        const std::vector<OfCutJoint>& cut) const {
     VectorX<double> all(rows.size() + static_cast<Eigen::Index>(cut.size()));
@@ -70,8 +69,8 @@ struct AssemblyUnits {
   }
 };
 
-/// J in units, a row per constraint and below them one per free coordinate of `cut`; `fixed` speeds
-/// have no entries. `row_units` are those of With().
+/// Returns J in units, a row per constraint and below them one per free coordinate of `cut`;
+/// `fixed` speeds have no entries. `row_units` are the units of With().
 template <class Space>
 SparseRows LoopRows(const Kinematics<Space, double>& kinematics, const AssemblyUnits<Space>& units,
                     const VectorX<double>& row_units, const std::vector<OfCutJoint>& cut,

@@ -47,7 +47,7 @@ class Closure {
         guesses_(description, mechanism_, units),
         guess_(guess),
         pull_units_(units) {
-    // what rounding leaves of a closure that passes through every body
+    // round-off of a closure that passes through every body
     const double eps = std::numeric_limits<double>::epsilon(), extent = Extent(mechanism_, units);
     goal_ = 16 * eps * extent;
     // A thousand times the goal is far below any drift worth measuring. Along many joints angles up
@@ -84,8 +84,8 @@ class Closure {
   }
 
  private:
-  /// Whether a residual is within the accuracy of the input: in rad, or parts of the arms of the
-  /// joints that close the loops.
+  /// Returns true if a residual is within the accuracy of the input: in rad, or relative to the
+  /// arms of the joints that close the loops.
   bool IsRounded(const Vector& e) const {
     Vector most = Vector::Zero(e.size());
     for (int index : mechanism_.constraints()) {
@@ -104,7 +104,7 @@ class Closure {
     if (kinematics_.q() != q) kinematics_.UpdatePosition(q);
   }
 
-  /// e in units, with a row per held coordinate of a cut joint.
+  /// Returns e in units, with a row per fixed coordinate of a cut joint.
   Vector Residual(const Vector& q) {
     Place(q);
     Vector e(mechanism_.num_rows() + static_cast<Eigen::Index>(guesses_.held().size()));
@@ -233,7 +233,7 @@ class Closure {
   }
 
   /// Closes the loops from the guesses, from random positions about them, and with the joints of
-  /// one loop moved from the best position so far. False where no start closes.
+  /// one loop moved from the best position so far. Returns false if no start closes.
   bool Search(bool closed, Vector* best) {
     std::mt19937_64 generator;
     // 53 random bits: the same number with every standard library

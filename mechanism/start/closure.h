@@ -1,16 +1,16 @@
 // Positions at which all loops are closed, as near as possible to the guesses of a description.
 //
-// With e(q) the mismatch of the cut joints, the coordinates that are not held first go from the
+// With e(q) the violation at the cut joints, the coordinates that are not fixed first go from the
 // guesses to e = 0 by Levenberg-Marquardt: damping vanishes near a solution, and convergence is
-// quadratic. Steps that reach a position next to the guesses are all that is done. Otherwise
-// another branch may be nearer, or angles may have wound: a search then starts from the guesses and
-// from random positions about them and minimises
+// quadratic. If these steps reach a position near the guesses, it is the result. Otherwise another
+// branch may be nearer, or angles may have wound. A search then starts from the guesses and from
+// random positions about them and minimises
 //
 //   |e(q)|^2 + mu^2 |q - guess|^2        over the guessed coordinates, for mu falling to 1e-2
 //
-// so that guesses are kept first, coordinates without a guess adapt to them, and guesses give way
-// at last. Of all closed positions found, the one nearest to the guesses is the start. Angles are
-// counted within half a turn of their guesses, since whole turns change no pose.
+// so that guesses are kept first, coordinates without a guess adapt to them, and guesses change
+// last. The start is the closed position nearest to the guesses. Angles lie within half a turn of
+// their guesses, since whole turns change no pose.
 #pragma once
 
 #include "mechanism/start/assembly.h"
@@ -18,8 +18,8 @@
 
 namespace loopbench {
 
-/// From the guesses in `start->q`, sets positions and their residual, or outcome and
-/// message where the loops do not close. `units` are of `kinematics`.
+/// Sets positions and their residual from the guesses in `start->q`, or outcome and message if the
+/// loops do not close. `units` belong to `kinematics`.
 template <class Space>
 void ClosePositions(const MechanismDescription& description, Kinematics<Space, double>& kinematics,
                     const AssemblyUnits<Space>& units, Start<double>* start);

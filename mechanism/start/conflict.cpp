@@ -10,7 +10,7 @@ namespace loopbench {
 namespace {
 
 constexpr std::size_t kMostNames = 4;
-/// Smaller residuals, relative to the largest, are what an iteration that ended leaves anywhere.
+/// Smaller residuals, relative to the largest, are left by any finished iteration.
 constexpr double kSmallest = 1e-3;
 
 std::string Short(double value) {
@@ -111,7 +111,7 @@ class Conflict {
     return path;
   }
 
-  /// What the loops hold fast, so that it may be what is to be changed.
+  /// Lists the fixed and prescribed joints of the loops, which may need a change.
   std::string Given() const {
     std::set<int> joints;  // of the description, in its order
     for (const OfJoint& one : found_) {

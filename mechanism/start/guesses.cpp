@@ -71,7 +71,7 @@ void Guesses<Space>::SetColumns(const Joint<Space, double>& joint,
   }
 }
 
-/// A helix has none: it moves on where it turns.
+/// Excludes a helix: its shift determines its turn.
 template <class Space>
 bool Guesses<Space>::IsAngle(const Joint<Space, double>& joint, int coordinate) const {
   return !joint.kind->has_quaternion() && joint.kind->parameter == 0.0 &&

@@ -1,8 +1,8 @@
-// Guesses of a description, and how far positions are from them.
+// Guesses of a description, and distances of positions from them.
 //
-// Tree joints differ from their guesses by coordinates, counted with their turns; where there is a
-// quaternion, by the rotation vector from one to the other. Joints that close loops are measured,
-// angles modulo a turn: in the plane they have turns, which count where a force depends on them.
+// Tree joints differ from their guesses by coordinates, turns included; quaternions by the rotation
+// vector between both. Joints that close loops are measured, angles modulo a turn: in the plane
+// they have turns, which count if a force depends on them.
 #pragma once
 
 #include "mechanism/start/assembly.h"
@@ -17,10 +17,10 @@ class Guesses {
   Guesses(const MechanismDescription& description, const Mechanism<Space, double>& mechanism,
           const AssemblyUnits<Space>& units);
 
-  /// Speeds of held joints; and of others with a guess.
+  /// Speeds of fixed joints; and of others with a guess.
   const std::vector<bool>& fixed() const { return fixed_; }
   const std::vector<bool>& guessed() const { return guessed_; }
-  /// Free coordinates of cut joints that have values: held ones, and others.
+  /// Free coordinates of cut joints that have values: fixed ones, and others.
   const std::vector<OfCutJoint>& held() const { return held_.free; }
   const std::vector<OfCutJoint>& loose() const { return loose_.free; }
 
@@ -28,7 +28,7 @@ class Guesses {
   VectorX<double> Apart(const VectorX<double>& q) const;
   /// Like Apart(), with 0 for coordinates without a guess.
   VectorX<double> GuessedApart(const VectorX<double>& q) const;
-  /// held() and loose() as measured less their values, in units.
+  /// Deviations of held() and loose() from their values, in units.
   VectorX<double> HeldApart(const Kinematics<Space, double>& at) const { return Apart(held_, at); }
   VectorX<double> LooseApart(const Kinematics<Space, double>& at) const {
     return Apart(loose_, at);

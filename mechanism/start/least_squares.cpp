@@ -9,16 +9,16 @@ namespace loopbench {
 
 namespace {
 
-/// Entries of J up to which dense factors are made at once: some 10 ms.
+/// Entries of J up to which dense factors are used at once: about 10 ms.
 constexpr double kSmall = 1e5;
 /// Entries of J below which rough solutions gain nothing from sparse factors.
 constexpr double kTiny = 1e3;
-/// Least pivot of J J^T over the entry that it began as: solutions keep six digits at least.
+/// Least pivot of J J^T over its original entry: solutions keep at least six digits.
 constexpr double kLeastPivot = 1e-10;
-/// What a step of an iteration may leave of r, which takes the rest in its next step.
+/// Share of r that a step of an iteration may leave; the next step removes it.
 constexpr double kStepLeaves = 1e-3;
-/// Corrections of a solution, each by all digits of the factors, and what they must have reached:
-/// residuals over the sizes of the terms in them, of which round-off of long rows is some 1e-14.
+/// Number of corrections of a solution, each by all digits of the factors, and their goal:
+/// residuals over the sizes of their terms, of which round-off of long rows is about 1e-14.
 constexpr int kCorrections = 4;
 constexpr double kSolved = 1e-12;
 

@@ -1,8 +1,8 @@
 // Least-squares problems of a start: as many rows as loops have constraints, a column per speed.
 //
 // Rows have few entries, so J J^T + damping^2 is formed and factored sparsely: time and memory are
-// near-linear for chains and ladders. Its condition is the square of that of J. Where a pivot says
-// that J is close to losing rank, and for all J that are small, dense orthogonal factors decide.
+// near-linear for chains and ladders. Its condition is the square of J's. If a pivot indicates that
+// J is close to losing rank, and for all small J, dense orthogonal factors decide.
 #pragma once
 
 #include <Eigen/SparseCholesky>
@@ -14,7 +14,7 @@ using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 class LeastSquares {
  public:
-  /// How Damped() is solved where J is close to losing rank.
+  /// Method of Damped() if J is close to losing rank.
   enum class Care {
     kFull,   ///< by dense factors
     kRough,  ///< sparsely all the same, d = 0 without factors: for a step that is tried

@@ -19,17 +19,17 @@ namespace {
 /// A motion that few mixtures lead to is missed by some of them, not by all. [rad or lengths]
 constexpr int kTrials = 12;
 constexpr double kTrialDistance = 0.02;
-/// A tenth of it counts as moved, and opens loops that are singular by 1e-4 lengths: ten times what
-/// rounded input leaves.
+/// A tenth of it counts as moved, and opens singular loops by 1e-4 lengths: ten times the effect of
+/// rounded input.
 constexpr double kRoundedDistance = 0.15;
 
-/// Self-stresses and speeds that constraints leave, above which nobody tries: both are squared.
+/// Maximum number of self-stresses and free speeds that are tried: both are squared.
 constexpr Eigen::Index kMostTried = 64;
 
-/// Whether a self-stress s of the constraints e proves that nothing moves: along every speed v with
-/// J v = 0 the second derivative of s^T e has one and the same sign, so that no acceleration, to
-/// which s^T J = 0 is blind, can keep e at zero (second-order rigidity: Connelly and Whiteley, SIAM
-/// J. Discrete Math. 9 (1996) 453). Tried with each of a basis of self-stresses and with their sum.
+/// Returns true if a self-stress s of the constraints e proves that nothing moves. Along every
+/// speed v with J v = 0 the second derivative of s^T e then has the same sign. Accelerations cannot
+/// keep e at zero because s^T J = 0 (second-order rigidity: Connelly and Whiteley, SIAM J. Discrete
+/// Math. 9 (1996) 453). Tries each of a basis of self-stresses and their sum.
 template <class Space>
 bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                           int rank) {
@@ -43,7 +43,7 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   dynamics.Jacobian(kinematics, J);
   const Eigen::LLT<Eigen::MatrixXd> mass(M);
   Eigen::MatrixXd rows = mass.matrixL().solve(J.transpose()).transpose();
-  // moments and forces compare by the speeds they take; one that takes none is like the others
+  // moments and forces are scaled by the speeds in them; rows without speeds are not
   Eigen::VectorXd size = rows.rowwise().norm();
   const double usual = size.maxCoeff() > 0.0 ? size.maxCoeff() : 1.0;
   size = (size.array() > 1e-6 * usual).select(size, usual);
@@ -79,7 +79,7 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(free, free);
   for (const Eigen::MatrixXd& form : forms) all += form;
   forms.push_back(all);
-  // the start closes to some 1e-10 of its size, and the self-stresses are as good
+  // the start closes to about 1e-10 of its size, with self-stresses of equal accuracy
   constexpr double kDefinite = 1e-8;
   const double least = kDefinite * largest;
   return largest > 0.0 && std::ranges::any_of(forms, [&](const Eigen::MatrixXd& form) {
@@ -88,7 +88,7 @@ bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const Vecto
          });
 }
 
-/// Of a mechanism of one part, as the end of a sentence.
+/// Returns the end of a sentence for a mechanism of one part.
 template <class Space>
 std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                      double accuracy) {

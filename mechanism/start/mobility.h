@@ -1,4 +1,4 @@
-// Whether anything can move from a position: to first order, and at all.
+// Mobility from a position: infinitesimal and finite.
 #pragma once
 
 #include <string>
@@ -7,17 +7,17 @@
 
 namespace loopbench {
 
-/// Why a mechanism in joint coordinates, compiled from `description`, is locked at the position q;
-/// "" where it is not, where motions are prescribed, and above kMostAnalysedSpeeds, where nobody
-/// looks unless all constraints are independent (joint_response.h). It is when nothing can move, or
-/// when a part stands in a singular position that it cannot leave and would start along speeds that
-/// lead nowhere. A rigid part without such speeds locks nothing: it stays where it is, whatever
-/// others do.
+/// Returns the reason why a mechanism in joint coordinates, compiled from `description`, is locked
+/// at the position q, or "" if it is not locked or motions are prescribed. Not analysed above
+/// kMostAnalysedSpeeds unless all constraints are independent (joint_response.h). Locked means that
+/// nothing can move, or that a part is in a singular configuration that it cannot leave and would
+/// start along infinitesimal motions. A rigid part without such speeds locks nothing: it stays in
+/// place regardless of others.
 ///
-/// Constraints may take every speed. Or they leave speeds at a singular position that lead nowhere:
-/// a stretched four-bar, whose hinges in line could each start to buckle and none may. There,
-/// a dozen mixtures of those speeds are followed a little way. Where none leads to another
-/// position, and all fall back or a self-stress forbids motion to second order, nothing moves.
+/// Constraints may remove every speed. Or they leave infinitesimal motions at a singular
+/// configuration: a stretched four-bar's hinges in line could each start to buckle and none may.
+/// Then a dozen mixtures of those speeds are followed a small distance. If none reaches another
+/// position, and all return or a self-stress forbids motion to second order, nothing moves.
 template <class Space>
 std::string WhyLocked(const MechanismDescription& description,
                       const Mechanism<Space, double>& mechanism, const VectorX<double>& q);

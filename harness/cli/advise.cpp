@@ -442,9 +442,8 @@ void AddAdvise(Commands& commands) {
   app->add_flag("--exhaustive", command.exhaustive,
                 "Try all combinations of formulation, level, integrator and tolerance");
   app->add_option("-o,--out", command.out, "File for the experiment that reproduces it");
-  app->add_option("--format", command.format, "Format of the finalists' table")
-      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "Format of the finalists' table",
+            {"text", "csv", "markdown", "json", "latex"});
   AddLimits(app, &command.limits);
   AddWide(app);
   app->footer(

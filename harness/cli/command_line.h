@@ -121,6 +121,12 @@ inline void AddLimits(CLI::App* app, ProcessLimits* limits) {
       ->capture_default_str();
 }
 
+/// Adds an option whose value, with its default, is one of `words`.
+inline void AddChoice(CLI::App* app, const std::string& name, std::string* word,
+                      const std::string& text, const std::vector<std::string>& words) {
+  app->add_option(name, *word, text)->check(CLI::IsMember(words))->capture_default_str();
+}
+
 inline CLI::Option* AddJson(CLI::App* app, bool* json) {
   return app->add_flag("--json", *json, "One JSON document instead (docs/using.md has its keys)");
 }
@@ -141,9 +147,8 @@ inline void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
 }
 
 inline void AddSize(CLI::App* app, std::string* size) {
-  app->add_option("--size", *size, "Width of figures: 85 mm or 178 mm, letters of 8 pt")
-      ->check(CLI::IsMember({"one-column", "two-column"}))
-      ->capture_default_str();
+  AddChoice(app, "--size", size, "Width of figures: 85 mm or 178 mm, letters of 8 pt",
+            {"one-column", "two-column"});
 }
 
 inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {

@@ -461,9 +461,8 @@ void AddCompare(Commands& commands) {
   app->add_option("--error-ratio", command.options.error_ratio, "Allowed on the same build")
       ->check(NumberFrom(1.0, 1e9))
       ->capture_default_str();
-  app->add_option("--format", command.format, "How tables are written (csv: all measures)")
-      ->check(CLI::IsMember({"text", "csv", "markdown"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "How tables are written (csv: all measures)",
+            {"text", "csv", "markdown"});
   AddWide(app);
   AddJson(app, &command.json);
 }
@@ -479,9 +478,8 @@ void AddFit(Commands& commands) {
       ->required();
   app->add_option("--min-size", command.from, "Leave out sizes below [bodies]")
       ->check(NumberFrom(0.0, 1e9));
-  app->add_option("--format", command.format, "How the table is written")
-      ->check(CLI::IsMember({"text", "csv", "markdown"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "How the table is written",
+            {"text", "csv", "markdown"});
   app->add_option("-o,--out", command.out, "File (default: the terminal)");
   AddWide(app);
 }
@@ -492,9 +490,8 @@ void AddExport(Commands& commands) {
                                [&](const Typed&) { return ExportMeasurements(command); });
   app->footer(kExportFooter);
   app->add_option("file", command.file, kMeasurements)->required();
-  app->add_option("--format", command.format, "Output format: github-action-benchmark or Bencher")
-      ->check(CLI::IsMember({"customSmallerIsBetter", "bmf"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "Output format: github-action-benchmark or Bencher",
+            {"customSmallerIsBetter", "bmf"});
   app->add_option("-o,--out", command.out, "File (default: the terminal)");
 }
 

@@ -363,9 +363,8 @@ void AddCount(Commands& commands) {
       ->delimiter(',')
       ->check(CLI::IsMember({"plain", "rank-revealing"}))
       ->capture_default_str();
-  app->add_option("--format", command.format, "Format of the table")
-      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex", "jsonl"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "Format of the table",
+            {"text", "csv", "markdown", "json", "latex", "jsonl"});
   app->add_option("-o,--out", command.out, "File (default: the terminal)");
   AddWide(app);
   AddLimits(app, &command.limits);

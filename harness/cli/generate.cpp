@@ -202,15 +202,10 @@ void AddGenerate(Commands& commands) {
   app->add_option("--formulation", command.formulation, "Formulation")
       ->check(CLI::IsMember(FormulationNamesWithoutPeers()))
       ->capture_default_str();
-  app->add_option("--enforcement", command.level, "Level of enforcement")
-      ->check(CLI::IsMember({"acceleration", "velocity"}))
-      ->capture_default_str();
-  app->add_option("--coordinates", command.coordinates, "Coordinate set")
-      ->check(CLI::IsMember({"joint", "absolute"}))
-      ->capture_default_str();
-  app->add_option("--solver", command.solver, "Solver")
-      ->check(CLI::IsMember({"plain", "rank-revealing"}))
-      ->capture_default_str();
+  AddChoice(app, "--enforcement", &command.level, "Level of enforcement",
+            {"acceleration", "velocity"});
+  AddChoice(app, "--coordinates", &command.coordinates, "Coordinate set", {"joint", "absolute"});
+  AddChoice(app, "--solver", &command.solver, "Solver", {"plain", "rank-revealing"});
   app->add_option("--horizon", command.horizon,
                   "Duration of the motion whose branches are generated [s]")
       ->check(NumberFrom(0.0, 1e6))

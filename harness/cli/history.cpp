@@ -305,9 +305,8 @@ void AddHistory(Commands& commands) {
   typed.show_app->add_option("--case", typed.show.one, "Only cases whose name contains this text");
   typed.show_app->add_option("--measure", typed.show.measure,
                              "Only measures whose name contains this text");
-  typed.show_app->add_option("--format", typed.show.format, "Output format")
-      ->check(CLI::IsMember({"text", "csv", "markdown", "json"}))
-      ->capture_default_str();
+  AddChoice(typed.show_app, "--format", &typed.show.format, "Output format",
+            {"text", "csv", "markdown", "json"});
   AddPlace(typed.show_app, &typed.place);
   AddJson(typed.show_app, &typed.show.json);
   AddWide(typed.show_app);

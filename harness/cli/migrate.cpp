@@ -1,5 +1,6 @@
 // migrate: replaces names in files of earlier versions by today's names.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -15,6 +16,7 @@
 #include "harness/record/record.h"
 #include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
+#include "harness/suite/suite.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 
@@ -68,7 +70,7 @@ constexpr OldName kRecordKeys[] = {
     {"error_ruled_by", "error_dominated_by"},
     {"drift_ruled_by", "drift_dominated_by"},
 };
-constexpr string_view kConditions = "/select/require/where/when/benchmarks/";
+constexpr string_view kConditions = "/select/require/where/when/benchmarks/of/relative_to/";
 
 /// Word among the values of some keys; several words are separated by spaces.
 struct OldValue {
@@ -187,23 +189,39 @@ class Renamer {
     }
   }
 
+  /// Returns the last name in the field of the sweep axis that begins at `begin`: its values are
+  /// values of this key.
+  string_view SweptKey(std::size_t begin) const {
+    const std::size_t field = text_.find("\"field\"", begin);
+    if (field == text_.npos) return "";
+    const std::size_t first = std::min(text_.find('"', field + 7), text_.size() - 1) + 1;
+    string_view path = text_.substr(first, text_.find('"', first) - first), name;
+    do {
+      const std::size_t slash = path.rfind('/');
+      name = slash == path.npos ? path : path.substr(slash + 1);
+      path = path.substr(0, slash == path.npos ? 0 : slash);
+    } while (!path.empty() && name.find_first_not_of("0123456789*") == name.npos);
+    return name;
+  }
+
   void Object(string_view within, int depth) {
-    std::string swept;  // last part of the field of a sweep, whose values follow it
+    const std::size_t begin = at_;
     for (++at_; SkipSpace(), text_[at_] != '}';) {
       if (text_[at_] == ',') {
         ++at_;
         continue;
       }
       const string_view key = String();
-      Replace(key, is_record_ && depth == 0 ? RecordKey(key) : ConfigurationKey(key, within));
+      const bool is_top = is_record_ && depth == 0;
+      Replace(key, is_top ? RecordKey(key) : ConfigurationKey(key, within));
       SkipSpace();
       ++at_;  // the colon
       SkipSpace();
-      if (key == "field" && text_[at_] == '"') {
-        const string_view rest = text_.substr(at_ + 1, text_.find('"', at_ + 1) - at_ - 1);
-        swept = rest.substr(rest.rfind('/') + 1);
+      if (is_top && key == "format") {
+        Replace(text_.substr(at_, text_.find_first_of(",} ", at_) - at_),
+                std::to_string(kRecordFormat));
       }
-      Value(key == "values" && !swept.empty() ? string_view(swept) : key, depth + 1);
+      Value(key == "values" ? SweptKey(begin) : key, depth + 1);
     }
     ++at_;
   }
@@ -214,16 +232,25 @@ class Renamer {
   std::string result_;
 };
 
-/// Returns a rewritten line of a record file; counts the replaced names.
-std::string RenamedLine(const std::string& line, const std::string& place, std::size_t* count) {
+/// Returns a rewritten line of a record file without its line end; counts the replaced names.
+std::string RenamedLine(string_view line, const std::string& place, std::size_t* count) {
+  const string_view end = line.substr(line.find_last_not_of(" \t\r") + 1);
+  line.remove_suffix(end.size());
+  if (line.empty()) return std::string(end);
   ParseDocument(line, place);
-  const bool is_sealed = VerifyChecksum(line);
   Renamer renamed(line, true);
   *count += renamed.count();
-  if (renamed.count() == 0 || !is_sealed) return renamed.result();
-  std::string object = renamed.result();
-  object.resize(object.rfind(",\"checksum\":"));
-  return WithChecksum(object + "}");
+  if (renamed.count() == 0) return std::string(line).append(end);
+  std::string object = std::move(renamed.result());
+  ParseDocument(object, place);  // a key of the user may have today's name
+  if (const std::size_t sealed = object.rfind(",\"checksum\":"); sealed != object.npos) {
+    if (WithChecksum(std::string(line.substr(0, line.rfind(",\"checksum\":"))) + "}") != line) {
+      throw std::runtime_error(place + ": wrong checksum: the line was changed");
+    }
+    object.resize(sealed);
+    object = WithChecksum(object + "}");
+  }
+  return object.append(end);
 }
 
 /// Writes the lines of a record file through `write`; returns the number of replaced names.
@@ -234,13 +261,10 @@ std::size_t RenameLines(const std::filesystem::path& file,
   std::size_t count = 0, number = 0;
   for (std::string line; std::getline(stream, line);) {
     const bool is_torn = stream.eof();  // no line end: possibly torn by a crash
-    const std::string place = fmt::format("{}:{}", file.string(), ++number);
     try {
-      if (!line.empty()) line = RenamedLine(line, place, &count);
+      line = RenamedLine(line, fmt::format("{}:{}", file.string(), ++number), &count);
     } catch (const ConfigError&) {
       if (!is_torn || number == 1) throw;
-    } catch (const std::runtime_error& error) {
-      throw std::runtime_error(fmt::format("{}: {}", place, error.what()));
     }
     write(line);
     if (!is_torn) write("\n");
@@ -251,16 +275,25 @@ std::size_t RenameLines(const std::filesystem::path& file,
 /// Returns true if the file has one record per line: a store, or the single record of a reference.
 bool HasRecordLines(const std::filesystem::path& file) {
   if (file.extension() == ".jsonl") return true;
-  std::ifstream stream(file, std::ios::binary);
-  std::string line;
-  std::getline(stream, line);
-  return line.starts_with("{") && line.ends_with("\"}") &&
-         line.find(",\"checksum\":\"") != std::string::npos;
+  constexpr std::streamoff kEnd = 48;  // the checksum is closer to the end of a sealed line
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  stream.seekg(std::max<std::streamoff>(0, stream.tellg() - kEnd));
+  std::string end(kEnd, ' ');
+  stream.read(end.data(), kEnd);
+  return end.find(",\"checksum\":\"") != end.npos;
 }
 
+struct Lock {
+  ~Lock() { ::close(descriptor); }
+  const int descriptor;
+};
+
 std::size_t MigrateFile(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) {
+    throw std::runtime_error(file.string() + ": expected a regular file");
+  }
   if (HasRecordLines(file)) {
-    if (IsLocked(file)) throw std::runtime_error(file.string() + ": another process writes to it");
+    const Lock lock{OpenLocked(file, false, "wait for it")};
     const std::size_t count = RenameLines(file, [](string_view) {});
     if (count == 0) return 0;
     OutputFile output(file, Onto::kAnyFile);
@@ -270,13 +303,28 @@ std::size_t MigrateFile(const std::filesystem::path& file) {
   }
   const std::string text = ReadTextFile(file);
   ParseDocument(text, file.string());
+  const bool has_own_hash = WithOwnHash(text) == text;
   Renamer renamed(text, false);
   if (renamed.count() == 0) return 0;
   ParseDocument(renamed.result(), file.string());  // old and new names may not occur together
   OutputFile output(file, Onto::kAnyFile);
-  output.Write(renamed.result());
+  output.Write(has_own_hash ? WithOwnHash(renamed.result()) : renamed.result());
   output.Finish();
   return renamed.count();
+}
+
+/// Returns the files of `path`: itself, or a store with its mechanisms and references.
+std::vector<std::filesystem::path> FilesOf(const std::filesystem::path& path) {
+  if (!std::filesystem::is_directory(path)) return {path};
+  std::vector<std::filesystem::path> files = {StoreFile(path)};
+  for (const char* folder : {"mechanisms", "references"}) {
+    if (!std::filesystem::is_directory(path / folder)) continue;
+    for (const auto& entry : std::filesystem::directory_iterator(path / folder)) {
+      if (entry.path().extension() == ".json") files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin() + 1, files.end());
+  return files;
 }
 
 /// Rewrites configuration files, stores and other record files (.jsonl) in place, each atomically.
@@ -285,15 +333,15 @@ std::size_t MigrateFile(const std::filesystem::path& file) {
 int Migrate(const std::vector<std::filesystem::path>& files) {
   int code = 0;
   for (const std::filesystem::path& path : files) {
-    try {
-      const std::filesystem::path file =
-          std::filesystem::is_directory(path) ? StoreFile(path) : path;
-      const std::size_t count = MigrateFile(file);
-      Print("{}: {}\n", file.string(),
-            count == 0 ? "no old names" : fmt::format("{} names replaced", count));
-    } catch (const std::exception& error) {
-      PrintError("{}\n", Lines{error.what()});
-      code = 2;
+    for (const std::filesystem::path& file : FilesOf(path)) {
+      try {
+        const std::size_t count = MigrateFile(file);
+        Print("{}: {}\n", file.string(),
+              count == 0 ? "no old names" : fmt::format("{} names replaced", count));
+      } catch (const std::exception& error) {
+        PrintError("{}\n", Lines{error.what()});
+        code = 2;
+      }
     }
   }
   return code;
@@ -308,18 +356,26 @@ void AddMigrate(Commands& commands) {
   app->add_option("file", files, "Configuration files (JSON), stores and files of records")
       ->required();
   app->footer(
-      "Keys and values with old names are replaced in place; all other bytes stay, and checksums "
-      "of\n"
-      "records are renewed. A file without old names is not written.\n"
+      "Keys and values with old names are replaced in place. All other bytes stay, and checksums "
+      "are\n"
+      "renewed. A file without old names is not written. Folders are stores with their mechanisms\n"
+      "and references. Migrated records serve tables and figures: a new run repeats their cases,\n"
+      "because identities of cases contain names.\n"
       "  loopbench migrate my-experiment.json results/runs/my-experiment");
 }
 
 std::string WithMigrationHint(std::string message) {
-  const auto is_named = [&message](string_view old) {
-    return message.find(fmt::format("unknown key \"{}\"", old)) != message.npos;
+  const auto holds = [&message](const std::string& part) {
+    return message.find(part) != message.npos;
   };
-  if (std::ranges::any_of(kKeys, is_named, &OldKey::old) ||
-      std::ranges::any_of(kRecordKeys, is_named, &OldName::old)) {
+  const auto is_key = [&](string_view old) {
+    return holds(fmt::format("unknown key \"{}\"", old));
+  };
+  const auto is_value = [&](string_view old) { return holds(fmt::format("found \"{}\",", old)); };
+  if (std::ranges::any_of(kKeys, is_key, &OldKey::old) ||
+      std::ranges::any_of(kRecordKeys, is_key, &OldName::old) ||
+      std::ranges::any_of(kValues, is_value, &OldValue::old) ||
+      holds("no key that tells the kind") || holds(fmt::format(kExpectedFormat, kRecordFormat))) {
     message += "\n`loopbench migrate FILE` replaces names of earlier versions";
   }
   return message;

@@ -267,10 +267,10 @@ Examples:
   loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
   loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
 
-Without --x and --y: angles and displacements of the run that is trusted most (finished, at level
-position, at the finest tolerance), drift with its fitted exponents, and of runs in several scalars
-error and drift against tolerance. Runs that failed are crosses, flagged ones hollow marks. A figure that
-cannot be drawn is reported with its reason, and the exit code is 2 after all others are drawn.)";
+Without --x and --y: angles and displacements of the most accurate run (finished, level projection,
+finest tolerance); drift with its fitted exponents; error and drift against tolerance in several
+floating-point types. Crosses are failed runs, hollow marks flagged ones. A figure that cannot be
+drawn is reported with its reason. The exit status is then 2, after all others are drawn.)";
 
 constexpr const char* kMapFooter = R"(
 Examples: (paths from the root of the repository)
@@ -282,7 +282,7 @@ Rules name methods (columns), extremes (rows) and what decides about a row:
   {"title": "Extremes",
    "methods": [{"label": "O-DCA projection",
                 "select": {"formulation": "odca", "enforcement": "projection"}}],
-   "groups": [{"label": "singular positions", "rows": [
+   "groups": [{"label": "singular configurations", "rows": [
      {"label": "parallelogram, 1e-8", "select": {"mechanism": "parallelogram", "rtol": 1e-8},
       "criteria": [{"measure": "branch_error_max", "limit": 500, "relative_to": "rtol", "unit": "rad"}],
       "rationale": "...", "required": "all"}]}]}
@@ -311,9 +311,8 @@ void AddTable(Commands& commands) {
                   "What the rows are (default: drift, or what the store has)")
       ->check(CLI::IsMember(
           {"drift", "precision", "timing", "factorial", "models", "references", "all"}));
-  app->add_option("--format", command.format, "How they are written")
-      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "How they are written",
+            {"text", "csv", "markdown", "json", "latex"});
   AddWhere(app, &conditions);
   app->add_option("--columns", command.view.columns, "Keys of records, in this order: a,b,c")
       ->delimiter(',');
@@ -373,11 +372,9 @@ void AddMap(Commands& commands) {
   app->add_option("store", command.store,
                   "Folder of a run, a .jsonl file, or robustness-map.csv to draw it again")
       ->required();
-  app->add_option("--rules", command.rules, "Rows, columns and limits (JSON)")->required();
+  app->add_option("--rules", command.rules, "Rows, methods and limits (JSON)")->required();
   app->add_option("-o,--out", command.out, "Folder for robustness-map.csv, .md and the picture");
-  app->add_option("--format", command.format, "Figure format")
-      ->check(CLI::IsMember({"svg", "pdf"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "Figure format", {"svg", "pdf"});
   AddSize(app, &command.size);
   app->add_option_function<std::string>(
          "--fail-on", [&command](const std::string&) { command.gate = true; },

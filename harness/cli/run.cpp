@@ -201,9 +201,8 @@ void AddRun(Commands& commands) {
                 "Every case in a process of its own; else short ones share processes");
   app->add_flag("--wait", command.wait,
                 "Wait while another process writes to the store, then go on with it");
-  app->add_option("--rerun", options.rerun, "Cases to run although the store has them")
-      ->check(CLI::IsMember({"none", "failed", "all"}))
-      ->capture_default_str();
+  AddChoice(app, "--rerun", &options.rerun, "Cases to run although the store has them",
+            {"none", "failed", "all"});
   CLI::Option* gate = AddGate(app, &command.gate);
   app->footer(
       "The same command resumes an interrupted run. A failed case is a record with its outcome.\n"

@@ -129,9 +129,8 @@ void AddTradeoff(Commands& commands) {
       ->capture_default_str();
   AddWhere(app, &conditions);
   app->add_option("-o,--out", command.out, "Folder (default: that of the store)");
-  app->add_option("--format", command.format, "How it is printed")
-      ->check(CLI::IsMember({"text", "csv", "markdown", "json", "latex"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "How it is printed",
+            {"text", "csv", "markdown", "json", "latex"});
   app->add_flag("--all", command.all, "Print every row");
   AddWide(app);
   CLI::Option* figures = app->add_flag("--figures", draws, "Draw figures too");

@@ -328,9 +328,7 @@ void AddTrajectory(Commands& commands) {
   app->add_option("source", command.source, "Folder of a run, or a trajectory (.csv)")->required();
   AddWhere(app, &conditions);
   app->add_option("-o,--out", command.out, "Folder to write to; of a .csv a file");
-  app->add_option("--format", command.format, "Output format")
-      ->check(CLI::IsMember({"csv", "jsonl"}))
-      ->capture_default_str();
+  AddChoice(app, "--format", &command.format, "Output format", {"csv", "jsonl"});
   app->add_option("--columns", command.columns, "Only columns that begin so, and t: a,b")
       ->delimiter(',');
   app->add_option("--every", command.every, "Only each so many-th row")

@@ -23,8 +23,8 @@ namespace {
 
 constexpr int kLargest = 1'000'000;
 
-/// The other speeds follow. Tension grows with length and its square: so slow that steps of a few
-/// milliseconds are short against the waves in it.
+/// Sets the first joint's speed; other speeds follow. It decreases with size, because tension grows
+/// with length and speed squared: steps of milliseconds stay short compared with waves.
 MechanismDescription Started(MechanismDescription description, int size) {
   description.initial.speeds.push_back({0, {std::min(1.0, 1000.0 / size)}});
   return description;
@@ -33,12 +33,12 @@ MechanismDescription Started(MechanismDescription description, int size) {
 }  // namespace
 
 const std::vector<SizedFamily>& SizedFamilies() {
-  // the smallest loops that move have three bars in the plane and six in space
+  // the smallest loops have three bars in the plane and six in space
   static const std::vector<SizedFamily> all = {
       {"chain", 3, kLargest, "bars of a closed chain", [](int n) { return Started(Chain(n), n); }},
       {"ladder", 1, kLargest, "windows in a row", [](int n) { return Ladder(n, 1.0, 1.0); }},
-      // storeys stand at angles from 0.4 rad on, a tenth more each: the 25th at 2.8 rad, the 29th
-      // would fold flat
+      // storey angles start at 0.4 rad and increase by 0.1 rad: the 25th is 2.8 rad, the 29th would
+      // be flat
       {"grid", 1, 25, "storeys of as many windows", [](int n) { return Grid(n, n, 0.4, 0.5); }},
       {"tree", 1, kLargest, "bars of a binary tree", [](int n) { return Tree(n, 0.1); }},
       {"arm", 1, kLargest, "bars in space, with axes of all directions",
@@ -55,7 +55,7 @@ std::vector<std::string> NamesOfSizedFamilies() {
 }
 
 std::string TextOfSizedFamilies() {
-  std::string text = "What a size counts:";
+  std::string text = "Meaning of a size:";
   for (const SizedFamily& family : SizedFamilies()) {
     text += fmt::format("{} {} ({}, from {})", &family == &SizedFamilies().front() ? "" : ",",
                         family.name, family.of_what, family.smallest);
@@ -115,7 +115,7 @@ std::vector<BenchmarkMember> ReadBenchmarkFamily(const JsonNode& node, const Jso
   return members;
 }
 
-/// Planar members, described in a plane tilted against the axes of space.
+/// Moves planar members to a plane that is tilted in space.
 void PutInSpace(const JsonNode& node, std::vector<BenchmarkMember>* members) {
   const Eigen::Vector3d tilt(0.3, -0.4, 0.5);
   for (BenchmarkMember& member : *members) {
@@ -130,7 +130,7 @@ void PutInSpace(const JsonNode& node, std::vector<BenchmarkMember>* members) {
   }
 }
 
-/// Each member's simplified parts in its place.
+/// Replaces each member by its simplified parts.
 void CompileMembers(std::vector<BenchmarkMember>* members) {
   std::vector<BenchmarkMember> compiled;
   for (const BenchmarkMember& member : *members) {
@@ -146,13 +146,13 @@ void CompileMembers(std::vector<BenchmarkMember>* members) {
   *members = std::move(compiled);
 }
 
-/// A group being read.
+/// Group being read.
 struct GroupInFile : BenchmarkGroup {
   std::filesystem::path folder;
   bool in_space = false, compile = false;
 };
 
-/// Mechanisms of files or of a family.
+/// Reads mechanisms of files or of a family.
 void ReadMembers(const JsonNode& node, GroupInFile& group) {
   const auto mechanisms = node.Optional("mechanisms"), family = node.Optional("family");
   if (mechanisms && family) {
@@ -177,25 +177,25 @@ const Fields<GroupInFile>& GroupFields() {
       {"required": ["mechanisms"], "not": {"anyOf": [{"required": ["family"]}, {"required": ["sizes"]}]}},
       {"required": ["family", "sizes"], "not": {"required": ["mechanisms"]}}]})");
   static const Fields<GroupInFile> fields(
-      "benchmark_group", "Mechanisms, or members of a family, and what is measured of them.",
+      "benchmark_group", "Mechanisms or members of a family, with their benchmarks.",
       {{"mechanisms", OneOrMoreSchema(TextSchema()),
         "Paths of mechanism files, relative to this file."},
-       {"family", ChoiceSchema(NamesOfSizedFamilies()), "What grows."},
+       {"family", ChoiceSchema(NamesOfSizedFamilies()), "Family of mechanisms."},
        {"sizes", OneOrMoreSchema(IntegerSchema(1, kMaxCount)), TextOfSizedFamilies()},
        {"", By(one_of_two, ReadMembers)},
        {"in_space", Bool(&GroupInFile::in_space),
-        "The planar members, described in a tilted plane in space."},
+        "If true, planar members are placed in a tilted plane in space."},
        {"preprocess", Bool(&GroupInFile::compile),
-        "The members' simplified parts in their place, with all savings."},
+        "If true, the members' parts after all simplifications replace the members."},
        {"", By(Json::object(), ChangeMembers)},
        {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
-        "A right-hand side, an integrator step, or both.", "\"rhs\", \"step\" or both"},
-       {"methods", Columns(&BenchmarkGroup::columns), "How the loops are imposed.",
+        "Right-hand sides, integrator steps, or both.", "\"rhs\", \"step\" or both"},
+       {"methods", Columns(&BenchmarkGroup::columns), "Methods that impose the loop constraints.",
         "an array of methods"}});
   return fields;
 }
 
-/// Reports a peer: its time is measured over whole runs, which benchmarks have none of.
+/// Reports peers, which are timed over whole runs only.
 void ReportPeer(const JsonNode& node, const BenchmarkGroup& group) {
   for (const Column& column : group.columns) {
     if (!FindFormulation(column.formulation)->is_peer()) continue;
@@ -205,7 +205,7 @@ void ReportPeer(const JsonNode& node, const BenchmarkGroup& group) {
   }
 }
 
-/// Reports the first benchmark that a group repeats: names must tell results apart.
+/// Reports the first repeated benchmark: names must be unique.
 void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
                              std::set<std::string>* taken) {
   for (const BenchmarkMember& member : group.members) {
@@ -220,7 +220,7 @@ void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
   }
 }
 
-/// The mistakes of the file of states join the others under its own name.
+/// Reads the file of states; its errors are added with its own file name.
 StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
   StateHashes states;
   try {
@@ -244,7 +244,7 @@ StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
 void ReadNamedStates(const JsonNode& node, BenchmarkSet& set) {
   const std::string named = node.Text();
   if (named.empty()) return;
-  // the file itself may be missing: --save-states makes it
+  // the file may be missing: --save-states writes it
   set.states_path = set.path.parent_path() / named;
   std::error_code error;
   if (std::filesystem::exists(set.states_path, error)) {
@@ -268,20 +268,20 @@ void ReadGroups(const JsonNode& node, BenchmarkSet& set) {
 const Fields<BenchmarkSet>& BenchmarkFields() {
   static const Fields<BenchmarkSet> fields(
       "benchmarks",
-      "What loopbench_bench and loopbench_count measure. Every combination of a group's members, "
-      "measures and columns is a benchmark. The program checks more than this schema: that "
-      "mechanism files exist and are valid, and that benchmarks are different.",
+      "Benchmarks of loopbench_bench and loopbench_count: every combination of a group's "
+      "members, measures and methods. The program also checks that mechanism files exist and are "
+      "valid, and that benchmarks are different.",
       DocumentRows<BenchmarkSet>(
-          {{"name", Text(&BenchmarkSet::name), "Of the set.", "a name"},
+          {{"name", Text(&BenchmarkSet::name), "Name of the set of benchmarks.", "a name"},
            {"comment", Text(&BenchmarkSet::comment), "Free text for readers."},
            {"states", By(TextSchema(), ReadNamedStates),
-            "File of state hashes, relative to this file; loopbench_bench --save-states writes "
+            "File of state hashes, relative to this file. loopbench_bench --save-states writes "
             "it."},
            {"integrator",
             Choice(&BenchmarkSet::integrator, ProfileNames(), "an integrator profile"),
-            "Profile whose step is measured."},
-           {"step", Number(&BenchmarkSet::step, kPositive), "Length of the step [s]."},
-           {"groups", By(ArraySchema(GroupFields().Schema(), 1), ReadGroups), "What is measured.",
+            "Integrator profile of the measured step."},
+           {"step", Number(&BenchmarkSet::step, kPositive), "Length of the measured step [s]."},
+           {"groups", By(ArraySchema(GroupFields().Schema(), 1), ReadGroups), "Groups.",
             "an array of groups"}}));
   return fields;
 }

@@ -16,7 +16,7 @@ bool EmptyOrContains(const std::vector<T>& accepted, const T& value) {
   return accepted.empty() || std::find(accepted.begin(), accepted.end(), value) != accepted.end();
 }
 
-/// Which steps a case takes: one of the two is there.
+/// Step control of a case: a tolerance or a fixed step.
 struct StepChoice {
   double tolerance = 0.0, step = 0.0;
 };
@@ -28,8 +28,8 @@ std::vector<StepChoice> StepChoices(const Experiment& experiment) {
   return choices;
 }
 
-/// The integrators that a column is run with: those of the experiment, and one of no consequence
-/// for a peer, which has its own.
+/// Returns the integrators of a method: all of the experiment; for a peer, which has its own, only
+/// one placeholder.
 std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Column& column) {
   const FormulationRow* row = FindFormulation(column.formulation);
   std::vector<std::string> integrators = experiment.integrators;
@@ -53,7 +53,7 @@ Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& col
   return one;
 }
 
-/// `wanted`, or the shortest.
+/// Returns `wanted` if positive, otherwise the shortest horizon.
 double HorizonOr(double wanted, const std::vector<double>& horizons) {
   return wanted > 0.0 ? wanted : *std::min_element(horizons.begin(), horizons.end());
 }
@@ -147,7 +147,7 @@ bool Matches(const EnsembleRule& rule, const Case& one) {
 
 namespace {
 
-/// As Expand(), without ensembles.
+/// Returns cases as Expand(), without ensembles.
 std::vector<Case> ExpandRuns(const Experiment& experiment) {
   std::vector<Case> cases;
   const std::vector<StepChoice> choices = StepChoices(experiment);
@@ -193,7 +193,7 @@ std::vector<Case> ExpandLadders(const Experiment& experiment) {
     if (horizons.empty()) continue;
     const double horizon = HorizonOr(precision.horizon, horizons);
     for (const Column& column : experiment.columns) {
-      // the one integrator that there is in every scalar
+      // the only integrator available in every scalar
       cases.push_back(MakeCase(experiment, scene, column,
                                {.tolerance = precision.tolerances.front()}, horizon, "ode45"));
     }

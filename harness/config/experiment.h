@@ -1,5 +1,5 @@
-// An experiment: which mechanisms, columns, tolerances and horizons are run, and how each case is
-// called. Plain data; experiment_reader.h fills it.
+// Experiment: mechanisms, methods, tolerances and horizons to run, and the keys of cases. Plain
+// data, filled by experiment_reader.h.
 #pragma once
 
 #include <array>
@@ -21,10 +21,10 @@
 
 namespace loopbench::harness {
 
-/// Where the Newton iteration of an implicit profile has its Jacobians from.
+/// Source of Jacobians for the Newton iteration of implicit profiles.
 enum class JacobianKind { kForward, kFiniteDifference };
 
-/// Who evaluates right-hand sides: the library, or code generated from its text
+/// Evaluation of right-hand sides: by the library, or by code generated from it
 /// (harness/generate/), without or with fused multiply-add.
 enum class Execution { kLibrary, kGenerated, kGeneratedFma };
 
@@ -43,12 +43,12 @@ template <>
 inline constexpr std::array<std::string_view, 3> kNames<Execution> = {"library", "generated",
                                                                       "generated-fma"};
 
-/// What a run computes in, narrowest first (harness/precision/).
+/// Floating-point type of a run, narrowest first (harness/precision/).
 enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<Scalar> = {"float", "double", "long-double",
                                                                    "float128"};
-/// The other enums have theirs beside them, in mechanism/.
+/// ToString of the other enums is in mechanism/.
 inline std::string_view ToString(Scalar value) {
   return kNames<Scalar>[static_cast<std::size_t>(value)];
 }
@@ -56,7 +56,7 @@ inline std::string_view ToString(Execution value) {
   return kNames<Execution>[static_cast<std::size_t>(value)];
 }
 
-/// The value with this name, or nothing.
+/// Returns the value with this name, or nothing.
 template <class Enum>
 std::optional<Enum> Parse(std::string_view name) {
   for (std::size_t i = 0; i < kNames<Enum>.size(); ++i) {
@@ -64,48 +64,48 @@ std::optional<Enum> Parse(std::string_view name) {
   }
   return std::nullopt;
 }
-/// Levels are a table that grows.
+/// Looks up a level in the table of registered levels.
 template <>
 inline std::optional<Enforcement> Parse<Enforcement>(std::string_view name) {
   return FindLevel(name);
 }
 
-/// One way of imposing the loops: a column of the tables. For reduction the solver as published is
-/// the mechanism's fixed independent set, the rank-revealing one the automatic partition.
+/// Method that imposes the loop constraints. For reduction, the plain solver uses the mechanism's
+/// fixed independent set, the rank-revealing solver the automatic partition.
 struct Column {
-  std::string formulation = "odca";  ///< a registered name (formulations.h)
+  std::string formulation = "odca";  ///< registered name (formulations.h)
   Enforcement enforcement = Enforcement::kAcceleration;
   Coordinates coordinates = Coordinates::kJoint;
   SolverKind solver = SolverKind::kRankRevealing;
-  /// Of "baumgarte", when the file gives them.
+  /// Gains of "baumgarte", if given in the file.
   std::optional<BaumgarteGains> gains = std::nullopt;
-  int threads = 1;  ///< that may work on one right-hand side
+  int threads = 1;  ///< threads for one right-hand side
   Execution execution = Execution::kLibrary;
 
   friend bool operator==(const Column&, const Column&) = default;
 };
 
-/// The most threads that files may ask for: more than processors have.
+/// Maximum number of threads in files; more than processors have.
 inline constexpr int kMostThreads = 256;
 
 /// "odca/acceleration/joint/plain", "odca/baumgarte(5, 5)/joint/rank-revealing",
 /// "odca/velocity/joint/rank-revealing/2-threads".
 std::string ToString(const Column& column);
 
-/// A mechanism and how long it runs.
+/// Problem: a mechanism and its simulated times.
 struct ExperimentScene {
   std::string name;  ///< the mechanism's name unless overridden; unique
-  /// The mechanism file, resolved against the experiment's folder; empty for one that stands in the
-  /// experiment itself or is a member of a family.
+  /// Mechanism file, resolved against the experiment's folder; empty for a mechanism in the
+  /// experiment file or a member of a family.
   std::filesystem::path path;
   MechanismFile mechanism;
   std::vector<double> horizons;   ///< [s], different
   std::vector<std::string> tags;  ///< for filters and tables
-  /// What accuracy runs are held against in place of a certified reference.
+  /// Published data, used instead of a certified reference.
   std::optional<PublishedSeries> series = std::nullopt;
 };
 
-/// A held coordinate drawn uniformly between two bounds [rad or m].
+/// Fixed coordinate, drawn uniformly between two bounds [rad or m].
 struct DrawnCoordinate {
   std::string joint;
   double from = 0.0, to = 0.0;
@@ -114,10 +114,10 @@ struct DrawnCoordinate {
 /// Perturbed repetitions for every case that matches all given lists; an empty list matches all.
 struct EnsembleRule {
   int size = 16;                         ///< runs per case, at least 2
-  std::uint64_t seed = 1;                ///< of the generator of perturbations
-  double perturb = 0.02;                 ///< amplitude on the held coordinates [rad or m]; or else
-  std::vector<DrawnCoordinate> between;  ///< held coordinates drawn anew, the others as they are
-  double branch_bound = 1e-6;            ///< a run further from its branch has left it [rad]
+  std::uint64_t seed = 1;                ///< seed of the random perturbations
+  double perturb = 0.02;                 ///< amplitude on the fixed coordinates [rad or m]; or
+  std::vector<DrawnCoordinate> between;  ///< drawn coordinates; others are unchanged
+  double branch_bound = 1e-6;            ///< branch error beyond which a run has left it [rad]
   std::vector<std::string> scenes;
   std::vector<double> horizons;
   std::vector<double> tolerances;
@@ -127,10 +127,10 @@ struct EnsembleRule {
   std::vector<SolverKind> solvers;
 };
 
-/// When a case is given up. Its row then says so.
+/// Limits at which a case is stopped; its row contains the reason.
 struct Limits {
   double cpu_s = 10.0;             ///< CPU time [s]: keeps a whole suite within minutes
-  std::int64_t steps = 1'000'000;  ///< accepted steps: far more than any case that ends needs
+  std::int64_t steps = 1'000'000;  ///< accepted steps; far more than completed cases need
   double memory_mb = 2048.0;       ///< address space of the case's process [MiB]
 };
 
@@ -138,18 +138,18 @@ struct Limits {
 /// side only.
 struct TimingFamily {
   std::string family;      ///< a SizedFamily (harness/config/benchmarks.h)
-  std::vector<int> sizes;  ///< of its members
+  std::vector<int> sizes;  ///< sizes of its members
   std::vector<Column> columns;
 };
 
-/// Timing runs, separate from those that measure accuracy.
+/// Timing runs, separate from accuracy runs.
 struct Timing {
-  int repeats = 5;              ///< 0 switches timing off; 5 make a median with a spread
+  int repeats = 5;              ///< 0: no timing; 5 give a median with a spread
   double tolerance = 1e-8;      ///< rtol = atol
-  double horizon = 0.0;         ///< [s]; 0: the shortest of each scene
-  std::vector<Column> columns;  ///< those of the experiment unless given
-  /// Instead of one tolerance and horizon for all: every accuracy case with its own integrator,
-  /// tolerance or step, and horizon, so that each accuracy row has a timing row of the same keys.
+  double horizon = 0.0;         ///< [s]; 0: the shortest of each problem
+  std::vector<Column> columns;  ///< default: as in the experiment
+  /// If true, every accuracy case is timed with its own integrator, tolerance or step, and horizon,
+  /// so that each accuracy row has a timing row with the same keys.
   bool cases = false;
   std::vector<TimingFamily> families;
 };
@@ -157,37 +157,37 @@ struct Timing {
 /// Runs in several scalars (harness/precision/ladder.h), separate from the others.
 struct Precision {
   std::vector<Scalar> scalars;     ///< different; empty: none
-  std::vector<double> tolerances;  ///< those of the experiment unless given
-  double horizon = 0.0;            ///< [s]; 0: the shortest of each scene
+  std::vector<double> tolerances;  ///< default: as in the experiment
+  double horizon = 0.0;            ///< [s]; 0: the shortest of each problem
   double reference = 1e-25;        ///< tolerance of the reference: double's reach squared
 };
 
-/// Certified references that accuracy runs are held against (harness/precision/make_reference.h).
+/// Certified references for accuracy runs (harness/precision/make_reference.h).
 struct ReferenceOptions {
-  /// "long-double", "float128" (of planar mechanisms), or the first that certifies to the end.
+  /// "long-double", "float128" (planar only), or "as-needed": the first that certifies to the end.
   std::string scalar = "as-needed";
-  int points = 101;     ///< times, evenly from the start to the end
-  double cpu_s = 20.0;  ///< of one witness [s]; it certifies as far as it gets
+  int points = 101;     ///< number of times, evenly from start to end
+  double cpu_s = 20.0;  ///< CPU time of one integration [s]; it certifies the completed part
 };
 
-/// What rows of a trajectory hold, in the order of their columns (harness/trajectory/columns.h).
+/// Quantities in rows of a trajectory, in the order of columns (harness/trajectory/columns.h).
 enum class OutputPart { kJoints, kBodies, kPoints, kReactions, kForces, kEnergy };
 template <>
 inline constexpr std::array<std::string_view, 6> kNames<OutputPart> = {
     "joints", "bodies", "points", "reactions", "forces", "energy"};
-/// Axes of reactions: the ground's, or frame F of each joint, which is fixed on its first body.
+/// Axes of reactions: ground axes, or frame F of each joint, which is fixed to its first body.
 enum class OutputAxes { kGround, kJoint };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<OutputAxes> = {"ground", "joint"};
 
-/// A trajectory of each accuracy case. Times are said in one of four ways.
+/// Trajectory of each accuracy case. Times are given in one of four ways.
 struct OutputOptions {
-  double step = 0.0;            ///< [s] from row to row, 0: said otherwise
-  int number = 0;               ///< of rows, evenly from the start to the end; 0: likewise
-  std::vector<double> times;    ///< [s], rising; those beyond a horizon are left out
+  double step = 0.0;            ///< [s] between rows; 0: not used
+  int number = 0;               ///< number of rows, evenly from start to end; 0: not used
+  std::vector<double> times;    ///< [s], ascending; times beyond a horizon are left out
   bool accepted_steps = false;  ///< the ends of the integrator's own steps
-  /// The integrator's steps end at the times; else they lie on dense output and the run is the same
-  /// as without.
+  /// If true, integrator steps end at the times. If false, rows are taken from dense output, and
+  /// the run is unchanged.
   bool exact = false;
   std::vector<OutputPart> quantities = {OutputPart::kJoints, OutputPart::kBodies,
                                         OutputPart::kPoints, OutputPart::kReactions,
@@ -197,9 +197,9 @@ struct OutputOptions {
   bool Has(OutputPart part) const;
 };
 
-/// The times of rows of a run until `horizon`; none for accepted steps.
+/// Returns the times of rows of a run until `horizon`; none for accepted steps.
 std::vector<double> OutputTimes(const OutputOptions& output, double horizon);
-/// All that it says, for the identity of cases.
+/// Returns all options as text, for the identity of cases.
 std::string ToString(const OutputOptions& output);
 
 struct Experiment {
@@ -208,79 +208,79 @@ struct Experiment {
   std::filesystem::path path;
   std::vector<ExperimentScene> scenes;
   std::vector<Column> columns;
-  std::vector<double> tolerances;   ///< rtol = atol; may be empty where there are
-  std::vector<double> fixed_steps;  ///< [s]; each makes cases without error test besides those
-  std::vector<std::string> integrators = {"ode45"};  ///< profiles, crossed with all of them
-  JacobianKind jacobian = JacobianKind::kForward;    ///< of no consequence to explicit profiles
-  std::vector<EnsembleRule> ensembles;               ///< the first that matches a case counts
+  std::vector<double> tolerances;   ///< rtol = atol; may be empty if there are fixed_steps
+  std::vector<double> fixed_steps;  ///< [s]; additional cases without error test
+  std::vector<std::string> integrators = {"ode45"};  ///< profiles, crossed with all steps
+  JacobianKind jacobian = JacobianKind::kForward;    ///< unused by explicit profiles
+  std::vector<EnsembleRule> ensembles;               ///< the first match of a case applies
   Limits limits;
-  CompileOptions compile;   ///< what is simplified before a run
+  CompileOptions compile;   ///< simplifications before a run
   bool refine = false;      ///< accuracy cases run again at a tenth of their tolerance
   int series_points = 200;  ///< points kept of a time series for figures
   Timing timing;
   Precision precision;
   std::optional<ReferenceOptions> reference;
   std::optional<OutputOptions> output;
-  /// Of a sweep: this combination's value on each axis, by the axis's name. The values are in every
-  /// record, so that filters and tables can use them. Empty without a sweep.
+  /// Values of this combination of a sweep, by axis name. Every record contains them, for filters
+  /// and tables. Empty without a sweep.
   Record parameters;
-  std::vector<Selection> exclusions;  ///< cases that match one of them are left out
+  std::vector<Selection> exclusions;  ///< matching cases are left out
 };
 
-/// One row of a table: everything that decides a run, except the mechanism itself.
+/// Case: all settings that determine a run, except the mechanism.
 struct Case {
-  std::size_t scene = 0;  ///< index into Experiment::scenes
-  std::string mechanism;  ///< the scene's name
+  std::size_t scene = 0;  ///< index in Experiment::scenes
+  std::string mechanism;  ///< the problem's name
   Column column;
   std::string integrator;
   JacobianKind jacobian = JacobianKind::kForward;
-  double rtol = 0.0;       ///< 0 where the step is fixed
-  double atol = 0.0;       ///< likewise
+  double rtol = 0.0;       ///< 0 if the step is fixed
+  double atol = 0.0;       ///< 0 if the step is fixed
   double horizon = 0.0;    ///< [s]
-  double step = 0.0;       ///< [s]; of all steps, without error test; 0: the tolerance chooses them
-  int ensemble = 1;        ///< runs; 1: the scene as it is, no perturbation
-  std::uint64_t seed = 0;  ///< of the ensemble
-  double perturb = 0.0;    ///< amplitude of the ensemble [rad or m], or else
+  double step = 0.0;       ///< fixed step [s], without error test; 0: set by the tolerance
+  int ensemble = 1;        ///< number of runs; 1: no perturbation
+  std::uint64_t seed = 0;  ///< seed of the ensemble
+  double perturb = 0.0;    ///< amplitude of the ensemble [rad or m], or
   std::vector<DrawnCoordinate> between = {};  ///< as in the rule
   double branch_bound = 1e-6;                 ///< [rad]
   Limits limits = {};
-  /// CaseKeys(), made with the case; where it is run also "case_id" and "content"
-  /// (harness/run/case_identity.h). What runs a case writes them, whatever they say.
+  /// CaseKeys() of the case; for runs also "case_id" and "content" (harness/run/case_identity.h).
+  /// They are written to the record unchanged.
   Record keys = {};
 };
 
-/// Whether the rule applies to the case (its ensemble fields do not matter).
+/// Returns true if the rule applies to the case, whose ensemble fields are ignored.
 bool Matches(const EnsembleRule& rule, const Case& one);
 
-/// The keys that name a case, as they stand in every table row: docs/reference/records.md,
-/// then the experiment's parameters. With a fixed step rtol and atol are empty and "step" is a key.
+/// Returns the keys of a case in every record (docs/reference/records.md), then the experiment's
+/// parameters. With a fixed step, rtol and atol are empty and "step" is a key.
 Record CaseKeys(const Experiment& experiment, const Case& one);
 
-/// "1e-08", or "step 0.001": what decides how long the case's steps are.
+/// "1e-08", or "step 0.001": the setting that determines step lengths.
 std::string SettingOf(const Case& one);
 
-/// In proportion to the steps that a run over `horizon` takes: the horizon over the fixed step, or
-/// times rtol^(-1/5), as with a pair of order 5. Only cases of one kind compare.
+/// Returns a number proportional to the expected steps of a run: horizon / step, or horizon
+/// rtol^(-1/5) as for a pair of order 5. Comparable only between cases of one kind.
 double ExpectedSteps(const Case& one);
 
-/// All columns but peers with so many threads; those that differed in nothing else become one.
+/// Sets the threads of all methods except peers, and merges methods that become equal.
 void UseThreads(int threads, Experiment& experiment);
 
-/// All cases for accuracy, in the order scene, horizon, column, integrator, tolerance, fixed step,
-/// without excluded ones. A peer, which has its own integrator, is there once for each tolerance.
+/// Returns all cases for accuracy that are not excluded, in the order problem, horizon, method,
+/// integrator, tolerance, fixed step. Peers, which have own integrators, have one per tolerance.
 std::vector<Case> Expand(const Experiment& experiment);
 
-/// One case for each precision ladder, in the order scene, column, without excluded ones; empty
-/// without scalars. Tolerances are those of the ladder.
+/// Returns one case per precision ladder except excluded cases, in the order problem, method; empty
+/// without scalars. Tolerances are in the ladder.
 std::vector<Case> ExpandLadders(const Experiment& experiment);
 
-/// All cases for timing, in the order scene, column, integrator, without excluded ones, or with
-/// `timing.cases` those for accuracy, each of which is one run; empty when timing is off.
+/// Returns all timing cases except excluded cases, in the order problem, method, integrator. With
+/// `timing.cases`, returns the accuracy cases, each as one run. Empty if timing is off.
 std::vector<Case> ExpandTiming(const Experiment& experiment);
 
-// Limits as keys and values: what the content of a case says of them.
+// Limits as keys and values, for the content of a case.
 
-/// Each limit under its key in files.
+/// Returns each limit under its key in files.
 Record RecordOf(const Limits& limits);
 
 }  // namespace loopbench::harness

@@ -14,7 +14,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// One combination, or all there is. Mistakes go to the root's errors.
+/// Reads one combination. Errors are added to the root's list.
 Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
   ExperimentFile experiment;
   experiment.files = &files;
@@ -34,12 +34,12 @@ std::string Described(const Record& parameters) {
 
 }  // namespace
 
-/// Which rules of "exclude" have matched, and whether any case was left.
+/// Records which rules of "exclude" have matched, and whether any case is left.
 class ExclusionUse {
  public:
   explicit ExclusionUse(const std::vector<Selection>& rules) : rules_(rules), used_(rules.size()) {}
 
-  /// Whether the experiment has a case that no rule excludes.
+  /// Returns true if the experiment has a case that no rule excludes.
   bool Look(Experiment* experiment) {
     if (rules_.empty()) return any_left_ = true;
     std::vector<Selection> own;
@@ -135,7 +135,7 @@ class ExperimentSource::Document {
     return WithoutExcluded(std::move(experiments));
   }
 
-  /// A rule that excludes nothing is a mistake, as is a set of rules that excludes everything.
+  /// Reports rules that exclude nothing, and rules that exclude all cases.
   void CheckExclusions(const std::vector<std::size_t>& sample) {
     ExclusionUse use(Read(0).exclusions);
     const auto look = [&](std::size_t i) {
@@ -165,13 +165,13 @@ class ExperimentSource::Document {
   }
 
   void ReadSweep() {
-    // Mistakes of the sweep itself come with those of the file as it stands.
+    // Errors of the sweep are reported with errors of the unchanged file.
     Origins origins = origins_;
     ErrorList errors(std::move(origins));
     const JsonNode root(document_, "", errors);
     sweep_ = std::make_unique<Sweep>(root, fields_, set_);
     if (!sweep_->sound()) {
-      ErrorList all(origins_);  // with the files that the sweep has taken in
+      ErrorList all(origins_);  // with the files included by the sweep
       const JsonNode again(document_, "", all);
       Sweep(again, fields_, set_);
       ReadOne(again, files_);
@@ -188,7 +188,7 @@ class ExperimentSource::Document {
         fault.suggestion.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", fault.suggestion));
   }
 
-  /// JSON where it is some, else a string: names need no quotes on the command line.
+  /// Returns JSON if valid, otherwise a string: names need no quotes on the command line.
   static Json Parsed(const Setting& setting) {
     const std::string where = "--set " + setting.pointer;
     if (const std::string fault = EncodingFault(setting.value); !fault.empty()) {
@@ -307,7 +307,7 @@ void ReadAllColumns(const JsonNode& node, File& file) {
   file.columns = file.timing.columns = ReadColumns(node);
 }
 
-/// None is as good as no key: RequireSteps() says when that will not do.
+/// Reads tolerances. An empty list is equal to a missing key; see RequireSteps().
 void ReadAnyTolerances(const JsonNode& node, File& file) {
   const bool is_empty = node.value().is_array() && node.value().empty();
   if (!is_empty) file.tolerances = node.NumberList(kTolerances);
@@ -353,7 +353,7 @@ void ReadOutputOptions(const JsonNode& node, File& file) {
   OutputFields().Read(node, &file.output.emplace());
 }
 
-/// Reports levels whose derivative an implicit profile asks for, and that have none.
+/// Reports levels without the derivative that an implicit profile needs.
 void RequireDerivatives(const JsonNode& node, File& file) {
   const auto integrator = node.Optional("integrator");
   if (!integrator || file.jacobian != JacobianKind::kForward) return;
@@ -384,35 +384,34 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
        {{"required", {"tolerances"}}, {"properties", {{"tolerances", {{"minItems", 1}}}}}}}};
   static const Fields<File> fields(
       "experiment",
-      "Which mechanisms, columns, tolerances and horizons are run. Lists expand as a cross "
-      "product. The program checks more than this schema: that mechanism files exist and are "
-      "valid, that problems and methods are different, that fields of a sweep exist, that ranges "
-      "have two different ends, and that every ensemble and exclusion matches a case.",
+      "Mechanisms, methods, tolerances and horizons to run. Lists expand as a cross product. The "
+      "program also checks that mechanism files exist and are valid, that problems and methods "
+      "are different, that fields of a sweep exist, that ranges have two different ends, and "
+      "that every ensemble and exclusion matches a case.",
       DocumentRows<File>(
-          {{"name", Text(&File::name), "Of the suite.", "a name"},
+          {{"name", Text(&File::name), "Name of the experiment.", "a name"},
            {"comment", Text(&File::comment), "Free text for readers."},
-           {"problems", ScenesValue(), "What moves.", "an array of problems"},
-           {"methods", By(ColumnsSchema(), ReadAllColumns), "How the loops are imposed.",
-            "an array of methods"},
+           {"problems", ScenesValue(), "Problems: a mechanism and a duration each.",
+            "an array of problems"},
+           {"methods", By(ColumnsSchema(), ReadAllColumns),
+            "Methods that impose the loop constraints.", "an array of methods"},
            {"tolerances", By(some_or_none, ReadAnyTolerances),
-            "rtol = atol of the integrator; above the spacing of doubles. May be left out, or be "
-            "[], "
-            "beside fixed_steps."},
+            "Tolerances rtol = atol of the integrator, above the spacing of doubles. Optional, "
+            "or [], if fixed_steps is given."},
            {"fixed_steps", NumberList(&File::fixed_steps, kPositive),
-            "Lengths of steps [s]: each makes cases whose steps all have this length (the last is "
-            "clipped), without error test, besides those of the tolerances. Not for peers."},
+            "Fixed step lengths [s]: each adds cases in which all steps have this length (the "
+            "last step is clipped) and no error test is made. Not for peers."},
            {"", By(one_of_both, RequireSteps)},
            {"", By(Json::object(), RequireNoPeerOfFixedSteps)},
            {"refine", Bool(&File::refine),
-            "Every case with a tolerance runs once more at a tenth of it. Records then contain "
-            "refinement_difference, the largest difference of final poses. More than 1000 "
-            "tolerances set the warning refinement."},
+            "If true, every case with a tolerance runs again at a tenth of it. Records then "
+            "contain refinement_difference, the largest difference of final poses. A difference "
+            "above 1000 tolerances sets the warning refinement."},
            {"integrator", Integrators(),
-            "The profile, a Runge-Kutta pair with its norm and controller, or several, crossed "
-            "with "
-            "all else."},
+            "Integrator profiles: Runge-Kutta pairs with norm and controller, crossed with all "
+            "other lists."},
            {"jacobian", Choice(&File::jacobian, NamesOf<JacobianKind>(), "a kind of Jacobian"),
-            "Where implicit profiles have their Jacobians from; explicit ones have none."},
+            "Jacobians of implicit profiles: by forward differentiation or finite differences."},
            {"limits", Object(&File::limits, LimitsFields())},
            {"preprocess", Object(&File::compile, CompileFields())},
            {"series", Section(SeriesFields())},
@@ -423,15 +422,13 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
            {"", By(Json::object(), RequireOutput)},
            {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
            {"sweep", SweepSchema(),
-            "Axes that are crossed, the first one slowest; each combination of values is run as if "
-            "the values stood in this file. Axes in a zip go in step. At most 10000000 "
-            "combinations."},
+            "Sweep axes, crossed with the first axis slowest. Each combination of values is run "
+            "as if the values were in this file. Axes in a zip advance together. At most "
+            "10000000 combinations."},
            {"exclude", ExclusionsSchema(),
-            "Cases that match all conditions of a rule are left out. Keys are mechanism, "
-            "formulation, "
-            "enforcement, coordinates, solver, integrator, rtol, atol, step, horizon and the names "
-            "of "
-            "axes."},
+            "Rules: cases that match all conditions of a rule are left out. Keys are mechanism, "
+            "formulation, enforcement, coordinates, solver, integrator, rtol, atol, step, "
+            "horizon and the names of axes."},
            {"", By(Json::object(), RequireDerivatives)}}));
   return fields;
 }

@@ -12,37 +12,36 @@
 
 namespace loopbench::harness {
 
-// The combinations of an experiment file, read one at a time.
+// Combinations of an experiment file, read one at a time.
 //
-// A file without "sweep" is one experiment. A sweep goes through the values of fields anywhere in
-// the file or in the mechanisms it names; each combination of values is an experiment of its own,
-// read as if the values stood in the file, and carries them as parameters. A sweep of ten million
-// combinations is as good as one of ten: nothing here grows with their number.
+// A file without "sweep" is one experiment. A sweep varies fields of the file or of its mechanisms.
+// Each combination of values is a separate experiment, read as if the values were in the file, with
+// the values as parameters. Memory does not grow with the number of combinations.
 
 /// "--set /json/pointer=value": the value of one field, set before anything is read. A pointer may
-/// go through a scene's mechanism path into that file ("/problems/0/mechanism/gravity"); "*" stands
-/// for all elements of an array. Keys that the file leaves out may be set; what the reader does not
-/// know it refuses as it does in the file.
+/// go through a problem's mechanism path into that file ("/problems/0/mechanism/gravity"); "*"
+/// stands for all elements of an array. Keys missing in the file may be set; unknown keys are
+/// rejected as in the file.
 struct Setting {
   std::string pointer;
-  std::string value;  ///< JSON, or taken as a string when it is none
+  std::string value;  ///< JSON; other text is a string
 };
 
-/// Reads "/json/pointer=value". Throws ConfigError when there is no "=" or no leading "/".
+/// Reads "/json/pointer=value". Throws ConfigError if "=" or the leading "/" is missing.
 Setting ParseSetting(std::string_view text);
 
 inline constexpr std::size_t kMaxCombinations = 10'000'000;  ///< of a sweep
-inline constexpr std::size_t kMaxCases = 10'000'000;     ///< of a file, all combinations together
-inline constexpr std::size_t kMaxInMemory = 100'000;     ///< combinations that are held at once
-inline constexpr std::size_t kMaxHeldCases = 1'000'000;  ///< and cases of them
+inline constexpr std::size_t kMaxCases = 10'000'000;         ///< of a file, all combinations
+inline constexpr std::size_t kMaxInMemory = 100'000;         ///< combinations in memory at once
+inline constexpr std::size_t kMaxHeldCases = 1'000'000;      ///< cases in memory at once
 
 class ExperimentSource {
  public:
-  /// Reads the file, what the settings change, and its sweep; mechanism paths in it are relative to
-  /// its folder. Throws ConfigError with all mistakes of the sweep, one per line.
+  /// Reads the file, applies settings and reads the sweep; mechanism paths are relative to the
+  /// file's folder. Throws ConfigError with all errors of the sweep, one per line.
   explicit ExperimentSource(const std::filesystem::path& path,
                             const std::vector<Setting>& settings = {});
-  /// The same from text; `path` gives the name used in messages and the folder.
+  /// Reads from text; `path` gives the name used in messages and the folder.
   ExperimentSource(std::string text, const std::filesystem::path& path,
                    const std::vector<Setting>& settings);
   ~ExperimentSource();
@@ -50,37 +49,37 @@ class ExperimentSource {
 
   const std::filesystem::path& path() const;
 
-  /// Number of combinations, those included whose cases are all excluded; 1 without a sweep.
+  /// Returns the number of combinations, including fully excluded combinations; 1 without a sweep.
   std::size_t count() const;
 
-  /// Names and numbers of values of the axes, the first one slowest, those of a zip one by one.
+  /// Returns names and numbers of values of all axes, the first axis slowest, axes of a zip one by
+  /// one.
   std::vector<std::pair<std::string, std::size_t>> axes() const;
 
-  /// A combination's value on each axis, without reading it.
+  /// Returns the values of a combination by axis, without reading the experiment.
   Record Parameters(std::size_t combination) const;
 
-  /// Reads one. Throws ConfigError with all its mistakes, those inside the mechanism files
-  /// included.
+  /// Reads a combination. Throws ConfigError with all errors, including errors of mechanism files.
   Experiment Read(std::size_t combination);
 
-  /// Combinations, rising, in which each value of each axis occurs, the first and the last one
-  /// among them; some of an axis's values, evenly, where it has more than `most`.
+  /// Returns ascending combinations, including the first and the last, in which each value of each
+  /// axis occurs. Of an axis with more than `most` values, only some occur, evenly spaced.
   std::vector<std::size_t> EachValue(std::size_t most) const;
 
-  /// The document as it is read, with all settings.
+  /// Returns the document with all settings applied.
   std::string Text() const;
 
-  /// All combinations in order, without those whose cases are all excluded.
+  /// Returns all combinations in order, except combinations whose cases are all excluded.
   ///
-  /// Besides names and ranges it refuses what would silently do nothing or do the same twice: a
-  /// column, scene or value listed twice, a field that two axes set, and an ensemble rule or
-  /// exclusion that matches no case. Throws ConfigError with all mistakes; of a sweep those of the
-  /// first combination that has any. More than kMaxInMemory are refused.
+  /// In addition to names and ranges, rejects repeated methods, problems or values, fields set by
+  /// two axes, and ensemble rules or exclusions that match no case. Throws ConfigError with all
+  /// errors, in a sweep with all errors of the first invalid combination. More than kMaxInMemory
+  /// combinations are rejected.
   std::vector<Experiment> ReadAll();
 
-  /// Throws ConfigError for rules of "exclude" that match no case of any combination, or that match
-  /// all of all. Reads combinations until it is sure.
-  /// @param sample  read before the others
+  /// Throws ConfigError if a rule of "exclude" matches no case, or if the rules exclude all cases.
+  /// Reads combinations until both are decided.
+  /// @param sample  combinations that are read first
   void CheckExclusions(const std::vector<std::size_t>& sample);
 
  private:
@@ -88,50 +87,49 @@ class ExperimentSource {
   std::unique_ptr<Document> document_;
 };
 
-// Experiments and the mechanisms they name, read whole from JSON
+// Experiments and their mechanisms, read completely from JSON
 // (configs/schema/experiment.schema.json).
 
-/// All combinations of a file (ExperimentSource::ReadAll()).
+/// Reads all combinations of a file (ExperimentSource::ReadAll()).
 std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
                                         const std::vector<Setting>& settings = {});
 
-/// The same from text; `path` gives the name used in messages and the folder for mechanism paths.
+/// Reads from text; `path` gives the name used in messages and the folder of mechanism paths.
 std::vector<Experiment> ParseExperiments(std::string_view text, const std::filesystem::path& path,
                                          const std::vector<Setting>& settings = {});
 
-/// The experiment of a file without a sweep. Throws ConfigError for a sweep of several
-/// combinations.
+/// Reads a file without a sweep. Throws ConfigError for a sweep of several combinations.
 Experiment ReadExperiment(const std::filesystem::path& path);
 
-/// The same from text.
+/// Reads an experiment from text.
 Experiment ParseExperiment(std::string_view text, const std::filesystem::path& path);
 
-// The text of an experiment of one run, for programs that recommend one.
+// Text of an experiment of one run, for recommended settings.
 
 struct SingleRun {
   std::string name, comment;
-  std::filesystem::path mechanism;  ///< as the experiment's folder sees it
+  std::filesystem::path mechanism;  ///< relative to the experiment's folder
   double horizon = 1.0;             ///< [s]
   Column column;
   std::string integrator = "ode45";
   double rtol = 1e-8;
-  double step = 0.0;  ///< [s]; fixed where it is positive
+  double step = 0.0;  ///< fixed step [s] if positive
   ReferenceOptions reference;
 };
 
-/// With a certified reference, and timed as it is.
+/// Returns the experiment with a certified reference and timing of its case.
 std::string ExperimentText(const SingleRun& run);
 
-// An experiment that runs all models of a ladder alike (mechanism/simplify/model.h).
+// Experiment that runs all models of a ladder equally (mechanism/simplify/model.h).
 
 struct LadderFile {
   std::string name, comment;
-  std::vector<std::string> mechanisms;  ///< paths as the experiment says them
+  std::vector<std::string> mechanisms;  ///< paths as written in the experiment
   double horizon = 10.0;                ///< [s]
 };
 
-/// The whole file: every model in the same columns, at the same tolerances, for the same horizon,
-/// with timings, and without the savings that models of the ladder have made themselves.
+/// Returns the file: all models with the same methods, tolerances and horizon, with timing, and
+/// without the simplifications that the models of the ladder already contain.
 std::string LadderText(const LadderFile& ladder);
 
 }  // namespace loopbench::harness

@@ -1,4 +1,4 @@
-// Sections of an experiment: scenes, families of mechanisms, ensembles of starts.
+// Sections of an experiment: problems, families of mechanisms, ensembles of initial values.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,16 +19,16 @@
 namespace loopbench::harness {
 namespace {
 
-// Farther coordinates [rad or m] start no member: its start is followed in steps of 0.1.
+// Limits of drawn coordinates [rad or m]: a member's start is reached in steps of 0.1.
 constexpr Range kFarthest = {.min = -1e4, .max = 1e4};
 constexpr Range kAmplitude = {.min = 0.0, .max = kFarthest.max, .above_min = true};
 
-/// A rule and what it selects from.
+/// Ensemble rule and its experiment.
 struct RuleOfExperiment : EnsembleRule {
   const Experiment* experiment = nullptr;
 };
 
-/// Each must be one of `used`: one that is not would match nothing.
+/// Reads numbers that must be in `used`; others would match nothing.
 std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<double>& used) {
   const std::vector<double> numbers = node.NumberList(kPositive);
   for (const double number : numbers) {
@@ -67,7 +67,7 @@ void ReadSceneNames(const JsonNode& node, RuleOfExperiment& rule) {
   }
 }
 
-/// {"joint": [from, to]}.
+/// Reads {"joint": [from, to]}.
 void ReadBetween(const JsonNode& node, EnsembleRule& rule) {
   for (const auto& [joint, bounds] : node.Members()) {
     const std::vector<double> ends = bounds.Numbers(2);
@@ -81,7 +81,7 @@ void ReadBetween(const JsonNode& node, EnsembleRule& rule) {
   if (node.value().is_object() && node.value().empty()) node.Fail("at least one joint");
 }
 
-/// Joints that can be drawn: held, with one coordinate.
+/// Returns joints that can be drawn: fixed, with one coordinate.
 NameList DrawableJoints(const MechanismDescription& description) {
   NameList names;
   for (const JointValues& values : description.initial.coordinates) {
@@ -93,7 +93,7 @@ NameList DrawableJoints(const MechanismDescription& description) {
   return names;
 }
 
-/// Every scene of the rule's cases must have the joints to draw.
+/// Checks that every problem of the rule's cases has the joints to draw.
 void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Experiment& experiment,
                   const std::vector<Case>& cases) {
   const auto node = element.Optional("between");
@@ -113,7 +113,7 @@ void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Exper
   }
 }
 
-/// One of the two ways to start anew.
+/// Reads "between" or "perturb".
 void ReadStart(const JsonNode& node, RuleOfExperiment& rule) {
   if (const auto between = node.Optional("between")) {
     if (const auto perturb = node.Optional("perturb")) {
@@ -133,25 +133,25 @@ const Fields<RuleOfExperiment>& EnsembleFields() {
   static const Json one_start = {{"oneOf", {Requires({"perturb"}), Requires({"between"})}}};
   static const Fields<Rule> fields(
       "ensemble",
-      "Perturbed repetitions of the cases that match every given key of a case; the first rule "
-      "that matches counts.",
+      "Perturbed repetitions of the cases that match all given case keys. The first match "
+      "applies.",
       {{"size", Integer(&Rule::size, 2, kMaxCount), "Runs per case.", "an integer from 2"},
-       {"seed", Integer(&Rule::seed, 0, kMaxSeed), "Of the generator of perturbations.",
+       {"seed", Integer(&Rule::seed, 0, kMaxSeed), "Seed of the random perturbations.",
         "an integer from 0"},
-       {"perturb", NumberSchema(kAmplitude), "Amplitude on the held coordinates [rad or m]."},
+       {"perturb", NumberSchema(kAmplitude), "Perturbation amplitude of fixed joints [rad or m]."},
        {"between", MapSchema(bounds, 1),
-        "Instead of perturb: held joints, each drawn uniformly between two bounds [rad or m]."},
+        "Instead of perturb: fixed joints, each drawn uniformly between two bounds [rad or m]."},
        {"", By(one_start, ReadStart)},
        {"branch_bound", Number(&Rule::branch_bound, kPositive),
-        "A run further from its branch has left it [rad]."},
+        "Branch error beyond which a run has left its branch [rad]."},
        {"problems", By(OneOrMoreSchema(TextSchema()), ReadSceneNames), "Names of problems."},
-       {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Of cases [s]."},
-       {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Of cases."},
-       {"formulation", FormulationChoices(&Rule::formulations), "Of cases."},
-       {"enforcement", LevelChoices(&Rule::enforcements), "Of cases."},
+       {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Horizons of cases [s]."},
+       {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Tolerances of cases."},
+       {"formulation", FormulationChoices(&Rule::formulations), "Formulations of cases."},
+       {"enforcement", LevelChoices(&Rule::enforcements), "Enforcement levels of cases."},
        {"coordinates", Choices(&Rule::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
-        "Of cases."},
-       {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>(), "a solver"), "Of cases."}});
+        "Coordinates of cases."},
+       {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>(), "a solver"), "Solvers."}});
   return fields;
 }
 
@@ -165,7 +165,7 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
     node.Fail(fmt::format("at most {} ensemble rules", kMaxRules));
     return;
   }
-  if (CountCases(experiment) > kMaxHeldCases) return;  // reported where it is counted
+  if (CountCases(experiment) > kMaxHeldCases) return;  // reported by the count
   const std::vector<Case> cases = Expand(experiment);
   for (const JsonNode& element : elements) {
     RuleOfExperiment rule;
@@ -173,7 +173,7 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
     EnsembleFields().Read(element, &rule);
     const bool used = std::any_of(cases.begin(), cases.end(),
                                   [&rule](const Case& one) { return Matches(rule, one); });
-    // Behind other mistakes this one would only be their consequence.
+    // After other errors, this error may be a consequence.
     if (!used && node.errors().empty()) {
       element.FailAs("a rule that matches no case", "keys that match at least one case");
     }
@@ -182,14 +182,14 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
   }
 }
 
-// Families of mechanisms (mechanism/description/library.h) as scenes: {"family": "chain", "bars":
+// Families of mechanisms (mechanism/description/library.h) as problems: {"family": "chain", "bars":
 // 10}.
 
 namespace {
 
 constexpr std::int64_t kMostUnits = 100'000;  ///< bars, windows, storeys
 
-/// {"family": "chain", ...} and so on; the defaults of cranks are those of timing.
+/// {"family": "chain", ...} and so on; defaults of cranks are as in timing.
 struct ChainFamily {
   std::vector<std::int64_t> bars;
   double speed = 0.0;
@@ -208,40 +208,41 @@ std::string CountsExpected(int least) {
 
 const Fields<ChainFamily>& ChainFields() {
   static const Fields<ChainFamily> fields(
-      "chain", "Closed chains of bars.",
-      {{"family", ChoiceSchema({"chain"}), "What it is.", "a family"},
-       {"bars", IntegerList(&ChainFamily::bars, 3, kMostUnits), "How many.", CountsExpected(3)},
-       {"speed", Number(&ChainFamily::speed), "Of the first bar [rad/s]."}});
+      "chain", "Closed chain of bars.",
+      {{"family", ChoiceSchema({"chain"}), "Family type.", "a family"},
+       {"bars", IntegerList(&ChainFamily::bars, 3, kMostUnits), "Number of bars.",
+        CountsExpected(3)},
+       {"speed", Number(&ChainFamily::speed), "Speed of the first bar [rad/s]."}});
   return fields;
 }
 
 const Fields<LadderFamily>& LadderFields() {
   static const Fields<LadderFamily> fields(
-      "ladder", "Parallel cranks, couplers between them: windows in a row.",
-      {{"family", ChoiceSchema({"ladder"}), "What it is.", "a family"},
-       {"windows", IntegerList(&LadderFamily::windows, 1, kMostUnits), "How many.",
+      "ladder", "Windows in a row: parallel cranks with couplers between them.",
+      {{"family", ChoiceSchema({"ladder"}), "Family type.", "a family"},
+       {"windows", IntegerList(&LadderFamily::windows, 1, kMostUnits), "Number of windows.",
         CountsExpected(1)},
-       {"angle", Number(&LadderFamily::angle), "Of the cranks [rad]."},
-       {"speed", Number(&LadderFamily::speed), "Of the cranks [rad/s]."}});
+       {"angle", Number(&LadderFamily::angle), "Angle of the cranks [rad]."},
+       {"speed", Number(&LadderFamily::speed), "Speed of the cranks [rad/s]."}});
   return fields;
 }
 
 const Fields<GridFamily>& GridFields() {
   static const Fields<GridFamily> fields(
       "grid", "Storeys of windows.",
-      {{"family", ChoiceSchema({"grid"}), "What it is.", "a family"},
-       {"storeys", IntegerList(&GridFamily::storeys, 1, kMostUnits), "How many.",
+      {{"family", ChoiceSchema({"grid"}), "Family type.", "a family"},
+       {"storeys", IntegerList(&GridFamily::storeys, 1, kMostUnits), "Number of storeys.",
         CountsExpected(1)},
-       {"windows", IntegerList(&GridFamily::windows, 1, kMostUnits), "In each storey.",
+       {"windows", IntegerList(&GridFamily::windows, 1, kMostUnits), "Windows in each storey.",
         CountsExpected(1)},
        {"angle", Number(&GridFamily::angle),
-        "Of the first storey's cranks [rad]; each storey stands 0.1 further."},
+        "Angle of the first storey's cranks [rad]. It increases by 0.1 per storey."},
        {"speed", Number(&GridFamily::speed),
-        "Of the first storey's cranks [rad/s]; that of storey r is r times as much."}});
+        "Speed of the first storey's cranks [rad/s]. Storey r has r times this speed."}});
   return fields;
 }
 
-/// Held joints are what ensembles perturb: as many as there are degrees of freedom.
+/// Fixes joints for perturbation by ensembles: as many as degrees of freedom.
 void HoldNamed(MechanismDescription* description, std::string_view start, std::size_t count) {
   for (std::size_t i = 0; i < description->joints.size(); ++i) {
     if (description->initial.held.size() == count) return;
@@ -251,7 +252,7 @@ void HoldNamed(MechanismDescription* description, std::string_view start, std::s
   }
 }
 
-/// A member counted against the room before it is built; building a million bodies takes its time.
+/// Members of a family. The number of bodies is checked before a member is built, to save time.
 class Members {
  public:
   Members(const JsonNode& node, std::size_t room) : node_(node), room_(room) {}
@@ -328,7 +329,7 @@ std::vector<FamilyMember> MakeMembers(const LadderFamily& family, const JsonNode
   return ladders;
 }
 
-/// The first crank of each storey moves as it likes: J crank 1.0, J crank 2.0, ...
+/// Fixes the first crank of each storey, an independent coordinate: J crank 1.0, J crank 2.0, ...
 void HoldFirstCranks(MechanismDescription* grid) {
   for (std::size_t i = 0; i < grid->joints.size(); ++i) {
     const std::string& name = grid->joints[i].name;
@@ -386,11 +387,11 @@ std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t ro
   return {};
 }
 
-// "scenes" of an experiment file and the mechanisms they name.
+// "problems" of an experiment file and their mechanisms.
 
 namespace {
 
-/// A file of mechanisms as a scene names it; its own mistakes join those of the experiment.
+/// Reads the mechanism file of a problem; its errors are added to the experiment's errors.
 void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentScene* scene) {
   const std::string named = node.Text();
   if (named.empty()) return;
@@ -403,7 +404,7 @@ void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentScene*
   }
 }
 
-/// The scene for each mechanism that "mechanism" stands for, without names.
+/// Returns a problem without name for each mechanism of "mechanism".
 std::vector<ExperimentScene> ReadMechanisms(const JsonNode& node, MechanismFiles& files,
                                             std::size_t room) {
   std::vector<ExperimentScene> scenes;
@@ -427,18 +428,18 @@ std::vector<ExperimentScene> ReadMechanisms(const JsonNode& node, MechanismFiles
   return scenes;
 }
 
-/// The mechanism at another size; what is known of its angles still holds.
+/// Scales the mechanism; known properties of angles stay valid.
 void Resize(MechanismFile* mechanism, double factor) {
   mechanism->description = AtScale(mechanism->description, factor);
   mechanism->observe.length *= factor;
   mechanism->canonical += fmt::format(" at scale {}", factor);
 }
 
-/// One entry of "problems": several scenes where a family has several counts. The base is what they
-/// have in common.
+/// Entry of "problems": several problems if a family has several counts. The base class contains
+/// the common values.
 struct SceneEntry : ExperimentScene {
   MechanismFiles* files = nullptr;
-  std::size_t room = 0;  ///< bodies there may be
+  std::size_t room = 0;  ///< maximum number of bodies
   double scale = 1.0;
   std::vector<ExperimentScene> scenes;
 };
@@ -457,17 +458,17 @@ const Fields<SceneEntry>& SceneFields() {
                     FamilySchema(),
                     {{"$ref", "mechanism.schema.json#"}, {"words", "a [mechanism](#mechanism)"}}});
   static const Fields<SceneEntry> fields(
-      "problem", "A mechanism and how long it moves.",
+      "problem", "A mechanism and its simulated time.",
       {{"mechanism", By(mechanism, ReadMechanism),
-        "Path of a mechanism file, relative to this file; a member of a family, one problem per "
-        "count; or a mechanism (mechanism.schema.json).",
+        "Path of a mechanism file, relative to this file; a family, with one problem per count; "
+        "or a mechanism (mechanism.schema.json).",
         "the path of a mechanism file, a mechanism, or {\"family\": ...}"},
        {"horizon", NumberList(&SceneEntry::horizons, kPositive), "Simulated time [s].",
         "a number > 0 or a list of them [s]"},
-       {"name", Text(&SceneEntry::name), "Instead of the mechanism's own name."},
-       {"tags", By(ArraySchema(TextSchema()), ReadTags), "Words for filters and tables."},
+       {"name", Text(&SceneEntry::name), "Name; default: the mechanism's name."},
+       {"tags", By(ArraySchema(TextSchema()), ReadTags), "Tags for filters and tables."},
        {"scale", Number(&SceneEntry::scale, {.min = 1e-12, .max = 1e12}),
-        "Factor on all lengths; gravity, forces and springs go with it so that angles move as "
+        "Factor on all lengths. Gravity, forces and springs are scaled so that angles move as "
         "before."}});
   return fields;
 }
@@ -479,8 +480,7 @@ std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& fil
   entry.room = room;
   SceneFields().Read(node, &entry);
   for (ExperimentScene& scene : entry.scenes) {
-    // A mechanism that could not be read lends its file's name, so that references to it still
-    // hold.
+    // An unreadable mechanism is named after its file, so that references to it stay valid.
     const std::string own = scene.mechanism.description.name.empty()
                                 ? scene.path.stem().string()
                                 : scene.mechanism.description.name;
@@ -493,7 +493,7 @@ std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& fil
   return std::move(entry.scenes);
 }
 
-/// Bodies other than ground.
+/// Returns the number of bodies except ground.
 std::size_t BodiesOf(const ExperimentScene& scene) {
   return scene.mechanism.description.bodies.size() - 1;
 }

@@ -26,28 +26,26 @@ inline constexpr Range kTolerances = {
     .max = 0.1,
     .above_min = true,
     .why = " (the spacing of doubles, below which rounding decides)"};
-/// Of a series: a picture has fewer points across, and a record of some ten series stays below 2
-/// MB.
+/// Maximum number of points of a time series: a record of about ten series stays below 2 MB.
 inline constexpr int kMostPoints = 10'000;
-inline constexpr int kMaxCount = 1'000'000;  ///< of anything: beyond it a number is a typing error
+inline constexpr int kMaxCount = 1'000'000;  ///< limit of counts; larger numbers are typing errors
 inline constexpr std::size_t kMaxRules = 1000;      ///< ensembles, exclusions
-inline constexpr std::size_t kMaxBodies = 200'000;  ///< of all scenes of one combination
+inline constexpr std::size_t kMaxBodies = 200'000;  ///< all problems of one combination
 
-/// The mechanism files of an experiment, each read once however many scenes and combinations use
-/// it.
+/// Mechanism files of an experiment; each is read once for all problems and combinations.
 class MechanismFiles {
  public:
-  /// `folder` is the experiment's.
+  /// `folder` is the experiment's folder.
   explicit MechanismFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// A path as the experiment writes it, seen from here.
+  /// Returns a path of the experiment file, relative to the current folder.
   std::filesystem::path Resolve(const std::string& named) const {
     return (folder_ / named).lexically_normal();
   }
-  /// A file's text, and the document in it. Throw ConfigError.
+  /// Return a file's text and its document. Throw ConfigError.
   const std::string& Text(const std::filesystem::path& path);
   Json Document(const std::filesystem::path& path);
-  /// The mechanism in a file; throws ConfigError with all its mistakes, each time it is asked for.
+  /// Returns the mechanism of a file; every call throws ConfigError with all errors of the file.
   const MechanismFile& Mechanism(const std::filesystem::path& path);
 
  private:
@@ -60,31 +58,31 @@ class MechanismFiles {
   std::map<std::filesystem::path, File> files_;
 };
 
-/// Whether there is a file at `path`, which a node names; reports one that is not there with the
-/// nearest name beside it. `what` it should be: "a mechanism file".
+/// Returns true if the file `path` named by a node exists; otherwise reports it with the nearest
+/// name in the folder. `what` is the expected kind: "a mechanism file".
 bool ExpectFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what);
 
-/// An experiment and what reading it needs besides.
+/// Experiment being read, with its mechanism files.
 struct ExperimentFile : Experiment {
   MechanismFiles* files = nullptr;
 };
-/// All that an experiment file may hold.
+/// Fields of an experiment file.
 const Fields<ExperimentFile>& ExperimentFileFields();
 
-/// "scenes" with the mechanisms they name; a family with several counts makes several scenes.
+/// Reader of "problems" with their mechanisms; a family with several counts gives several problems.
 FieldValue<ExperimentFile> ScenesValue();
-/// A member of a family that stands where a mechanism may, and what its counts are.
+/// Member of a family used as a mechanism, with its counts.
 struct FamilyMember {
   MechanismFile mechanism;
   std::string counts;  ///< "10", "3x4"
 };
-/// All members that {"family": ...} names; `room` is how many bodies there may be.
+/// Returns all members of {"family": ...}; `room` is the maximum number of bodies.
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room);
 Json FamilySchema();
-/// A list of columns, each entry expanded.
+/// Returns a list of methods, each entry expanded.
 std::vector<Column> ReadColumns(const JsonNode& node);
 Json ColumnsSchema();
-/// The sections of the same names, and "series".
+/// Fields of the sections of the same names, and of "series".
 const Fields<Limits>& LimitsFields();
 const Fields<CompileOptions>& CompileFields();
 const Fields<Experiment>& SeriesFields();
@@ -92,28 +90,28 @@ const Fields<Timing>& TimingFields();
 const Fields<Precision>& PrecisionFields();
 const Fields<ReferenceOptions>& ReferenceFields();
 const Fields<OutputOptions>& OutputFields();
-/// Reports output that the rest of the experiment rules out.
+/// Reports output options that conflict with the rest of the experiment.
 void RequireOutput(const JsonNode& node, ExperimentFile& experiment);
-/// "reference", after the scenes: options of certified ones, or the published series of scenes.
+/// Reads "reference" after the problems: options of certified references, or published data.
 void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment);
-/// "ensembles", after everything that they select from.
+/// Reads "ensembles", after all sections that they select from.
 void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
 Json EnsemblesSchema();
-/// "sweep" and "exclude" (experiment_sections.h).
+/// Schemas of "sweep" and "exclude".
 Json SweepSchema();
 Json ExclusionsSchema();
-/// Number of cases before exclusion.
+/// Returns the number of cases before exclusion.
 std::size_t CountCases(const Experiment& experiment);
 
-/// Names of an enum's values in files.
+/// Returns the names of an enum's values in files.
 template <class Enum>
 const NameList& NamesOf() {
   static const NameList known(std::vector<std::string>(kNames<Enum>.begin(), kNames<Enum>.end()));
   return known;
 }
 
-/// One or several of the names that are registered when a file is read, or the enum values that
-/// their indices are.
+/// Returns one or several registered names, looked up when a file is read, or the enum values of
+/// their indices.
 template <class T, class Chosen>
 FieldValue<T> RegisteredChoices(std::vector<Chosen> T::*member, std::vector<std::string> (*names)(),
                                 std::string what) {
@@ -146,35 +144,34 @@ FieldValue<T> Columns(std::vector<Column> T::*member) {
 
 // Fields of an experiment's document by JSON Pointer, for sweeps and --set.
 //
-// A pointer may go through the path of a scene's mechanism: the file is then taken into the
-// document. "*" as an index goes through all elements of an array. Keys that the file leaves out
-// are made, since they have defaults; what the reader does not know it will refuse. Internal to
-// harness/config.
+// A pointer may go through the path of a problem's mechanism; the file is then included in the
+// document. "*" as an index stands for all elements of an array. Missing keys are created, since
+// they have defaults; unknown keys are rejected by the reader. Internal to harness/config.
 
-/// Why a pointer names no field: in the words of a message, or a finished text.
+/// Reason why a pointer names no field: parts of a message, or a complete text.
 struct FieldFault {
   std::string found, expected, suggestion;
-  std::string text;      ///< of a mechanism file that cannot be read; the others are empty then
-  bool of_file = false;  ///< of a mechanism file: who reads the scene will complain as well
+  std::string text;      ///< message of an unreadable mechanism file; the others are then empty
+  bool of_file = false;  ///< fault of a mechanism file; the problem's reader reports it too
 };
 
-/// The fields a pointer stands for, as pointers without "*".
+/// Fields that a pointer refers to, as pointers without "*".
 struct FieldTargets {
   std::vector<std::string> pointers;
-  std::vector<std::string> made;  ///< for each the outermost part that the file does not have
+  std::vector<std::string> made;  ///< for each pointer the outermost part missing in the file
   std::optional<FieldFault> fault;
 };
 
 class ExperimentFields {
  public:
-  /// `document` and `origins` change as files are taken in and values set.
+  /// `document` and `origins` are modified when files are included and values are set.
   ExperimentFields(Json& document, Origins& origins, MechanismFiles& files)
       : document_(document), origins_(origins), files_(files) {}
 
-  /// Takes in the files on the way. The document is otherwise as before.
+  /// Finds the fields, and includes files on the way. The document is otherwise unchanged.
   FieldTargets Find(const std::string& pointer);
 
-  /// Sets one field that Find() gave.
+  /// Sets one field from Find().
   void Set(const std::string& pointer, const Json& value);
 
  private:
@@ -187,7 +184,8 @@ class ExperimentFields {
   MechanismFiles& files_;
 };
 
-/// The tokens of a JSON Pointer; nothing when it is none (no leading "/", "~" without 0 or 1).
+/// Returns the tokens of a JSON Pointer, or nothing if it is invalid (no leading "/", "~" without 0
+/// or 1).
 std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer);
 
 // "sweep" of an experiment file: axes that are crossed, each the values of one field.
@@ -196,17 +194,17 @@ std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer
 //   3]},
 //             {"zip": [{"name": "stiffness", ...}, {"name": "damping", ...}]}]
 //
-// makes 3 n combinations: the axes of a zip go in step. Internal to harness/config.
+// gives 3 n combinations: the axes of a zip advance together. Internal to harness/config.
 
 struct SweepAxis {
   std::string name;
   std::string source;             ///< pointer of the axis in the experiment file
-  FieldTargets fields;            ///< what each value is set to
+  FieldTargets fields;            ///< fields that are set to each value
   std::vector<Json> values;       ///< at least one
-  std::vector<Value> parameters;  ///< the same as records hold them
+  std::vector<Value> parameters;  ///< values as stored in records
 };
 
-/// Axes in step; a plain axis is alone.
+/// Axes that advance together; a single axis outside of a zip.
 struct SweepGroup {
   std::vector<SweepAxis> axes;
   std::size_t count() const { return axes.front().values.size(); }
@@ -214,29 +212,29 @@ struct SweepGroup {
 
 class Sweep {
  public:
-  /// Reads "sweep" and finds the fields; mistakes go to the root's errors. `settings` are the
-  /// fields that --set has set: a sweep over one of them would undo it.
+  /// Reads "sweep" and finds the fields; errors go to the root's list. `settings` are the fields
+  /// set by --set, which a sweep must not overwrite.
   Sweep(const JsonNode& root, ExperimentFields& fields, const std::vector<std::string>& settings);
 
-  /// False when there are mistakes in it, or in a mechanism file that it goes through.
+  /// Returns false if the sweep or an included mechanism file has errors.
   bool sound() const { return sound_; }
 
-  /// Number of combinations; 1 without a sweep, which is the file as it stands.
+  /// Returns the number of combinations; 1 without a sweep.
   std::size_t count() const { return count_; }
 
   /// Sets the fields of one combination; the last group is the fastest.
   void Apply(std::size_t combination, ExperimentFields& fields) const;
 
-  /// Its values by name.
+  /// Returns the values of a combination by axis name.
   Record Parameters(std::size_t combination) const;
 
-  /// Names and numbers of values.
+  /// Returns names of axes and numbers of values.
   std::vector<std::pair<std::string, std::size_t>> Axes() const;
 
-  /// As ExperimentSource::EachValue().
+  /// See ExperimentSource::EachValue().
   std::vector<std::size_t> EachValue(std::size_t most) const;
 
-  /// Notes where values come from, for messages.
+  /// Records the origin of values, for messages.
   void Note(Origins* origins) const;
 
  private:
@@ -250,7 +248,7 @@ class Sweep {
   bool sound_ = true;
 };
 
-/// "exclude": conditions on case keys and axis names, as selections that match excluded cases.
+/// "exclude": returns conditions on case keys and axis names; excluded cases match one of them.
 std::vector<Selection> ReadExclusions(const JsonNode& root, const Record& keys);
 
 }  // namespace loopbench::harness

@@ -17,13 +17,13 @@
 namespace loopbench::harness {
 namespace {
 
-// float128 reaches some 1e-30
+// precision of float128: about 1e-30
 constexpr double kReach = 1e-30;
 constexpr Range kReferences = {.min = kReach, .max = 1e-6};
-// of runs in other scalars than double; what a narrow one cannot meet ends as step-too-small
+// for runs in scalars other than double; if a scalar is too narrow, the run ends as step-too-small
 constexpr Range kTolerancesOfLadders = {
     .min = kReach, .max = 0.1, .why = " (the reach of float128)"};
-constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // no run gets there
+constexpr std::int64_t kMaxSteps = 1'000'000'000'000;  // above any run
 
 void CheckOneCpuLimit(const JsonNode& node, Limits&) {
   if (!node.Optional("cpu_s") || !node.Optional("wall_s")) return;
@@ -33,14 +33,14 @@ void CheckOneCpuLimit(const JsonNode& node, Limits&) {
 void ReadFormerName(const JsonNode& node, Limits& limits) { limits.cpu_s = node.Number(kPositive); }
 
 void ReadSizes(const JsonNode& node, TimingFamily& family) {
-  if (family.family.empty()) return;  // which has been said
+  if (family.family.empty()) return;  // already reported
   const SizedFamily& of = SizedFamilyOf(family.family);
   for (const std::int64_t size : node.IntegerList(of.smallest, of.largest)) {
     family.sizes.push_back(static_cast<int>(size));
   }
 }
 
-/// What accuracy cases say themselves.
+/// Keys that accuracy cases define.
 constexpr const char* kOfCases[] = {"tolerance", "horizon", "methods"};
 
 void RequireCasesAlone(const JsonNode& node, Timing& timing) {
@@ -69,12 +69,12 @@ const Fields<TimingFamily>& TimingFamilyFields() {
           {{"properties", {{"sizes", IntegerListSchema(family.smallest, family.largest)}}}}}});
   }
   static const Fields<TimingFamily> fields(
-      "timing_family", "Mechanisms of growing size, timed per right-hand side only.",
-      {{"family", Choice(&TimingFamily::family, NamesOfSizedFamilies(), "a family"), "What grows.",
+      "timing_family", "Family of mechanisms of several sizes; only right-hand sides are timed.",
+      {{"family", Choice(&TimingFamily::family, NamesOfSizedFamilies(), "a family"), "Family.",
         "a family"},
        {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes), TextOfSizedFamilies(),
         "a list of integers"},
-       {"methods", Columns(&TimingFamily::columns), "Timed.", "an array of methods"},
+       {"methods", Columns(&TimingFamily::columns), "Methods to be timed.", "an array of methods"},
        {"", Json::object({{"allOf", ranges}})}});
   return fields;
 }
@@ -83,14 +83,14 @@ const Fields<TimingFamily>& TimingFamilyFields() {
 
 const Fields<Limits>& LimitsFields() {
   static const Fields<Limits> fields(
-      "limits", "When a case is given up.",
+      "limits", "Limits at which a case is stopped.",
       {{"", By({{"not", Requires({"cpu_s", "wall_s"})}}, CheckOneCpuLimit)},
        {"cpu_s", Number(&Limits::cpu_s, kPositive),
-        "CPU time of one run [s]. Waiting for a processor does not count."},
-       {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Accepted steps."},
+        "CPU time of one run [s], without waiting for a processor."},
+       {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Number of accepted steps."},
        {"memory_mb", Number(&Limits::memory_mb, kPositive),
         "Address space of a case's process [MiB]."},
-       {"wall_s", By(NumberSchema(kPositive), ReadFormerName), "The former name of cpu_s."}});
+       {"wall_s", By(NumberSchema(kPositive), ReadFormerName), "Former name of cpu_s."}});
   return fields;
 }
 
@@ -109,39 +109,39 @@ Record RecordOf(const Limits& limits) {
 const Fields<CompileOptions>& CompileFields() {
   static const Fields<CompileOptions> fields(
       "preprocess",
-      "What is simplified before a run. The motion is the same but for rounding; records say in "
-      "\"compiled\" what was found to save.",
+      "Simplifications before a run. The motion changes only by round-off. The record key "
+      "\"compiled\" lists the simplifications.",
       {{"planar", Bool(&CompileOptions::planar),
         "Spatial mechanisms that move in parallel planes become planar."},
        {"welds", Bool(&CompileOptions::welds), "Welded bodies become one."},
        {"immovable", Bool(&CompileOptions::immovable),
         "Rigid sub-structures on the ground become ground."},
        {"islands", Bool(&CompileOptions::islands),
-        "Parts connected through ground at most run on their own, each with its own steps."},
+        "Parts that are connected at most through ground run separately, each with its own steps."},
        {"redundancy", Bool(&CompileOptions::redundancy),
-        "Constraints that say at every position what others say are released."}});
+        "Constraints that repeat other constraints at every position are released."}});
   return fields;
 }
 
 const Fields<Experiment>& SeriesFields() {
   static const Fields<Experiment> fields(
-      "series", "Values over time that records keep.",
+      "series", "Time series in records.",
       {{"points", Integer(&Experiment::series_points, 2, kMostPoints),
-        "Points kept of a time series for figures."}});
+        "Number of points of a time series, for figures."}});
   return fields;
 }
 
 const Fields<Timing>& TimingFields() {
   static const Fields<Timing> fields(
-      "timing", "Timing runs, separate from those that measure accuracy.",
-      {{"repeats", Integer(&Timing::repeats, 0, kMaxCount), "0: no timing."},
+      "timing", "Timing runs, separate from accuracy runs.",
+      {{"repeats", Integer(&Timing::repeats, 0, kMaxCount), "Repetitions; 0: no timing."},
        {"tolerance", Number(&Timing::tolerance, kTolerances), "rtol = atol of the integrator."},
        {"horizon", Number(&Timing::horizon, kPositive),
         "Simulated time [s]; default: the shortest of each problem."},
-       {"methods", Columns(&Timing::columns), "Default: those of the experiment."},
+       {"methods", Columns(&Timing::columns), "Methods; default: as in the experiment."},
        {"cases", Bool(&Timing::cases),
-        "Every accuracy case is timed as it is, with its own integrator, tolerance or step, and "
-        "horizon; not beside tolerance, horizon and columns."},
+        "If true, every accuracy case is timed with its own integrator, tolerance or step, and "
+        "horizon. Not together with tolerance, horizon or methods."},
        {"", By(CasesAloneSchema(), RequireCasesAlone)},
        {"families", ObjectList(&Timing::families, TimingFamilyFields(), "families")}});
   return fields;
@@ -150,23 +150,23 @@ const Fields<Timing>& TimingFields() {
 const Fields<Precision>& PrecisionFields() {
   static const Fields<Precision> fields(
       "precision",
-      "The columns in several scalars with one integrator (ode45), against a reference in "
-      "float128. Planar mechanisms; one horizon per problem.",
+      "Runs of the methods in several floating-point types with one integrator (ode45), compared "
+      "with a reference in float128. Planar mechanisms; one horizon per problem.",
       {{"scalars", Choices(&Precision::scalars, NamesOf<Scalar>(), "a scalar"),
-        "One or several, narrowest first by custom.", "a list of scalars"},
+        "Floating-point types, usually narrowest first.", "a list of scalars"},
        {"tolerances", NumberList(&Precision::tolerances, kTolerancesOfLadders),
-        "Default: those of the experiment."},
+        "Tolerances rtol = atol; default: as in the experiment."},
        {"horizon", Number(&Precision::horizon, kPositive),
         "Simulated time [s]; default: the shortest of each problem."},
        {"reference", Number(&Precision::reference, kReferences), "Tolerance of the reference."}});
   return fields;
 }
 
-// "output" of an experiment file: which rows a trajectory has.
+// "output" of an experiment file: rows of a trajectory.
 
 namespace {
 
-constexpr int kMostRows = 100'000'000;  // some 50 GB of a small mechanism
+constexpr int kMostRows = 100'000'000;  // about 50 GB for a small mechanism
 constexpr const char* kOneWay =
     "one of \"step\", \"number\", \"times\" and \"accepted_steps\": true";
 
@@ -174,9 +174,9 @@ int WaysOf(const OutputOptions& output) {
   return (output.step > 0.0) + (output.number > 0) + !output.times.empty() + output.accepted_steps;
 }
 
-/// Reports times that are said twice or not at all, or do not rise.
+/// Reports times that are given twice, missing or not ascending.
 void RequireOneWay(const JsonNode& node, OutputOptions& output) {
-  // a value that is wrong by itself has been reported
+  // invalid values are already reported
   const bool said = node.Optional("step") || node.Optional("number") || node.Optional("times");
   if (WaysOf(output) > 1) return node.FailAs("several ways to say times", kOneWay);
   if (WaysOf(output) == 0 && !said) return node.FailAs("no times", kOneWay);
@@ -202,23 +202,23 @@ Json OneWaySchema() {
 const Fields<OutputOptions>& OutputFields() {
   static const Fields<OutputOptions> fields(
       "output",
-      "A trajectory of each case, as CSV beside the store. One of step, number, times and "
-      "accepted_steps says when.",
-      {{"step", Number(&OutputOptions::step, kPositive), "From row to row [s], from 0."},
+      "Trajectory of each case, as a CSV file next to the store. One of step, number, times and "
+      "accepted_steps sets the times of rows.",
+      {{"step", Number(&OutputOptions::step, kPositive), "Time between rows [s], from 0."},
        {"number", Integer(&OutputOptions::number, 2, kMostRows),
-        "Of rows, evenly from the start to the end."},
+        "Number of rows, evenly from the start to the end."},
        {"times", NumberList(&OutputOptions::times, {.min = 0.0}),
-        "Rising [s]; those beyond a horizon are left out."},
+        "Ascending times [s]. Times beyond a horizon are left out."},
        {"accepted_steps", Bool(&OutputOptions::accepted_steps),
-        "A row for the end of each step of the integrator."},
+        "If true, one row for the end of each integrator step."},
        {"exact", Bool(&OutputOptions::exact),
-        "Steps end at the times, which makes another run; else rows lie on dense output, and the "
-        "run is the same as without."},
+        "If true, integrator steps end at the times, which changes the run. If false, rows are "
+        "taken from dense output, and the run is unchanged."},
        {"quantities",
         Choices(&OutputOptions::quantities, NamesOf<OutputPart>(), "a part of a trajectory"),
-        "What rows hold; default: all."},
+        "Quantities in each row; default: all."},
        {"axes", Choice(&OutputOptions::axes, NamesOf<OutputAxes>(), "axes"),
-        "Of reactions: those of the ground, or of each joint's frame on its first body."},
+        "Axes of reactions: ground axes, or each joint's frame on its first body."},
        {"", By(OneWaySchema(), RequireOneWay)}});
   return fields;
 }
@@ -256,7 +256,7 @@ std::vector<double> OutputTimes(const OutputOptions& output, double horizon) {
   if (output.number > 0) {
     for (int i = 0; i < output.number; ++i) times.push_back(horizon * i / (output.number - 1));
   } else if (output.step > 0.0) {
-    // a last row that rounding has carried beyond the end is the end
+    // a last row beyond the end by round-off is moved to the end
     const double rows = horizon / output.step;
     const double last = std::floor(rows * (1 + 4 * std::numeric_limits<double>::epsilon()));
     for (std::int64_t i = 0; i <= static_cast<std::int64_t>(last); ++i) {
@@ -280,19 +280,19 @@ std::string ToString(const OutputOptions& output) {
   return text + fmt::format(" {}", kNames<OutputAxes>[static_cast<std::size_t>(output.axes)]);
 }
 
-// "reference" of an experiment file: what the motion itself is held against.
+// "reference" of an experiment file: reference solution of the motion.
 
 namespace {
 
 constexpr std::array<const char*, 3> kOfCertified = {"scalar", "points", "cpu_s"};
 
-/// The file that a node names, for one scene; its own mistakes join those of the experiment.
+/// Reads published data of one problem; its errors are added to the experiment's errors.
 void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentScene* scene) {
   const std::string named = node.Text();
   if (named.empty()) return;
   const std::filesystem::path path = files.Resolve(named);
   if (!ExpectFile(node, path, "a published series")) return;
-  // the names of a mechanism that could not be read are not known
+  // names of an unreadable mechanism are unknown
   const MechanismDescription& mechanism = scene->mechanism.description;
   try {
     scene->series = ReadPublishedSeries(path, mechanism.bodies.size() > 1 ? &mechanism : nullptr);
@@ -331,7 +331,7 @@ void RequireSeriesAlone(const JsonNode& node, ReferenceOptions&) {
   if (!node.Optional("published_data")) return;
   for (const char* key : kOfCertified) {
     if (!node.Optional(key)) continue;
-    node.FailAs(fmt::format("\"series\" beside \"{}\"", key),
+    node.FailAs(fmt::format("\"published_data\" beside \"{}\"", key),
                 "one of them: what was published is not made");
   }
 }
@@ -348,21 +348,21 @@ const Fields<ReferenceOptions>& ReferenceFields() {
   static const NameList scalars({"as-needed", "long-double", "float128"});
   static const Fields<ReferenceOptions> fields(
       "reference",
-      "Each mechanism and horizon once more at high order in a wide scalar, by two formulations "
-      "and at two tolerances: where these agree, runs are held against them. Kept beside the "
-      "store. Or numbers that others published.",
+      "Reference solution of each mechanism and horizon, at high order in a wide floating-point "
+      "type, by two formulations and at two tolerances. Runs are compared with it where these "
+      "agree. Stored next to the store. Or published data.",
       {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
-        "float128 has 33 digits, takes some 50 times as long, and is for planar mechanisms; as "
-        "needed it follows where long-double does not certify to the end."},
+        "Floating-point type. float128 has 33 digits, takes about 50 times as long, and is for "
+        "planar mechanisms; as-needed adds it if long-double does not certify to the end."},
        {"points", Integer(&ReferenceOptions::points, 2, kMostPoints),
-        "Times at which errors are taken, evenly from the start to the end."},
+        "Number of times with errors, evenly from the start to the end."},
        {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
-        "CPU time of each integration [s]. One that is cut off certifies as far as it got."},
+        "CPU time of each integration [s]. If it is exceeded, only the completed part is "
+        "certified."},
        {"published_data", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
-        "Instead: path of a published series (series.schema.json), relative to this file; with "
-        "several problems an object of such paths by the problems' names. Problems without one "
-        "have no "
-        "reference."},
+        "Instead of a computed reference: path of published data (series.schema.json), relative "
+        "to this file. For several problems, an object of paths by problem name. Problems "
+        "without a path have no reference."},
        {"", By(SeriesAloneSchema(), RequireSeriesAlone)}});
   return fields;
 }
@@ -376,7 +376,7 @@ void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment) {
 }
 namespace {
 
-/// An index as a JSON Pointer writes it.
+/// Returns an index of a JSON Pointer.
 std::optional<std::size_t> IndexOf(const std::string& token) {
   std::size_t index = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), index);
@@ -408,7 +408,7 @@ FieldFault NoKey(const Json& object, const std::string& token, const std::string
           NearestSpelling(token, keys), ""};
 }
 
-/// The name under which "limits" has a field: "cpu_s" was "wall_s" once, and either is accepted.
+/// Returns the name of a field in "limits": "wall_s" is the former name of "cpu_s".
 std::string NameInLimits(const Json& limits, const std::string& token) {
   const std::string other = token == "wall_s" ? "cpu_s" : token == "cpu_s" ? "wall_s" : token;
   return limits.contains(token) || !limits.contains(other) ? token : other;
@@ -488,8 +488,8 @@ void ExperimentFields::Walk(Json& node, const std::vector<std::string>& tokens, 
     Walk(*member, tokens, depth + 1, below, found);
     return;
   }
-  // Points may have any name: a misspelt one would be made, and change nothing. And there is no
-  // telling what an array that is not there should hold.
+  // Points may have any name: a misspelt name would be created without effect. The content of a
+  // missing array is unknown.
   const bool free_names = depth > 0 && tokens[depth - 1] == "points";
   const bool in_array = std::any_of(
       tokens.begin() + static_cast<std::ptrdiff_t>(depth) + 1, tokens.end(),

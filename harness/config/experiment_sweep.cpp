@@ -1,4 +1,4 @@
-// Sections of an experiment: sweep, columns, exclusions.
+// Sections of an experiment: sweep, methods, exclusions.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::size_t kMaxAxes = 100;
 
-/// Letters, digits, "_" and "-", a letter first: a name can stand in --filter key=value. Dots are
-/// for the nested values of records.
+/// Returns true for letters, digits, "_" and "-" after a letter: usable in --filter key=value. Dots
+/// are reserved for nested values of records.
 bool IsName(const std::string& text) {
   const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
   return !text.empty() && letter(text.front()) && std::ranges::all_of(text, [&](char c) {
@@ -28,7 +28,7 @@ std::string Compact(const Json& value) {
   return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// Integers only where all values are: a column of a table has one type.
+/// Returns integers only if all values are integers: a table column has one type.
 std::vector<Value> AsParameters(const std::vector<Json>& values) {
   constexpr double kLargestExact = 9007199254740992.0;  // 2^53
   const bool integers = std::ranges::all_of(values, [](const Json& value) {
@@ -50,13 +50,13 @@ std::vector<Value> AsParameters(const std::vector<Json>& values) {
   return parameters;
 }
 
-/// An axis being read.
+/// Axis being read.
 struct AxisOfSweep : SweepAxis {
   ExperimentFields* experiment = nullptr;
   std::set<std::string>* taken = nullptr;
 };
 
-/// The name of an axis, which becomes a key of records.
+/// Reads the name of an axis, which becomes a key of records.
 void ReadAxisName(const JsonNode& node, AxisOfSweep& axis) {
   axis.name = node.Text();
   if (axis.name.empty()) return;
@@ -99,16 +99,16 @@ const Fields<AxisOfSweep>& AxisFields() {
   static const Json values =
       EitherSchema({ArraySchema(Json::object(), 1), SpacedSchema(NumberSchema(), false)});
   static const Fields<AxisOfSweep> fields(
-      "axis", "The values of one field.",
+      "axis", "Values of one field.",
       {{"name", By(PatternSchema("^[A-Za-z][A-Za-z0-9_-]*$"), ReadAxisName),
-        "In every record, for filters and tables; none of the names that records have already.",
+        "Key in every record, for filters and tables. It differs from all other keys of records.",
         "a name for tables and filters"},
        {"field", By(PatternSchema("^/(?!sweep(/|$)|exclude(/|$))"), ReadField),
-        "JSON Pointer into this file, or through a problem's mechanism path into that one; \"*\" "
-        "stands for all elements of an array.",
+        "JSON Pointer into this file, or through a problem's mechanism path into the mechanism "
+        "file. \"*\" stands for all elements of an array.",
         "a JSON Pointer such as /problems/0/horizon"},
        {"values", By(values, ReadValues),
-        "Of any kind, each once (in step with others, they may repeat), or a range.",
+        "Values of any type, each once (in a zip, values may repeat), or a range.",
         "an array of values or a range"}});
   return fields;
 }
@@ -122,7 +122,7 @@ SweepAxis ReadAxis(const JsonNode& node, ExperimentFields& fields, std::set<std:
   return axis;
 }
 
-/// The same combination twice would be the same cases twice.
+/// Reports repeated combinations, which would repeat cases.
 void CheckDistinct(const JsonNode& node, const SweepGroup& group) {
   std::set<std::string> known;
   for (std::size_t i = 0; i < group.count(); ++i) {
@@ -160,7 +160,7 @@ SweepGroup ReadGroup(const JsonNode& node, ExperimentFields& fields, std::set<st
 
 Json SweepSchema() {
   const Json axis = AxisFields().Schema();
-  Json zip = ObjectSchema("", {{"zip", ArraySchema(axis, 2), "Axes that go in step.", true}});
+  Json zip = ObjectSchema("", {{"zip", ArraySchema(axis, 2), "Axes that advance together.", true}});
   zip["words"] = "`{\"zip\": [axis, ...]}`";
   return ArraySchema(EitherSchema({axis, zip}), 0, kMaxAxes);
 }
@@ -203,7 +203,7 @@ void Sweep::Read(const JsonNode& node, ExperimentFields& fields,
 }
 
 void Sweep::CheckOverlaps(const JsonNode& node, const std::vector<std::string>& settings) const {
-  // with a "/" at the end a pointer sorts directly before those inside it
+  // with a final "/" a pointer sorts directly before its children
   std::vector<std::pair<std::string, std::string>> set, given;
   for (const SweepGroup& group : groups_) {
     for (const SweepAxis& axis : group.axes) {
@@ -285,7 +285,7 @@ std::vector<std::size_t> Sweep::EachValue(std::size_t most) const {
 }
 
 void Sweep::Note(Origins* origins) const {
-  // two axes may have made one object: each field's own note comes after those of what holds it
+  // two axes may have created one object: notes of fields follow notes of their parents
   for (const bool whole : {true, false}) {
     for (const SweepGroup& group : groups_) {
       for (const SweepAxis& axis : group.axes) {
@@ -297,11 +297,11 @@ void Sweep::Note(Origins* origins) const {
   }
 }
 
-// "columns" of an experiment file.
+// "methods" of an experiment file.
 
 namespace {
 
-/// One entry of "columns", whose cross product is meant.
+/// Entry of "methods", expanded as a cross product.
 struct ColumnLists {
   std::vector<std::string> formulations;
   std::vector<Enforcement> enforcements;
@@ -326,7 +326,7 @@ void RequireLevels(const JsonNode& node, ColumnLists& lists) {
   }
 }
 
-/// Reports what a peer does not have: it has its own coordinates and solver.
+/// Reports options that a peer does not have: it has its own coordinates and solver.
 void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
   for (const std::string& formulation : lists.formulations) {
     if (!FindFormulation(formulation)->is_peer()) continue;
@@ -353,7 +353,7 @@ void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
   }
 }
 
-/// Gains of Baumgarte's stabilisation, which only it has, and both or none.
+/// Reads both gains of Baumgarte stabilisation, or none; other levels have no gains.
 void ReadGains(const JsonNode& node, ColumnLists& lists) {
   const auto alpha = node.Optional("alpha"), beta = node.Optional("beta");
   if (!alpha && !beta) return;
@@ -371,33 +371,33 @@ void ReadGains(const JsonNode& node, ColumnLists& lists) {
 
 const Fields<ColumnLists>& ColumnFields() {
   static const Fields<ColumnLists> fields(
-      "column", "A way of imposing the loops; lists expand as a cross product.",
+      "column", "Method that imposes the loop constraints. Lists expand as a cross product.",
       {{"formulation", FormulationChoices(&ColumnLists::formulations),
-        "The algorithm that imposes them.", "a formulation"},
+        "Algorithm that imposes the constraints.", "a formulation"},
        {"enforcement", LevelChoices(&ColumnLists::enforcements),
-        "The level at which constraints act.", "a level of enforcement"},
+        "Level at which constraints are enforced.", "a level of enforcement"},
        {"coordinates",
         Choices(&ColumnLists::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
-        "Of the joints of a tree, or of every body."},
+        "Coordinates of the joints of a tree, or of every body."},
        {"solver", Choices(&ColumnLists::solvers, NamesOf<SolverKind>(), "a solver"),
-        "For reduction: plain is the fixed independent set, rank-revealing the automatic "
-        "partition."},
+        "Solver of the formulation. In reduction, plain uses the fixed independent set, "
+        "rank-revealing the automatic partition."},
        {"threads", IntegerList(&ColumnLists::threads, 1, kMostThreads),
-        "That may work on one right-hand side; results have the same bits for any number."},
+        "Threads for one right-hand side. Results are bitwise equal for any number."},
        {"execution", Choices(&ColumnLists::executions, NamesOf<Execution>(), "an execution"),
-        "Right-hand sides by the library, or by C code generated from its text, without or with "
-        "fused multiply-add (docs/operation-counts.md)."},
+        "Right-hand sides by the library, or by C code generated from it, without or with fused "
+        "multiply-add (docs/generated-code.md)."},
        {"alpha", NumberSchema(kNotNegative),
-        "Gain on mismatches of speeds [1/s]; baumgarte only, beside beta."},
+        "Gain on velocity violations [1/s]; baumgarte only, together with beta."},
        {"beta", NumberSchema(kNotNegative),
-        "Gain on mismatches of positions [1/s]; baumgarte only, beside alpha."},
+        "Gain on position violations [1/s]; baumgarte only, together with alpha."},
        {"", By({{"dependencies", {{"alpha", {"beta"}}, {"beta", {"alpha"}}}}}, ReadGains)},
        {"", By(Json::object(), RequireLevels)},
        {"", By(Json::object(), RequirePeersOwn)}});
   return fields;
 }
 
-/// The cross product of an entry's lists, first key slowest.
+/// Returns the cross product of an entry's lists, first key slowest.
 std::vector<Column> ReadColumnEntry(const JsonNode& node) {
   std::vector<Column> columns;
   ColumnLists lists;
@@ -459,7 +459,7 @@ std::vector<Selection> ReadExclusions(const JsonNode& root, const Record& keys) 
   for (const auto& [name, value] : keys.items()) {
     if (name != "kind" && name != "experiment") known.Add(name);
   }
-  known.Add("step");  // of those cases only whose steps are fixed
+  known.Add("step");  // only for cases with fixed steps
   for (const JsonNode& element : elements) {
     Selection& rule = exclusions.emplace_back();
     if (!element.ExpectObject(known)) continue;

@@ -1,4 +1,4 @@
-// The schemas of whole files, as harness/json/schema.h prints them.
+// Schemas of whole files, printed by harness/json/schema.h.
 #pragma once
 
 #include "harness/json/schema.h"

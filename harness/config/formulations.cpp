@@ -14,7 +14,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// A peer's states are looked at through O-DCA.
+/// Returns the row of a peer, whose states are evaluated by O-DCA.
 FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
                        std::string integrator, std::string color, bool is_soft = false) {
   FormulationRow row = Row<odca::Odca>(std::move(name), std::move(sentence), std::move(color));
@@ -24,8 +24,8 @@ FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
   return row;
 }
 
-/// Those that come with Loopbench, peers last. Colours differ in lightness too: Tol's for high
-/// contrast, and others of his.
+/// Returns built-in formulations, peers last. Colours by P. Tol (high contrast and others) also
+/// differ in lightness.
 std::deque<FormulationRow> BuiltIn() {
   return {Row<odca::Odca>("odca",
                           "orthogonal complement divide and conquer. Bodies are joined pair by "
@@ -45,7 +45,7 @@ std::deque<FormulationRow> BuiltIn() {
                   Enforcement::kBaumgarte, "mujoco-rk4", "#88CCEE", true)};
 }
 
-/// For rows without a colour, in turn.
+/// Colours for rows without a colour, in turn.
 constexpr std::array kFreeColors = {"#AA4499", "#332288", "#999933"};
 
 std::deque<FormulationRow>& Rows() {

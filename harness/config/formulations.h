@@ -1,13 +1,13 @@
-// The formulations by name: what experiments may ask for, and what readers, commands, tables and
-// figures know about each.
+// Registry of formulations by name, with their properties for readers, commands, tables and
+// figures.
 //
-// Those that come with Loopbench are rows of formulations.cpp. A program of somebody else registers
-// its own before it calls loopbench::Main() (harness/cli/program.h; examples/own-formulation/):
+// Built-in formulations are rows of formulations.cpp. A program registers its own formulation
+// before loopbench::Main() (harness/cli/program.h; examples/own-formulation/):
 //
 //   harness::RegisterFormulation(harness::Row<NullSpace>("null-space", "a basis of ..."));
 //
-// and from then on the name is valid wherever "odca" is. Only runs in several scalars
-// (harness/precision/) know the built-in ones alone: a row makes solvers in double.
+// Afterwards the name is valid wherever "odca" is. Runs in several scalars (harness/precision/)
+// need built-in formulations: rows make solvers in double.
 #pragma once
 
 #include <deque>
@@ -27,29 +27,29 @@ template <class Space>
 using SolverFactory = std::function<std::unique_ptr<ConstraintSolver<Space, double>>(
     const Mechanism<Space, double>&, const FormulationOptions&)>;
 
-/// All that the harness knows of a formulation.
+/// Properties of a formulation.
 struct FormulationRow {
-  /// A word in files, tables and names: a-z, 0-9, '-' and '_'; of peers "peer/" and a word.
+  /// Name in files and tables: a-z, 0-9, '-' and '_'; for peers "peer/" and a name.
   std::string name;
-  std::string sentence;  ///< what `explain` says of it, after "name: "
+  std::string sentence;  ///< text of `explain`, after "name: "
   SolverFactory<Planar> planar;
   SolverFactory<Spatial> spatial;
-  std::vector<Enforcement> levels = {};  ///< those it has; empty: all there are
-  /// Of its curves in figures, "#RRGGBB". Without one the row is given the next free one.
+  std::vector<Enforcement> levels = {};  ///< available levels; empty: all
+  /// Colour of its curves in figures, "#RRGGBB". If empty, the next free colour is assigned.
   std::string color = {};
-  /// Of a peer (harness/run/peers.h), somebody else's program, the name of its own integrator,
-  /// which tables show in the place of the experiment's; empty for formulations. The factories are
-  /// then those of the solver that the peer's states are looked at through.
+  /// Integrator of a peer (harness/run/peers.h), an external program. Tables show it instead of the
+  /// experiment's integrator. Empty for formulations. Its factories make the solver for the peer's
+  /// states.
   std::string integrator = {};
 
-  /// Of a peer whose closures give way: where its runs end says nothing about others.
+  /// True for a peer with compliant closures, whose final states do not verify other runs.
   bool is_soft = false;
 
   bool is_peer() const { return !integrator.empty(); }
   bool Has(Enforcement level) const;
 };
 
-/// The row of a class template such as odca::Odca, made from a mechanism and options.
+/// Returns the row of a class template such as odca::Odca, made from a mechanism and options.
 template <template <class Space, class S> class Solver>
 FormulationRow Row(std::string name, std::string sentence, std::string color = {}) {
   const auto make = []<class Space>(const Mechanism<Space, double>& mechanism,
@@ -64,22 +64,22 @@ FormulationRow Row(std::string name, std::string sentence, std::string color = {
           .color = std::move(color)};
 }
 
-/// Adds a row; not while experiments run. Throws std::invalid_argument for one that is not sound
-/// (mechanism/description/registration.h), or a colour that is none.
+/// Adds a row; not while experiments run. Throws std::invalid_argument for an invalid row
+/// (mechanism/description/registration.h) or colour.
 void RegisterFormulation(FormulationRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
-/// All rows: the built-in ones, then the others in the order of their registration. Rows stay where
-/// they are.
+/// Returns all rows: built-in rows, then others in order of registration. References to rows stay
+/// valid.
 const std::deque<FormulationRow>& Formulations();
 std::vector<std::string> FormulationNames();
-/// Without those of other engines, which have right-hand sides of their own.
+/// Returns names without peers, which have their own right-hand sides.
 std::vector<std::string> FormulationNamesWithoutPeers();
-/// Null for a name that is not registered: stores may hold records of other programs.
+/// Returns null for a name that is not registered: stores may contain records of other programs.
 const FormulationRow* FindFormulation(std::string_view name);
 
-/// The mechanism with the solver of that name, at the level of the options. Throws
-/// std::invalid_argument where there is no such name, or where it does not have the level. Of a
-/// peer's row: what its states are looked at through, which projects nothing.
+/// Returns the mechanism with the solver of that name, at the level of the options. Throws
+/// std::invalid_argument if the name is unknown or the level is not available. For a peer, returns
+/// the system that evaluates its states, without projection.
 template <class Space>
 std::unique_ptr<System<Space, double>> MakeFormulation(std::string_view name,
                                                        const Mechanism<Space, double>& mechanism,

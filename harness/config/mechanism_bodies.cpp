@@ -18,7 +18,7 @@ void ReadPoints(const JsonNode& node, SpaceKind space, BodyDescription* body) {
 
 Json WritePoints(const BodyDescription& body, SpaceKind space) {
   Json points = Json::object();
-  // names differ: at the end of the list, where points[name] would look through all of them
+  // names are unique: append, since points[name] would search the list
   auto& list = points.get_ref<Json::object_t&>();
   for (const auto& [name, at] : body.points) list.emplace_back(name, WriteVector(at, space));
   return points.empty() ? Json() : points;
@@ -32,12 +32,12 @@ Json PointsSchema() {
 
 using Body = PartOf<BodyDescription>;
 
-/// One number I becomes diag(I, I, I): in the plane only Izz matters, in space it is isotropic.
-/// Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it stands.
+/// Reads the inertia. One number I becomes diag(I, I, I): in the plane only Izz matters, in space
+/// it is isotropic. Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it
+/// stands.
 ///
-/// A principal moment is the integral of two squared distances of three: none exceeds the sum of
-/// the other two, and in a thin rod or plate one equals it. In the plane only Izz is used, and
-/// nothing is known of the others.
+/// Principal moments satisfy the triangle inequality; for a thin rod or plate with equality. In the
+/// plane only Izz is used and the other moments are unknown.
 void ReadInertia(const JsonNode& node, Body& body) {
   Eigen::Matrix3d& inertia = body.inertia;
   inertia.setIdentity();
@@ -56,7 +56,7 @@ void ReadInertia(const JsonNode& node, Body& body) {
     inertia(0, 2) = inertia(2, 0) = values[4];
     inertia(1, 2) = inertia(2, 1) = values[5];
   }
-  // Not the factorisation alone: a matrix of huge elements may factorise by round-off.
+  // The factorisation alone is insufficient: huge elements may pass by round-off.
   const bool positive = inertia.diagonal().minCoeff() > 0.0 &&
                         Eigen::LLT<Eigen::Matrix3d>(inertia).info() == Eigen::Success;
   if (!positive) node.Fail("a positive definite inertia");
@@ -69,7 +69,7 @@ void ReadInertia(const JsonNode& node, Body& body) {
   }
 }
 
-/// As short as it can be said without loss.
+/// Writes the shortest form without loss.
 Json WriteInertia(const Body& body) {
   const Eigen::Matrix3d& I = body.inertia;
   const bool is_diagonal = I(0, 1) == 0.0 && I(0, 2) == 0.0 && I(1, 2) == 0.0;
@@ -107,25 +107,25 @@ const Fields<Body>& BodyFields() {
                     ArraySchema(NumberSchema(), 6, 6)});
   static const Fields<Body> fields(
       "body", "A rigid body.",
-      {{"name", By(TextSchema(), ReadNameOfBody, WriteNameOfBody), "One that no other body has.",
+      {{"name", By(TextSchema(), ReadNameOfBody, WriteNameOfBody), "Unique name of the body.",
         "a name"},
        {"mass", Number(&BodyDescription::mass, kPositive), "Mass [kg].", "a number > 0 [kg]"},
        {"inertia", By(inertia, ReadInertia, WriteInertia),
-        "About the centre of mass, body axes [kg m^2]: Izz (isotropic in space), [Ixx, Iyy, Izz] "
-        "or the matrix elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].",
+        "Inertia about the centre of mass in body axes [kg m^2]: Izz (isotropic in space), [Ixx, "
+        "Iyy, Izz] or the matrix elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].",
         "the inertia about the centre of mass"},
        {"com", VectorOf(&BodyDescription::com),
-        "Centre of mass in body axes [m], default the body's origin."},
+        "Centre of mass in body axes [m]; default: the body's origin."},
        {"points", By(PointsSchema(), ReadPointsOfBody, WritePointsOfBody),
-        "Named points in body axes from the body's origin [m]."}});
+        "Named points in body axes, from the body's origin [m]."}});
   return fields;
 }
 
 const Fields<Draft>& GroundFields() {
   static const Fields<Draft> fields(
-      "ground", "What does not move.",
+      "ground", "The fixed ground.",
       {{"points", By(PointsSchema(), ReadPointsOfGround, WritePointsOfGround),
-        "Named points in ground axes from the origin [m]."}});
+        "Named points in ground axes, from the origin [m]."}});
   return fields;
 }
 
@@ -161,7 +161,7 @@ namespace {
 using Side = PartOf<JointSide>;
 using Joint = PartOf<JointDescription>;
 
-/// A number (about z) or a rotation vector of three numbers.
+/// Reads an angle about z, or a rotation vector of three numbers.
 void ReadRotation(const JsonNode& node, Side& side) {
   if (node.value().is_number()) {
     side.rotation = {0.0, 0.0, node.Number()};
@@ -188,13 +188,13 @@ Json WriteRotation(const Side& side) {
 const Fields<Side>& SideFields() {
   static const Json rotation = EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)});
   static const Fields<Side> fields(
-      "side", "A frame of a joint, fixed on a body.",
-      {{"body", BodyOf<JointSide>(&JointSide::body, true), "A body's name or \"ground\".",
+      "side", "Frame of a joint, fixed to a body.",
+      {{"body", BodyOf<JointSide>(&JointSide::body, true), "Name of a body, or \"ground\".",
         "the name of a body or \"ground\""},
        {"at", PlaceOf<JointSide>(&JointSide::body, &JointSide::position),
-        "Its origin: the name of one of the body's points, or coordinates in body axes [m]."},
+        "Origin: a point of the body by name, or body coordinates [m]. Default: body origin."},
        {"rotation", By(rotation, ReadRotation, WriteRotation),
-        "Body axes to the joint's frame [rad]: about z, or a rotation vector. Default 0."}});
+        "Rotation from body to frame [rad]: angle about z, or rotation vector; default: 0."}});
   return fields;
 }
 
@@ -222,7 +222,7 @@ Json WriteAxis(const Joint& joint) {
 
 Range RangeOf(const JointParameter& parameter) { return parameter.positive ? kPositive : Range{}; }
 
-/// A number that joints of some types must have and no other may.
+/// Parameter that some joint types require and others do not allow.
 struct ParameterKey {
   JointParameter parameter;
   std::vector<std::string> types;
@@ -254,7 +254,7 @@ void ReadParameter(const JsonNode& node, Joint& joint) {
   }
 }
 
-/// A motion of a joint with `speeds` coordinates that may be prescribed, of which some are.
+/// Motion of a joint with `speeds` coordinates, of which `taken` are already prescribed.
 struct MotionOfJoint : PrescribedMotion {
   int speeds = 1;
   const std::vector<PrescribedMotion>* taken = nullptr;
@@ -270,17 +270,17 @@ void ReadCoordinate(const JsonNode& node, MotionOfJoint& motion) {
 Json WriteCoordinate(const MotionOfJoint& motion) { return motion.coordinate; }
 
 const Fields<MotionOfJoint>& MotionFields() {
-  constexpr int kMostCoordinates = 3;  // that can be prescribed: those of a planar joint
+  constexpr int kMostCoordinates = 3;  // prescribable coordinates of a planar joint
   static const Fields<MotionOfJoint> fields(
-      "motion", "A coordinate as a given function of time.",
+      "motion", "Prescribed motion of one coordinate of a joint.",
       {{"coordinate", By(IntegerSchema(0, kMostCoordinates - 1), ReadCoordinate, WriteCoordinate),
-        "In the order of initial coordinates, from 0.", "the number of a coordinate"},
-       {"value", TimeFunctionOf(&PrescribedMotion::value), "Its value [rad or m].",
+        "Index in the initial coordinates, from 0.", "the number of a coordinate"},
+       {"value", TimeFunctionOf(&PrescribedMotion::value), "Value [rad or m].",
         "a number or a function of time"}});
   return fields;
 }
 
-/// One function for a joint with one coordinate, else a list that names coordinates.
+/// Reads one function for a joint with one coordinate, otherwise a list with coordinates.
 void ReadMotions(const JsonNode& node, Joint& joint) {
   const SpaceKind space = joint.draft->space;
   const int speeds = NumValues(joint.type, space, true);
@@ -336,7 +336,7 @@ void CheckSides(const JsonNode& node, Joint& joint) {
       "two different bodies");
 }
 
-/// Keys that joints of some types must have and others may not, and the rule that says so.
+/// Adds parameters that some joint types require and others do not allow, with their rule.
 void AddParameters(std::vector<Field<Joint>>* rows) {
   Json rules = Json::array();
   for (const auto& [parameter, types] : ParameterKeys()) {
@@ -346,7 +346,7 @@ void AddParameters(std::vector<Field<Joint>>* rows) {
     };
     rows->push_back(
         {key, FieldValue<Joint>(NumberSchema(RangeOf(parameter)), nullptr, nullptr, write),
-         fmt::format("Of a {} joint: {}.", fmt::join(types, " or "), parameter.meaning)});
+         fmt::format("For a {} joint: {}.", fmt::join(types, " or "), parameter.meaning)});
     rules.push_back({{"if", {{"properties", {{"type", ChoiceSchema(types)}}}}},
                      {"then", Requires({key})},
                      {"else", {{"not", Requires({key})}}}});
@@ -363,24 +363,24 @@ Json WriteNameOfJoint(const Joint& joint) { return joint.name; }
 Fields<Joint> MakeJointFields() {
   const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
   std::vector<Field<Joint>> rows = {
-      {"name", By(TextSchema(), ReadNameOfJoint, WriteNameOfJoint), "One that no other joint has.",
+      {"name", By(TextSchema(), ReadNameOfJoint, WriteNameOfJoint), "Unique name of the joint.",
        "a name"},
-      {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType, WriteType),
-       "What it leaves free.", "a joint type", IsMissingInPlane},
-      {"from", Part(&JointDescription::from, SideFields()), "Where F is.",
+      {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType, WriteType), "Type of the joint.",
+       "a joint type", IsMissingInPlane},
+      {"from", Part(&JointDescription::from, SideFields()), "Frame F of the joint.",
        "an object with keys \"body\", \"at\", \"rotation\""},
-      {"to", Part(&JointDescription::to, SideFields()), "Where M is.",
+      {"to", Part(&JointDescription::to, SideFields()), "Frame M of the joint.",
        "an object with keys \"body\", \"at\", \"rotation\""},
       {"", By(Json::object(), CheckSides)},
       {"axis", By(VectorSchema(), ReadAxis, WriteAxis),
-       "Of a revolute (default z) or prismatic joint (default x), not zero."}};
+       "Axis, not zero. Default: x for prismatic and pin-in-slot joints, otherwise z."}};
   AddParameters(&rows);
   rows.push_back({"motion", By(motions, ReadMotions, WriteMotions),
-                  "Coordinates as given functions of time [rad or m]: one function for a joint "
-                  "with one coordinate, else a list."});
+                  "Prescribed coordinates as functions of time [rad or m]: one function for a "
+                  "joint with one coordinate, otherwise a list."});
   rows.push_back({"cut", Bool(&JointDescription::cut),
-                  "This joint closes its loop: it carries no joint coordinate."});
-  return {"joint", "From frame F on one body to frame M on another.", std::move(rows)};
+                  "If true, the joint closes its loop and has no joint coordinate."});
+  return {"joint", "Joint between frame F on one body and frame M on another.", std::move(rows)};
 }
 
 const Fields<Joint>& JointFields() {
@@ -390,7 +390,7 @@ const Fields<Joint>& JointFields() {
 
 void ReadJoints(const JsonNode& node, Draft& draft) {
   JointDescription unread;
-  unread.from.body = unread.to.body = -1;  // not known: matches no other side
+  unread.from.body = unread.to.body = -1;  // unknown: differs from every other side
   for (const JsonNode& element : node.Elements("joints")) {
     draft.joints.push_back(ReadPart(JointFields(), element, draft, unread));
     draft.joint_names.Add(draft.joints.back().name);

@@ -9,7 +9,7 @@ namespace {
 using Force = PartOf<ForceDescription>;
 using Rows = std::vector<Field<Force>>;
 
-/// Joints that carry no single coordinate have no room for a force.
+/// Reads the joint of a force, which must have exactly one coordinate.
 void ReadJoint(const JsonNode& node, Force& force) {
   const auto index = ReadJointName(node, *force.draft);
   if (!index) return;
@@ -26,22 +26,22 @@ Json WriteJoint(const Force& force) {
 }
 
 constexpr const char* kPlaceOnBody =
-    "The name of one of the body's points, or coordinates in body axes [m]; default its origin.";
+    "Name of a point of the body, or coordinates in body axes [m]; default: the body's origin.";
 
-/// A force on one body names its point without an object around it.
+/// Adds the body and point of a force on one body, without an enclosing object.
 void AddPoint(Rows* rows) {
   const auto point = [](ForceDescription& force) { return PartsOf(force).points[0]; };
   const auto body = [=](ForceDescription& force) -> int& { return point(force)->body; };
   const auto at = [=](ForceDescription& force) -> Eigen::Vector3d& { return point(force)->at; };
-  rows->push_back({"body", BodyOf<ForceDescription>(body, false), "A body that can move.",
+  rows->push_back({"body", BodyOf<ForceDescription>(body, false), "Name of a moving body.",
                    "the name of a body"});
   rows->push_back({"at", PlaceOf<ForceDescription>(body, at), kPlaceOnBody});
 }
 
 const Fields<PartOf<BodyPoint>>& EndFields() {
   static const Fields<PartOf<BodyPoint>> fields(
-      "end", "A point of a body.",
-      {{"body", BodyOf<BodyPoint>(&BodyPoint::body, true), "A body's name or \"ground\".",
+      "end", "Point of a body.",
+      {{"body", BodyOf<BodyPoint>(&BodyPoint::body, true), "Name of a body, or \"ground\".",
         "the name of a body or \"ground\""},
        {"at", PlaceOf<BodyPoint>(&BodyPoint::body, &BodyPoint::at), kPlaceOnBody}});
   return fields;
@@ -72,12 +72,12 @@ void AddEnds(Rows* rows) {
                                                 *PartsOf(copy).points[i]);
                              }};
   };
-  rows->push_back({"from", end(0), "One end.", kEnd});
-  rows->push_back({"to", end(1), "The other, on another body.", kEnd});
+  rows->push_back({"from", end(0), "First end point.", kEnd});
+  rows->push_back({"to", end(1), "Second end point, on another body.", kEnd});
   rows->push_back({"", By(Json::object(), CheckEnds)});
 }
 
-/// A force that lacks all of these does nothing.
+/// Requires at least one of these keys; without them a force has no effect.
 FieldValue<Force> OneOf(const std::vector<std::string>& keys) {
   std::vector<Json> required;
   for (const std::string& key : keys) required.push_back(Requires({key}));
@@ -100,7 +100,7 @@ void AddVector(Rows* rows) {
                       ForceDescription copy = force;
                       return WriteVector(*PartsOf(copy).force, force.draft->space);
                     }},
-                   "[N]",
+                   "Force [N].",
                    "an array of 2 or 3 numbers [N]"});
   static const NameList axes = {"ground", "body"};
   rows->push_back({"axes",
@@ -114,7 +114,7 @@ void AddVector(Rows* rows) {
                       ForceDescription copy = force;
                       return *PartsOf(copy).in_body_axes ? Json(axes.all().back()) : Json();
                     }},
-                   "Body: the force turns with the body."});
+                   "Axes of the force; body: the force turns with the body."});
 }
 
 void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
@@ -143,10 +143,10 @@ void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
 
 Fields<Force> FieldsOf(ForceDescription kind) {
   const ForceParts parts = PartsOf(kind);
-  Rows rows = {{"type", Constant<Force>(std::string(parts.name)), "What it is.", "a force type"}};
+  Rows rows = {{"type", Constant<Force>(std::string(parts.name)), "Force type.", "a force type"}};
   if (parts.joint != nullptr) {
     rows.push_back({"joint", By(TextSchema(), ReadJoint, WriteJoint),
-                    "With one coordinate: revolute, prismatic or helical.", "the name of a joint"});
+                    "Revolute, prismatic or helical joint.", "the name of a joint"});
   }
   if (parts.points.size() == 1) AddPoint(&rows);
   if (parts.points.size() == 2) AddEnds(&rows);
@@ -167,14 +167,14 @@ Fields<Force> FieldsOf(ForceDescription kind) {
                        ForceDescription copy = force;
                        return WriteTimeFunction(*PartsOf(copy).value);
                      }},
-                    "[N m] or [N] on the joint's second body.",
+                    "Moment [N m] or force [N] on the joint's second body.",
                     "a number or a function of time"});
   }
   for (std::size_t i = 0; i < parts.numbers.size(); ++i) AddNumber(parts, i, &rows);
   return {std::string(parts.name), std::string(parts.sentence), std::move(rows)};
 }
 
-/// In the order of ForceKinds().
+/// Returns fields in the order of ForceKinds().
 const std::vector<Fields<Force>>& AllFields() {
   static const std::vector<Fields<Force>> all = [] {
     std::vector<Fields<Force>> fields;
@@ -200,7 +200,7 @@ ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
   const auto kind = static_cast<std::size_t>(*type);
   ForceDescription force = ForceKinds()[kind];
   const std::vector<BodyPoint*> points = PartsOf(force).points;
-  // ends are not known yet: -1 matches no other
+  // ends are unknown: -1 differs from every body
   for (BodyPoint* end : points) end->body = points.size() > 1 ? -1 : end->body;
   return ReadPart(AllFields()[kind], node, draft, force);
 }
@@ -235,7 +235,7 @@ FieldValue<Draft> ForcesValue() {
 
 namespace {
 
-/// An array with at least `least` numbers.
+/// Returns an array with at least `least` numbers.
 template <class T>
 FieldValue<T> Numbers(std::vector<double> T::*member, std::size_t least, std::string expected) {
   return {ArraySchema(NumberSchema(), least),
@@ -254,25 +254,25 @@ FieldValue<T> Numbers(std::vector<double> T::*member, std::size_t least, std::st
 const Fields<Polynomial>& PolynomialFields() {
   constexpr const char* kExpected = "an array of one or more numbers, constant first";
   static const Fields<Polynomial> fields(
-      "polynomial", "A polynomial in t.",
-      {{"type", Constant<Polynomial>("polynomial"), "What it is.", "a function of time"},
-       {"coefficients", Numbers(&Polynomial::coefficients, 1, kExpected), "Of 1, t, t^2, ...",
-        kExpected}});
+      "polynomial", "Polynomial in time t [s].",
+      {{"type", Constant<Polynomial>("polynomial"), "Function type.", "a function of time"},
+       {"coefficients", Numbers(&Polynomial::coefficients, 1, kExpected),
+        "Factors of 1, t, t^2, ...", kExpected}});
   return fields;
 }
 
 const Fields<Harmonic>& HarmonicFields() {
   static const Fields<Harmonic> fields(
-      "harmonic", "mean + amplitude sin(omega t + phase)",
-      {{"type", Constant<Harmonic>("harmonic"), "What it is.", "a function of time"},
-       {"mean", Number(&Harmonic::mean), "About which it swings."},
-       {"amplitude", Number(&Harmonic::amplitude), "Of the sine.", "a number"},
+      "harmonic", "Harmonic function mean + amplitude sin(omega t + phase).",
+      {{"type", Constant<Harmonic>("harmonic"), "Function type.", "a function of time"},
+       {"mean", Number(&Harmonic::mean), "Mean value."},
+       {"amplitude", Number(&Harmonic::amplitude), "Amplitude of the sine.", "a number"},
        {"omega", Number(&Harmonic::omega), "Angular frequency [rad/s].", "a number"},
-       {"phase", Number(&Harmonic::phase), "At t = 0 [rad]."}});
+       {"phase", Number(&Harmonic::phase), "Phase at t = 0 [rad]."}});
   return fields;
 }
 
-/// Times ascend, and each has a value.
+/// Checks that times ascend and that each time has a value.
 void CheckTable(const JsonNode& node, TimeTable& table) {
   if (table.times.empty() || table.values.empty()) return;
   const std::vector<JsonNode> times = node.Optional("times")->Elements("times");
@@ -297,18 +297,18 @@ const Fields<TimeTable>& TableFields() {
   constexpr const char* kTimes = "an array of two or more numbers that ascend [s]";
   constexpr const char* kValues = "an array of two or more numbers";
   static const Fields<TimeTable> fields(
-      "table", "Values at given times, and between them.",
-      {{"type", Constant<TimeTable>("table"), "What it is.", "a function of time"},
-       {"times", Numbers(&TimeTable::times, 2, kTimes), "Ascending [s].", kTimes},
-       {"values", Numbers(&TimeTable::values, 2, kValues), "One per time.", kValues},
+      "table", "Table of values at given times, with interpolation.",
+      {{"type", Constant<TimeTable>("table"), "Function type.", "a function of time"},
+       {"times", Numbers(&TimeTable::times, 2, kTimes), "Ascending times [s].", kTimes},
+       {"values", Numbers(&TimeTable::values, 2, kValues), "One value per time.", kValues},
        {"interpolation",
         By(ChoiceSchema({"cubic", "linear"}), ReadInterpolation, WriteInterpolation),
-        "Cubic, the default: a natural spline that goes on straight; linear: end values hold."},
+        "cubic (default): natural spline, linear outside; linear: constant outside."},
        {"", By(Json::object(), CheckTable)}});
   return fields;
 }
 
-/// Of an object of one type.
+/// Reads an object of one type.
 template <class T>
 TimeFunctionDescription ReadAs(const Fields<T>& fields, const JsonNode& node) {
   T function{};
@@ -317,7 +317,7 @@ TimeFunctionDescription ReadAs(const Fields<T>& fields, const JsonNode& node) {
 }
 
 Json Written(const Polynomial& function) {
-  // a file says a constant as a number, and any other list of coefficients in full
+  // a constant is written as a number, other polynomials with all coefficients
   if (function.coefficients.size() == 1) return function.coefficients[0];
   return PolynomialFields().Write(function);
 }

@@ -84,7 +84,7 @@ void ReadGravity(const JsonNode& node, Draft& draft) {
 
 Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.space); }
 
-// without bodies everything that names one would be a mistake, and none of its own
+// without bodies, every reference to a body would be a consequential error
 bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
 
 }  // namespace
@@ -92,30 +92,29 @@ bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
 const Fields<Draft>& MechanismFileFields() {
   static const Fields<Draft> fields(
       "mechanism",
-      "Bodies, joints, forces and initial values; SI units, angles in rad. The program checks "
-      "more than this schema: that names exist, that inertias are positive definite and those of "
-      "a body, that each joint gets as many values as it has coordinates.",
+      "Bodies, joints, forces and initial values in SI units; angles in rad. The program also "
+      "checks that names exist, that inertias are positive definite and physically possible, and "
+      "that each joint has as many values as coordinates.",
       DocumentRows<Draft>(
-          {{"name", Text(&Draft::name), "Of the problem.", "a name"},
+          {{"name", Text(&Draft::name), "Name of the mechanism.", "a name"},
            {"comment", By(TextSchema(), ReadComment, WriteComment), "Free text for readers."},
            {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
-            "Planar: everything moves in the x-y plane, third components are 0."},
+            "planar: all motion is in the x-y plane, and third components are 0."},
            {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
             "Acceleration of gravity [m/s^2] in ground axes.",
             "an array of 2 or 3 numbers [m/s^2]"},
            {"ground", GroundValue()},
-           {"bodies", BodiesValue(), "All that moves.", "an array of bodies", HasNoBodies},
-           {"joints", JointsValue(), "What holds bodies together, and lets them move.",
-            "an array of joints"},
-           {"forces", ForcesValue(), "Besides gravity."},
+           {"bodies", BodiesValue(), "Moving bodies.", "an array of bodies", HasNoBodies},
+           {"joints", JointsValue(), "Joints between the bodies.", "an array of joints"},
+           {"forces", ForcesValue(), "Forces other than gravity."},
            {"initial", Section(InitialFields())},
            {"independent", IndependentValue(),
-            "Speeds that the fixed coordinate reduction takes as independent: joint names for "
-            "joint "
-            "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute ones."},
+            "Independent speeds of the fixed coordinate reduction: joint names for joint "
+            "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute coordinates."},
            {"accuracy", Number(&Draft::accuracy, kPositive),
-            "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. Loops "
-            "that close within it are closed; constraints that differ by less are redundant."},
+            "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. "
+            "Loops with smaller gaps are closed; constraints with smaller differences are "
+            "redundant."},
            {"known_solution", Section(ObservationFields())}}));
   return fields;
 }
@@ -176,7 +175,7 @@ std::string MechanismText(const MechanismDescription& description, const SceneOb
 
 namespace {
 
-/// One number for a joint with one coordinate, else as many as it has.
+/// Reads one number for a joint with one coordinate, otherwise one per coordinate.
 std::vector<double> ReadJointNumbers(const JsonNode& node, const JointDescription& joint,
                                      SpaceKind space, bool speeds) {
   const int count = NumValues(joint.type, space, speeds);
@@ -199,7 +198,7 @@ std::vector<double> ReadJointNumbers(const JsonNode& node, const JointDescriptio
   return {};
 }
 
-/// Quaternions are normalised where they are used, so their length is free, but not zero.
+/// Reports zero quaternions. Other lengths are allowed: quaternions are normalised on use.
 void CheckQuaternion(const JsonNode& node, const std::vector<double>& values) {
   const auto zeros = std::count(values.begin(), std::min(values.begin() + 4, values.end()), 0.0);
   if (zeros == 4) node.Fail("a quaternion qw, qx, qy, qz that is not zero");
@@ -225,8 +224,7 @@ std::vector<JointValues> ReadJointValues(const JsonNode& section, const Draft& d
   return result;
 }
 
-/// One number, or as many as there are. Those of joints that follow a given motion say nothing, and
-/// no file has them.
+/// Writes one number or several. Values of joints with prescribed motion are left out.
 Json WriteJointValues(const Draft& draft, const std::vector<JointValues>& list, bool speeds) {
   Json written = Json::object();
   for (const JointValues& one : list) {
@@ -238,7 +236,7 @@ Json WriteJointValues(const Draft& draft, const std::vector<JointValues>& list, 
   return written.empty() ? Json() : written;
 }
 
-/// What bears speeds: joints with one, which has the joint's name, and owners of several, named
+/// Names of speeds: joints with one speed, and owners of several speeds, named
 /// "<owner>.<component>": bodies in absolute coordinates, and free joints.
 struct SpeedNames {
   NameList joints, owners;
@@ -258,7 +256,7 @@ SpeedNames NamesOfSpeeds(const Draft& draft) {
 }
 
 void CheckIndependentName(const JsonNode& node, const std::string& name, const SpeedNames& names) {
-  // Those of the plane and of space: a planar file may be run in either.
+  // Components in the plane and in space: a planar file may be run in either.
   static const NameList kComponents = {"angle", "x", "y", "z", "wx", "wy", "wz"};
   if (names.joints.Find(name)) return;
   const std::size_t dot = name.rfind('.');
@@ -296,15 +294,15 @@ Json WriteFormBody(const Form& form) { return form.body; }
 
 const Fields<Form>& PendulumFields() {
   static const Fields<Form> fields(
-      "closed_form", "The exact motion of one body: that of a plain pendulum.",
-      {{"type", By(ChoiceSchema({"pendulum"}), ReadFormType, WriteFormType), "What it is.",
+      "closed_form", "Closed-form motion of one body: a simple pendulum.",
+      {{"type", By(ChoiceSchema({"pendulum"}), ReadFormType, WriteFormType), "Closed-form type.",
         "\"pendulum\""},
-       {"body", By(TextSchema(), ReadFormBody, WriteFormBody), "Whose angle it is.",
+       {"body", By(TextSchema(), ReadFormBody, WriteFormBody), "Body whose angle is theta.",
         "the name of a body"},
        {"down_angle", Number(&PendulumForm::down_angle),
-        "Absolute angle of the body where theta = 0 [rad].", "a number [rad]"},
+        "Absolute angle of the body at theta = 0 [rad].", "a number [rad]"},
        {"frequency_squared", Number(&PendulumForm::frequency_squared, kPositive),
-        "In theta'' = -frequency_squared sin(theta) [1/s^2].", "a number > 0 [1/s^2]"}});
+        "Factor in theta'' = -frequency_squared sin(theta) [1/s^2].", "a number > 0 [1/s^2]"}});
   return fields;
 }
 
@@ -356,7 +354,7 @@ Json WriteIndependent(const Draft& draft) {
   return draft.independent.empty() ? Json() : Json(draft.independent);
 }
 
-/// Names, each once.
+/// Returns the schema of unique names.
 Json NamesSchema() {
   Json schema = ArraySchema(TextSchema());
   schema["uniqueItems"] = true;
@@ -417,31 +415,31 @@ FieldValue<Draft> IndependentValue() {
 }
 
 const Fields<Draft>& InitialFields() {
-  constexpr std::size_t kMostValues = 7;  // of a free joint in space
+  constexpr std::size_t kMostValues = 7;  // free joint in space
   static const Json values =
       Named("jointValues",
             MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMostValues)})));
   static const Fields<Draft> fields(
-      "initial", "Where and how fast it starts; what is not said is assembled.",
+      "initial", "Initial coordinates and speeds. Missing values are found by assembly.",
       {{"coordinates", By(values, ReadCoordinates, WriteCoordinates),
-        "By joint: guesses, or exact where the joint is held. Revolute [rad], prismatic [m], free "
-        "joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
+        "Guesses by joint, or exact values for \"fixed\" joints. Revolute [rad], prismatic [m], "
+        "free joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
        {"speeds", By(values, ReadSpeeds, WriteSpeeds),
-        "By joint; all of them are held when the loops are assembled."},
+        "Speeds by joint [rad/s or m/s]. The assembly of the loops keeps all of them."},
        {"fixed", By(NamesSchema(), ReadHeld, WriteHeld),
-        "Joints whose coordinates the assembly must not move."}});
+        "Joints whose coordinates the assembly keeps."}});
   return fields;
 }
 
 const Fields<Draft>& ObservationFields() {
   static const Fields<Draft> fields(
-      "known_solution", "Exact facts that observers compare with.",
+      "known_solution", "Known exact properties of the motion, for error measures.",
       {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch, WriteBranch),
-        "Linear combinations of absolute body angles, by body, that stay constant on the right "
+        "Linear combinations of absolute body angles, by body, that are constant on the correct "
         "branch."},
        {"closed_form", By(PendulumFields().Schema(), ReadClosedForm, WriteClosedForm)},
        {"length", By(NumberSchema(kPositive), ReadLength, WriteLength),
-        "Characteristic bar length [m], default 1."}});
+        "Characteristic bar length [m]; default: 1."}});
   return fields;
 }
 

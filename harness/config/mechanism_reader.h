@@ -1,4 +1,4 @@
-// What a mechanism file says, its reader and its writer.
+// Content of a mechanism file, its reader and its writer.
 #pragma once
 
 #include <filesystem>
@@ -12,13 +12,13 @@
 
 namespace loopbench::harness {
 
-// What a mechanism file says beyond the mechanism itself: exact facts that observers compare with.
+// Content of a mechanism file in addition to the mechanism: known exact properties of the motion.
 
-/// A linear combination of absolute body angles, as (body name, coefficient) pairs. On the branch
-/// the scene starts on it keeps its initial value; a run that changes it has left the branch.
+/// Linear combination of absolute body angles, as (body name, coefficient) pairs. It is constant on
+/// the initial branch; a run that changes it has left the branch.
 using AngleCombination = std::vector<std::pair<std::string, double>>;
 
-/// The exact motion of one body is that of a plain pendulum,
+/// Closed-form motion of one body, a simple pendulum,
 ///   theta'' = -frequency_squared sin(theta),   theta = absolute angle of the body - down_angle.
 struct PendulumForm {
   std::string body;
@@ -26,45 +26,44 @@ struct PendulumForm {
   double frequency_squared = 0.0;  ///< [1/s^2], > 0
 };
 
-/// JSON "observe". Empty where a scene has no such facts.
+/// JSON "known_solution". Empty if a problem has no such properties.
 struct SceneObservation {
   std::vector<AngleCombination> branch_invariants;  ///< JSON "branch"
   std::optional<PendulumForm> closed_form;
   double length = 1.0;  ///< characteristic bar length, the scale of "saturated" drift [m]
 };
 
-/// All that one mechanism file says.
+/// Content of one mechanism file.
 struct MechanismFile {
   MechanismDescription description;
   SceneObservation observe;
-  std::string canonical;  ///< the document without spaces: equal texts are equal mechanisms
+  std::string canonical;  ///< document without spaces; equal for equal mechanisms
 };
 
 // Reads a mechanism from JSON (configs/schema/mechanism.schema.json; SI units, angles in rad).
 //
-// The reader answers for what the file says: names that exist, numbers in range, as many values as
-// a joint has coordinates, inertias that are positive definite. Whether the loops can be closed
-// from the initial values is the assembly's business. In a planar file vectors may have a third
-// component, which must be zero, and frames turn about z only.
+// The reader checks the content of the file: existing names, ranges of numbers, one value per
+// coordinate of a joint, positive definite inertias. The assembly checks if the loops can be closed
+// from the initial values. In a planar file vectors may have a third component, which must be zero,
+// and frames turn about z only.
 
-/// Reads a file. Throws ConfigError with all mistakes in it, one per line.
+/// Reads a file. Throws ConfigError with all errors, one per line.
 MechanismFile ReadMechanism(const std::filesystem::path& path);
 
-/// The same from text; `file` is the name used in messages.
+/// Reads a mechanism from text; `file` is the name used in messages.
 MechanismFile ParseMechanism(std::string_view text, const std::string& file);
 
-// A mechanism as the JSON file that says it (mechanism_reader.h reads it to the same description).
+// Writer of mechanisms as JSON files, which the reader reads to the same description.
 //
-// What is written comes from the lists of fields that the readers use, so that nothing that a file
-// can say is lost. Points of bodies that joints and forces refer to keep their names.
+// The writer uses the readers' lists of fields, so that no key is lost. Points of bodies that
+// joints and forces refer to keep their names.
 
-/// The whole file. Reading it gives the description bit by bit, but for what no file says: values
-/// of joints whose only coordinate follows a given motion, which say nothing, are left out, and the
-/// sign of a zero that is a default.
+/// Returns the file. Reading it gives a bitwise equal description, with two exceptions: values of
+/// joints whose only coordinate is prescribed are left out, and the sign of default zeros is lost.
 ///
-/// @throws ConfigError with what the reader has against it, for a description that no file can say:
-/// released directions of joints (redundancy.h), names that are empty or used twice, parts out of
-/// the plane, inertias that no body has.
+/// @throws ConfigError with the reader's messages, for a description that no file can represent:
+/// released directions of joints (redundancy.h), empty or repeated names, non-planar parts,
+/// impossible inertias.
 std::string MechanismText(const MechanismDescription& description, const SceneObservation& observe,
                           const std::string& comment = "");
 

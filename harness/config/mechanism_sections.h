@@ -1,9 +1,8 @@
-// The sections of a mechanism file, each read into its part of the description.
+// Sections of a mechanism file, each read into its part of the description.
 //
-// Internal to harness/config. `root` is the file's top-level object. Later sections refer to
-// earlier ones by name, so the order of the calls is that of the declarations. Entries with errors
-// stay in the lists with stand-in values: the file is refused in the end, and indices stay valid
-// until then.
+// Internal to harness/config. `root` is the file's top-level object. Sections refer to earlier
+// sections by name, so the calls follow the order of declarations. Entries with errors stay in the
+// lists with placeholder values: indices stay valid until the file is rejected.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,8 +18,8 @@
 
 namespace loopbench::harness {
 
-/// A mechanism file being read, with the names in the order of its lists: references are looked up
-/// without a search, so that reading is linear in the size of the file.
+/// Mechanism file being read, with names in the order of its lists. Lookup of names takes constant
+/// time, so that reading is linear in the size of the file.
 struct Draft : MechanismDescription {
   NameList body_names;  ///< ground first
   NameList joint_names;
@@ -28,21 +27,21 @@ struct Draft : MechanismDescription {
   std::string comment;
 };
 
-/// A part of it, which refers to others by name.
+/// Part of a mechanism file, which refers to other parts by name.
 template <class T>
 struct PartOf : T {
   const Draft* draft = nullptr;
 };
 
-/// What makes everything right that leaves the plane in a file that does not say so.
+/// Cure for non-planar values in a file without "space".
 inline constexpr std::string_view kSpatialCure = "\"space\": \"spatial\" at the top level";
 
-/// The whole of a mechanism; `root` may be a file's top level or a value inside an experiment.
+/// Reads a mechanism; `root` is the top level of a file or a value inside an experiment.
 MechanismFile ReadMechanismObject(const JsonNode& root);
 
-/// All that a mechanism file may hold.
+/// Fields of a mechanism file.
 const Fields<Draft>& MechanismFileFields();
-/// The sections of the same names.
+/// Fields of the sections of the same names.
 FieldValue<Draft> GroundValue();
 FieldValue<Draft> BodiesValue();
 FieldValue<Draft> JointsValue();
@@ -51,29 +50,29 @@ FieldValue<Draft> IndependentValue();
 const Fields<Draft>& InitialFields();
 const Fields<Draft>& ObservationFields();
 
-/// A number (a constant), or an object with "type" polynomial, harmonic or table. A stand-in after
-/// an error.
+/// Reads a number (a constant), or an object with "type" polynomial, harmonic or table. Returns a
+/// placeholder after an error.
 TimeFunctionDescription ReadTimeFunction(const JsonNode& node);
-/// A constant as a number.
+/// Writes a function; a constant as a number.
 Json WriteTimeFunction(const TimeFunctionDescription& function);
 Json TimeFunctionSchema();
-/// Two or three numbers; reports a third one that is not zero in the plane.
+/// Reads two or three numbers; reports a third number that is not zero in the plane.
 Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space);
-/// Two numbers in the plane, unless the third is not zero; else three.
+/// Writes two numbers in the plane if the third is zero, otherwise three.
 Json WriteVector(const Eigen::Vector3d& vector, SpaceKind space);
-/// The name of the body's point that is there, else the vector.
+/// Writes the name of the body's point at this position, otherwise the vector.
 Json WritePoint(const Eigen::Vector3d& at, const BodyDescription& body, SpaceKind space);
-/// The point that a name of the body's points or a vector denotes.
+/// Reads a point: the name of a point of the body, or a vector.
 Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space);
 Json PlaceSchema();
-/// Index of the body with this name ("ground" is one of them).
+/// Reads the name of a body, including "ground", and returns its index.
 std::optional<int> ReadBodyName(const JsonNode& node, const Draft& draft);
-/// Index of the joint with this name.
+/// Reads the name of a joint and returns its index.
 std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft);
-/// A name that is not empty and not yet in `taken`.
+/// Reads a name that is not empty and not in `taken`.
 std::string ReadNewName(const JsonNode& node, const NameList& taken);
 
-/// A part that begins as `start`, where nothing is said.
+/// Reads a part; `start` contains the defaults.
 template <class T>
 T ReadPart(const Fields<PartOf<T>>& fields, const JsonNode& node, const Draft& draft,
            T start = {}) {
@@ -84,7 +83,7 @@ T ReadPart(const Fields<PartOf<T>>& fields, const JsonNode& node, const Draft& d
   return part;
 }
 
-/// A part as a file says it.
+/// Writes a part as in a file.
 template <class T>
 Json WritePart(const Fields<PartOf<T>>& fields, const Draft& draft, const T& whole) {
   PartOf<T> part;
@@ -93,7 +92,7 @@ Json WritePart(const Fields<PartOf<T>>& fields, const Draft& draft, const T& who
   return fields.Write(part);
 }
 
-/// An object within an object.
+/// Field for an object within an object.
 template <class T, class Owner>
 FieldValue<PartOf<Owner>> Part(T Owner::*member, const Fields<PartOf<T>>& fields) {
   return {fields.Schema(),
@@ -126,7 +125,7 @@ FieldValue<T> TimeFunctionOf(TimeFunctionDescription T::*member) {
           [=](const T& owner) { return WriteTimeFunction(owner.*member); }};
 }
 
-/// The index of a body, -1 for a name that is not known; `get(owner)` refers to it.
+/// Field for the index of a body, -1 for an unknown name; `get(owner)` is a reference to it.
 template <class T, class Get>
 FieldValue<PartOf<T>> BodyOf(Get get, bool may_be_ground) {
   return {TextSchema(),
@@ -137,13 +136,13 @@ FieldValue<PartOf<T>> BodyOf(Get get, bool may_be_ground) {
           },
           nullptr,
           [=](const PartOf<T>& owner) {
-            T part = owner;  // forces know their parts by reference
+            T part = owner;  // accessors of forces need a mutable copy
             const int body = std::invoke(get, part);
             return Json(owner.draft->bodies[body].name);
           }};
 }
 
-/// A place on that body, in its axes from its origin.
+/// Field for a point of that body, in body axes from the body's origin.
 template <class T, class GetBody, class Get>
 FieldValue<PartOf<T>> PlaceOf(GetBody body, Get get) {
   return {PlaceSchema(),
@@ -163,7 +162,7 @@ FieldValue<PartOf<T>> PlaceOf(GetBody body, Get get) {
           }};
 }
 
-/// Names of joint types in files, by value of JointType.
+/// Returns the names of joint types in files, by value of JointType.
 const NameList& JointTypeNames();
 
 }  // namespace loopbench::harness

@@ -63,7 +63,7 @@ std::vector<std::string> ProfileNames() {
 }
 
 std::string Validate(const IntegratorOptions& options) {
-  // Negated comparisons, so that NaN is refused too.
+  // Negated comparisons, so that NaN is rejected too.
   if (FindProfile(options.profile) == nullptr) {
     return fmt::format("profile is \"{}\"; accepted: {}", options.profile,
                        fmt::join(ProfileNames(), ", "));

@@ -1,4 +1,4 @@
-// Integrator profiles and options: what may be asked of the integrator. No SUNDIALS here.
+// Integrator profiles and options, independent of SUNDIALS.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace loopbench::harness {
 
-/// How to integrate. A profile is a Runge-Kutta pair together with an error norm, a step-size
-/// controller and a first-step rule: all of them change drift (by factors of two to four), so a
+/// Options of the integrator. A profile is a Runge-Kutta pair with an error norm, a step-size
+/// controller and a first-step rule. All of them change drift (by factors of two to four), so a
 /// comparison must name its profile.
 ///
 /// | profile          | pair                  | order | norm, controller                         |
@@ -55,41 +55,41 @@ struct IntegratorOptions {
   /// Accepted steps before the run ends with kStepLimit.
   std::int64_t step_limit = 10'000'000;
 
-  /// CPU time of the thread in seconds before the run ends with kTimeLimit: waiting for a processor
-  /// is not the run's doing. Checked after every accepted step
-  /// and on every 16th derivative, so one derivative that hangs is not interrupted.
+  /// CPU time of the thread in seconds before the run ends with kTimeLimit, without waiting for a
+  /// processor. Checked after every accepted step and on every 16th derivative, so a derivative
+  /// that hangs is not interrupted.
   double time_limit_s = 600;
 
   /// Longest step in seconds; 0 is the profile's own (ode45: a tenth of the interval; else none).
   double max_step = 0;
 
-  /// When positive: every step has this length (the last, and one that ends at a stop time, is
-  /// clipped) and no error test is made. Tolerances then end Newton's iteration alone.
+  /// If positive, every step has this length and no error test is made. The last step, and steps
+  /// that end at a stop time, are clipped. Tolerances are then used by Newton's iteration only.
   double fixed_step = 0;
 
   /// Times, in order, at which a step must end because f or a derivative of it jumps there: knots
   /// of prescribed motions and of tables. The step that ends at such a time evaluates f before it
-  /// only (at the last representable time before it where a stage lies at the end), the next step
-  /// evaluates f anew at it, with the step length that was in use before it was clipped. Without
-  /// stops a method loses its order at the jump, and only some of it is caught by the error test.
-  /// Times outside (t0, t_end] have no effect; those closer than 100 round-offs of the interval's
-  /// ends are one.
+  /// only (at the last representable time before it if a stage lies at the end). The next step
+  /// evaluates f again at it, with the step length before clipping. Without stops a method loses
+  /// its order at the jump, and the error test detects only part of the error. Times outside (t0,
+  /// t_end] have no effect; times closer than 100 round-offs of the interval's ends are merged.
   std::vector<double> stop_times;
 };
 
-/// The least relative tolerance: at the spacing of doubles no step's error can be told from
-/// rounding, and ARKODE takes none (ARK_TOO_MUCH_ACC). It is refused itself.
+/// Exclusive lower limit of the relative tolerance: at the spacing of doubles, errors are
+/// indistinguishable from rounding, and ARKODE takes no step (ARK_TOO_MUCH_ACC).
 inline constexpr double kLeastTolerance = std::numeric_limits<double>::epsilon();
 
-/// Of runs with a fixed step, which make no error test: Newton's iteration of implicit profiles
-/// ends by it. It leaves a hundredth, 1e-12, far below the error of any step worth taking, and
-/// still a thousand times above rounding, where the iteration would no longer converge.
+/// Tolerance of Newton's iteration for implicit profiles in runs with a fixed step. The iteration
+/// error is a hundredth of it, 1e-12: far below the error of useful steps, and a thousand times
+/// above round-off, where the iteration would not converge.
 inline constexpr double kToleranceOfFixedSteps = 1e-10;
 
-/// "" if the options can be used, else one sentence with the option, its value and what is allowed.
+/// Returns "" if the options are valid, otherwise a sentence with the option, its value and the
+/// allowed values.
 std::string Validate(const IntegratorOptions& options);
 
-/// The accepted values of `IntegratorOptions::profile`, in the order of the table above.
+/// Returns the accepted values of `IntegratorOptions::profile`, in the order of the table above.
 std::vector<std::string> ProfileNames();
 
 /// ARKODE's step-size controller. Every value is set by the profile, because ARKODE's own defaults
@@ -106,22 +106,22 @@ struct Controller {
   double keep_below;        ///< the step is kept if it would grow by less than this factor
 };
 
-/// One row of the table above, as arkode.cpp needs it.
+/// Row of the table above, for arkode.cpp.
 struct Profile {
   std::string_view name;
   const char* table;  ///< ARKODE's name of the Runge-Kutta pair
   Controller controller;
   bool is_ode45;  ///< MATLAB's norm, weights, first step and longest step
 
-  /// ERKStep 6.4.1 takes every table whose last abscissa is 1 for first-same-as-last and so loses
-  /// order with tables that are not; a post-step hook, even an empty one, makes it evaluate the
+  /// ERKStep 6.4.1 assumes that every table whose last abscissa is 1 is first-same-as-last, and
+  /// loses order for other tables; a post-step hook, even an empty one, makes it evaluate the
   /// derivative at the new solution (LLNL/sundials issue 311, fixed in 6.7).
   bool needs_fresh_derivative;
 
   bool is_implicit = false;  ///< diagonally implicit, stages by Newton's iteration
 };
 
-/// The profile of that name, or nullptr.
+/// Returns the profile of that name, or nullptr.
 const Profile* FindProfile(std::string_view name);
 
 }  // namespace loopbench::harness

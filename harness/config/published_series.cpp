@@ -11,7 +11,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// More than any printed table has; a dense output stops at every one of them.
+/// Limit above any printed table; dense output is evaluated at each time.
 constexpr std::size_t kMostTimes = 10'000;
 
 const NameList& Axes() {
@@ -26,7 +26,7 @@ struct SeriesDraft : PublishedSeries {
   const MechanismDescription* mechanism = nullptr;
 };
 
-/// One of its quantities, with what it belongs to.
+/// Quantity with the series that it belongs to.
 struct QuantityDraft : PublishedQuantity {
   const SeriesDraft* series = nullptr;
 };
@@ -55,7 +55,7 @@ void ReadValues(const JsonNode& node, QuantityDraft& draft) {
               fmt::format("one for each of the {} times", wanted));
 }
 
-/// Looks `name` up among things of the mechanism; their index, or nothing where it is none.
+/// Returns the index of the name among `things` of the mechanism, or nothing.
 template <class Things, class Name>
 std::optional<int> Among(const JsonNode& node, const Things& things, Name name, std::size_t first,
                          const std::string& what) {
@@ -145,20 +145,20 @@ Json OneThingSchema() {
 const Fields<QuantityDraft>& QuantityFields() {
   static const Fields<QuantityDraft> fields(
       "quantity",
-      "Numbers by time of a named point of a body along an axis, of a planar body's angle, or of a "
+      "Values over time of a coordinate of a named point, of a planar body's angle, or of a "
       "joint.",
-      {{"body", By(TextSchema(), ReadBody), "A body of the mechanism, with axis."},
-       {"point", By(TextSchema(), ReadPoint), "A named point of the body."},
+      {{"body", By(TextSchema(), ReadBody), "Name of a body of the mechanism, with axis."},
+       {"point", By(TextSchema(), ReadPoint), "Name of a point of the body."},
        {"axis", By(ChoiceSchema(Axes().all()), ReadAxis),
-        "Of the ground [m], or the angle that the body is turned by [rad]."},
-       {"joint", By(TextSchema(), ReadJoint), "A joint with one coordinate [rad or m]."},
+        "Ground axis of the coordinate [m], or the angle of the body [rad]."},
+       {"joint", By(TextSchema(), ReadJoint), "Name of a joint with one coordinate [rad or m]."},
        {"", By(OneThingSchema(), RequireOneThing)},
-       {"speed", Bool(&QuantityDraft::is_speed), "The values are its rate, per second."},
-       {"values", By(ArraySchema(NumberSchema(), 1, kMostTimes), ReadValues), "One for each time.",
+       {"speed", Bool(&QuantityDraft::is_speed), "If true, the values are rates, per second."},
+       {"values", By(ArraySchema(NumberSchema(), 1, kMostTimes), ReadValues), "One per time.",
         "a list of numbers, one for each time"},
        {"uncertainty", Number(&QuantityDraft::accuracy, kPositive),
-        "What the source claims of every value, absolute, in their unit: half a unit of the last "
-        "printed digit at least.",
+        "Absolute uncertainty of every value, in the unit of the values: at least half a unit of "
+        "the last printed digit.",
         "a number > 0 in the unit of the values"}});
   return fields;
 }
@@ -185,18 +185,18 @@ void ReadQuantities(const JsonNode& node, SeriesDraft& draft) {
 const Fields<SeriesDraft>& SeriesFileFields() {
   static const Fields<SeriesDraft> fields(
       "series",
-      "Published numbers of a mechanism's motion, for \"reference\" in an experiment. The program "
-      "checks more than this schema: that times rise, that there are as many values, that bodies, "
-      "points and joints are the mechanism's.",
+      "Published data of a mechanism's motion, for \"reference\" in an experiment. The program "
+      "also checks that times ascend, that each time has a value, and that the mechanism has the "
+      "bodies, points and joints.",
       DocumentRows<SeriesDraft>(
-          {{"name", Text(&SeriesDraft::name), "Of the series, for tables.", "a name"},
-           {"source", Text(&SeriesDraft::source), "Where the numbers were published, and by what.",
+          {{"name", Text(&SeriesDraft::name), "Name of the data, for tables.", "a name"},
+           {"source", Text(&SeriesDraft::source), "Publication and origin of the values.",
             "where the numbers were published"},
            {"comment", Text(&SeriesDraft::comment), "Free text for readers."},
            {"times", By(ArraySchema(NumberSchema(kNotNegative), 1, kMostTimes), ReadTimes),
-            "Rising [s].", "a list of rising numbers >= 0 [s]"},
+            "Ascending times [s].", "a list of rising numbers >= 0 [s]"},
            {"quantities", By(ArraySchema(QuantityFields().Schema(), 1), ReadQuantities),
-            "What is known at these times.", "a list of quantities"}}));
+            "Quantities with values at these times.", "a list of quantities"}}));
   return fields;
 }
 

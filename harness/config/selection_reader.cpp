@@ -8,7 +8,7 @@
 namespace loopbench::harness {
 namespace {
 
-// A scalar as the text that a Condition compares with: 1e-6 becomes "1e-06", true becomes "true".
+// Returns a scalar as the text of a Condition: 1e-6 becomes "1e-06", true becomes "true".
 std::string ConditionValue(const JsonNode& node) {
   const Json& value = node.value();
   if (value.is_string()) return node.Text();

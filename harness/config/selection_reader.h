@@ -1,4 +1,4 @@
-// What the files of rules share (claims, robustness maps): words, and selections of records.
+// Common parts of files of rules (claims, robustness maps): texts, and selections of records.
 //
 // Internal to harness/config.
 #pragma once
@@ -14,8 +14,8 @@ namespace loopbench::harness {
 
 inline constexpr const char* kAnyText = "a string that is not empty";
 
-/// {"key": value, "key": [value, ...]} with at least so many keys (none would select everything):
-/// strings, numbers and bools as the texts that a Condition compares with.
+/// {"key": value, "key": [value, ...]} with at least `least` keys (no key would select everything).
+/// Strings, numbers and bools become the texts that a Condition compares with.
 Selection ReadSelection(const JsonNode& node, std::size_t least = 0);
 Json SelectionSchema(std::size_t least = 0);
 
@@ -25,8 +25,8 @@ FieldValue<T> SelectionOf(Selection T::*member, std::size_t least = 0) {
           [=](const JsonNode& node, T& owner) { owner.*member = ReadSelection(node, least); }};
 }
 
-/// Labels and ids name results, so each may be there once: reports `owner`'s `key` where `name` is
-/// among `taken`, and adds it.
+/// Reports `owner`'s `key` if `name` is in `taken`, and adds the name: labels and ids must be
+/// unique.
 void ReportRepeated(const JsonNode& owner, const std::string& key, const std::string& name,
                     std::vector<std::string>* taken);
 

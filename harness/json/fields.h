@@ -1,18 +1,17 @@
-// Lists of fields: what an object of a file may hold, said once for all who ask.
+// Lists of fields: the keys of an object of a file, defined once for all uses.
 //
 //   const Fields<Limits>& LimitsFields() {
 //     static const Fields<Limits> fields(
-//         "limits", "When a case is given up.",
-//         {{"cpu_s", Number(&Limits::cpu_s, kPositive), "CPU time of one run [s]."},
-//          {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Accepted steps."}});
+//         "limits", "Limits at which a case is stopped.",
+//         {{"cpu_s", Number(&Limits::cpu_s, kPositive), "CPU time of one run [s], ..."},
+//          {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Number of accepted steps."}});
 //     return fields;
 //   }
 //
-// A row is the key, what its value may be and where it goes, and a sentence with the unit; a key
-// that must be there has in addition the words for the message that it is not. Defaults are those
-// of the struct. From the rows come the reader, the refusal of other keys with the nearest
-// spelling, the JSON schema (configs/schema/), the tables of docs/fields.md, and, where every row
-// can say its value, the writer of such an object.
+// A row contains the key, its value type and target member, and a sentence with the unit. A
+// required key also has a text for the error message. Defaults are the struct's defaults. The rows
+// generate the reader, the errors for unknown keys, the JSON schema (configs/schema/), the tables
+// of docs/fields.md, and, if every row can write its value, the writer.
 #pragma once
 
 #include <concepts>
@@ -29,17 +28,17 @@
 
 namespace loopbench::harness {
 
-/// What the value of a key may be, and where it goes in a T.
+/// Value type of a key, and its member in a T.
 template <class T>
 struct FieldValue {
   using Read = std::function<void(const JsonNode&, T&)>;
   using Show = std::function<Json(const T&)>;
 
   Json schema;
-  Read read;  ///< null: read elsewhere
-  Show show;  ///< as a file says it; null where there is no one way
-  /// As a file that is written says it: null where the key is left out. Without one it is `show`,
-  /// left out where the value is the default and may be.
+  Read read;  ///< null: read by other code
+  Show show;  ///< value as in a file; null if there is no unique form
+  /// Value for writing; null if the key is left out. Without `write`, `show` is used, and default
+  /// values of optional keys are left out.
   Show write;
 
   FieldValue(Json what, Read reader = nullptr, Show shown = nullptr,  // NOLINT: a schema is one
@@ -48,29 +47,29 @@ struct FieldValue {
         read(std::move(reader)),
         show(std::move(shown)),
         write(std::move(written)) {}
-  /// A member of a base is one of the derived struct, which may carry what reading needs besides.
+  /// Converts a field of a base class to a field of the derived struct.
   template <class Base>
   requires(std::derived_from<T, Base> && !std::same_as<T, Base>)
       FieldValue(const FieldValue<Base>& other)  // NOLINT: as a T is a Base
       : schema(other.schema), read(other.read), show(other.show), write(other.write) {}
 };
 
-/// One row. Without a name it is a rule about the whole object: `schema` says it, `read` gets the
-/// object, after the rows before it.
+/// Row of a list of fields. Without a name it is a rule for the whole object: `schema` states it,
+/// and `read` is called with the object after the previous rows.
 template <class T>
 struct Field {
   std::string name;
   FieldValue<T> value;
   std::string sentence = "";
-  std::string missing = "";  ///< what is expected where the key must be and is not there
-  /// Whether the rows after it cannot be judged.
+  std::string missing = "";  ///< expected value, for the error if a required key is missing
+  /// Returns true if the rows after it cannot be checked.
   bool (*ends)(const T&) = nullptr;
 };
 
 template <class T>
 class Fields {
  public:
-  /// `name` is that of the object in schemas and tables.
+  /// `name` is the object's name in schemas and tables.
   Fields(std::string name, std::string sentence, std::vector<Field<T>> rows)
       : name_(std::move(name)), sentence_(std::move(sentence)), rows_(std::move(rows)) {
     for (const Field<T>& row : rows_) {
@@ -78,15 +77,15 @@ class Fields {
     }
   }
 
-  /// Reads all rows into `result`; false, and nothing read, when `node` is no object. Reports
-  /// unknown keys first.
+  /// Reads all rows into `result`. Returns false, and reads nothing, if `node` is not an object.
+  /// Reports unknown keys first.
   bool Read(const JsonNode& node, T* result) const {
     if (!node.ExpectObject(keys_)) return false;
     ReadRows(node, result);
     return true;
   }
 
-  /// The same for an object whose keys are known.
+  /// Reads all rows of an object whose keys are already checked.
   void ReadRows(const JsonNode& node, T* result) const {
     for (const Field<T>& row : rows_) {
       if (row.name.empty()) {
@@ -100,7 +99,7 @@ class Fields {
     }
   }
 
-  /// Each plain value of `object` under its key, in the order of the rows.
+  /// Calls `put` with the key and plain value of each row, in order.
   template <class Put>
   void Show(const T& object, Put put) const {
     for (const Field<T>& row : rows_) {
@@ -108,7 +107,7 @@ class Fields {
     }
   }
 
-  /// The object as a file may say it, by all rows that can: Read() of it gives the same.
+  /// Returns the object as JSON, from all rows that can be written. Read() gives the same object.
   Json Write(const T& object) const {
     const T standard{};
     Json written = Json::object();
@@ -123,7 +122,7 @@ class Fields {
     return written;
   }
 
-  /// The object by itself, and as others refer to it.
+  /// Return the object's own schema, and a named reference to it.
   Json OwnSchema() const {
     const T standard{};
     std::vector<FieldSchema> fields;
@@ -141,14 +140,14 @@ class Fields {
   NameList keys_;
 };
 
-/// A value with a reader of its own, a function of the node and of a T, and perhaps a writer.
+/// Returns a value with its own reader, a function of the node and a T, and optionally a writer.
 template <class T>
 FieldValue<T> By(Json schema, void (*read)(const JsonNode&, T&),
                  Json (*write)(const T&) = nullptr) {
   return {std::move(schema), read, nullptr, write};
 }
 
-/// The word that says of which kind an object is: read by who chose these fields for it.
+/// Returns the constant word of an object's type, which the caller has already read.
 template <class T>
 FieldValue<T> Constant(const std::string& word) {
   return {ChoiceSchema({word}), nullptr, nullptr, [word](const T&) { return Json(word); }};
@@ -159,7 +158,7 @@ FieldValue<T> Number(double T::*member, Range range = {}) {
   return {NumberSchema(range),
           [=](const JsonNode& node, T& owner) { owner.*member = node.Number(range); },
           [=](const T& owner) {
-            // beyond the range it stands for what no file can say
+            // out-of-range values are sentinels and are written as null
             return range.Contains(owner.*member) ? Json(owner.*member) : Json();
           }};
 }
@@ -186,8 +185,8 @@ FieldValue<T> Text(std::string T::*member) {
           [=](const T& owner) { return (owner.*member).empty() ? Json() : Json(owner.*member); }};
 }
 
-/// One of some names; `what` names the thing. The member is the name, or an enum or bool with the
-/// name's index as its value.
+/// Returns a choice among names; `what` names the object. The member is the name, or an enum or
+/// bool with the name's index as its value.
 template <class T, class Chosen>
 FieldValue<T> Choice(Chosen T::*member, const NameList& names, std::string what) {
   return {ChoiceSchema(names.all()),
@@ -209,7 +208,7 @@ FieldValue<T> Choice(Chosen T::*member, const NameList& names, std::string what)
           }};
 }
 
-/// One or several different names of enum values, which are the indices of the names.
+/// Returns one or several different names of enum values, which are the indices of the names.
 template <class T, class Enum>
 FieldValue<T> Choices(std::vector<Enum> T::*member, const NameList& names, std::string what) {
   return {OneOrMoreSchema(ChoiceSchema(names.all()), true),
@@ -225,7 +224,7 @@ FieldValue<T> Choices(std::vector<Enum> T::*member, const NameList& names, std::
           }};
 }
 
-/// One, several or a range.
+/// Returns one number, several numbers or a range.
 template <class T>
 FieldValue<T> NumberList(std::vector<double> T::*member, Range range = {}) {
   return {NumberListSchema(range),
@@ -246,7 +245,7 @@ FieldValue<T> Object(Part T::*member, const Fields<Part>& fields) {
           }};
 }
 
-/// An object whose fields go to the same struct.
+/// Returns an object whose fields are members of the same struct.
 template <class T>
 FieldValue<T> Section(const Fields<T>& fields) {
   return {fields.Schema(), [&fields](const JsonNode& node, T& owner) { fields.Read(node, &owner); },
@@ -257,7 +256,7 @@ FieldValue<T> Section(const Fields<T>& fields) {
           }};
 }
 
-/// An array of objects; `what` names them.
+/// Returns an array of objects; `what` names them.
 template <class T, class Part>
 FieldValue<T> ObjectList(std::vector<Part> T::*member, const Fields<Part>& fields,
                          std::string what) {
@@ -268,24 +267,23 @@ FieldValue<T> ObjectList(std::vector<Part> T::*member, const Fields<Part>& field
           }};
 }
 
-// The top level of each kind of file: its keys, and what to say to a file of another kind.
+// Top level of each kind of file: its keys, and the error for a file of another kind.
 //
 // Internal to harness/config (see json_document.h).
 
-/// True when `root` is an object that may be of this kind. Reports all else: no object, a document
-/// that another kind knows more keys of ("found a mechanism (it has "bodies"), expected an
-/// experiment"), another format, else every key that is not known, and a "$schema" that is no
-/// string. Every kind may have that one: editors find the schema of a file by it, and nothing else
-/// reads it.
+/// Returns true if `root` is an object that may be of this kind. Reports all errors: not an object,
+/// a document with more keys of another kind ("found a mechanism (it has "bodies"), expected an
+/// experiment"), another format, otherwise every unknown key, and a "$schema" that is not a string.
+/// "$schema" is allowed in every kind, for editors only.
 bool ExpectDocument(const JsonNode& root, FileKind kind);
 
-/// The rows of what every kind may have, before its own.
+/// Returns the common rows of all kinds, followed by `own`.
 template <class T>
 std::vector<Field<T>> DocumentRows(std::vector<Field<T>> own) {
   std::vector<Field<T>> rows = {
       {"$schema", TextSchema(), "Address of this schema, for editors."},
       {"format", IntegerSchema(kFileFormat, kFileFormat),
-       "Of the file; a version of Loopbench that reads another refuses it by name."}};
+       "Version of the file format. Files of other versions are rejected."}};
   rows.insert(rows.end(), std::make_move_iterator(own.begin()), std::make_move_iterator(own.end()));
   return rows;
 }

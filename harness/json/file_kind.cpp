@@ -14,15 +14,15 @@
 namespace loopbench::harness {
 namespace {
 
-/// What every file may have.
+/// Returns true for keys that every file may have.
 bool IsCommon(std::string_view key) { return key == "$schema" || key == "format"; }
 
-/// A kind by what every file of it has and may have at its top level.
+/// Kind of file, with its top-level keys.
 struct Kind {
   FileKind kind;
   std::string_view name;
-  std::vector<std::string> own;  ///< what it is known by; without any of these a file is not of it
-  NameList keys;                 ///< all, those of every file last
+  std::vector<std::string> own;  ///< characteristic keys; a file of this kind has at least one
+  NameList keys;                 ///< all keys, common keys last
 
   std::ptrdiff_t CountKnown(const Json& document) const {
     std::ptrdiff_t known = 0;
@@ -63,7 +63,7 @@ const std::array<Kind, 6>& Kinds() {
   return kinds;
 }
 
-/// The kinds that know the most keys of an object.
+/// Returns the kinds that have most of an object's keys.
 std::vector<const Kind*> Likeliest(const Json& document) {
   std::vector<const Kind*> best;
   std::ptrdiff_t most = 0;
@@ -76,7 +76,7 @@ std::vector<const Kind*> Likeliest(const Json& document) {
   return best;
 }
 
-/// "a mechanism ("bodies", "joints")", of the keys that `has` holds.
+/// "a mechanism ("bodies", "joints")", of the keys that satisfy `has`.
 template <class Has>
 std::string WithKeys(const Kind& kind, const std::vector<std::string>& keys, Has has) {
   std::vector<std::string> quoted;
@@ -86,7 +86,7 @@ std::string WithKeys(const Kind& kind, const std::vector<std::string>& keys, Has
   return fmt::format("{} ({})", kind.name, fmt::join(quoted, ", "));
 }
 
-/// `kinds`: those that the file may be of.
+/// Reports that the kind of a file is ambiguous. `kinds`: the possible kinds.
 void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds) {
   std::vector<std::string> found, expected;
   for (const Kind* kind : kinds) {
@@ -118,7 +118,7 @@ bool ExpectDocument(const JsonNode& root, FileKind kind) {
       return false;
     }
   }
-  // first of all: keys of a later format are no mistakes of spelling
+  // first: keys of a later format are not spelling errors
   if (const auto format = root.Optional("format"); format && format->value() != kFileFormat) {
     format->Fail(fmt::format(kExpectedFormat, kFileFormat));
     return false;

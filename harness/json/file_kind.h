@@ -1,5 +1,4 @@
-// What a configuration file is about: decided by the keys of its top level, never by names or texts
-// further inside.
+// Kind of a configuration file, determined by its top-level keys only.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +7,10 @@ namespace loopbench::harness {
 
 enum class FileKind { kMechanism, kExperiment, kClaims, kMap, kBenchmarks, kSeries };
 
-/// The kind that knows the most of the file's top-level keys, and among them at least one that
-/// tells it apart; of several such kinds the one of which all of these are there. Throws
-/// ConfigError when the file cannot be read or is no JSON, and when that leaves no kind or several;
-/// the message then says which keys were found and what each kind has.
+/// Returns the kind that has most of the file's top-level keys, including one of its characteristic
+/// keys. If several kinds qualify, the kind with all its characteristic keys present is chosen.
+/// Throws ConfigError if the file cannot be read or is not JSON, or if no kind or several kinds
+/// remain; the message lists the keys found and the keys of each kind.
 FileKind KindOfFile(const std::filesystem::path& path);
 
 }  // namespace loopbench::harness

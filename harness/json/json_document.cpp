@@ -18,14 +18,14 @@
 #include "harness/text/words.h"
 
 namespace loopbench::harness {
-// The parser's events with what they lack: the pointer and the line of each value.
+// Parser events with the pointer and the line of each value.
 //
 // Internal to harness/config (see json_document.h).
 
-/// How far the parser has read.
+/// Position of the parser.
 struct Reading {
   std::size_t line = 1;
-  std::size_t line_before = 1;  ///< without the last character: a number is read one too far
+  std::size_t line_before = 1;  ///< without the last character: numbers are read one too far
 };
 
 /// Gives the parser its characters and counts their lines.
@@ -57,7 +57,7 @@ class LineCounter {
   Reading* reading_;
 };
 
-/// Follows the parser through the document and knows the pointer and the line of each value.
+/// Follows the parser and records the pointer and the line of each value.
 class Walker : public nlohmann::json_sax<Json> {
  public:
   /// Walks through `text` to its end, or until a callback returns false.
@@ -87,12 +87,12 @@ class Walker : public nlohmann::json_sax<Json> {
  protected:
   virtual bool Key(const std::string&) { return true; }
   virtual bool CheckNumber(double, const std::string&) { return true; }
-  /// A value; containers come empty.
+  /// Adds a value; containers are still empty.
   virtual bool Put(Json value) = 0;
-  /// The last container that was put and not finished is complete.
+  /// Completes the last open container.
   virtual void Finish() {}
 
-  /// Of the value or key that is being reported.
+  /// Returns the pointer of the current value or key.
   std::string Pointer() const {
     std::string pointer;
     for (const Level& level : levels_) {
@@ -133,12 +133,12 @@ class Walker : public nlohmann::json_sax<Json> {
 };
 namespace {
 
-/// Builds the document and notes what the parser would forgive.
+/// Builds the document and records errors that the parser accepts.
 class Builder final : public Walker {
  public:
   Builder(std::string_view text, const std::string& file) : text_(text), file_(file) {}
 
-  /// The document; throws ConfigError with all complaints when there are any.
+  /// Returns the document; throws ConfigError with all errors if there are any.
   Json Take() {
     if (complaints_.empty()) return std::move(root_);
     if (more_ > 0) complaints_.push_back(fmt::format("{}: and {} more", file_, more_));
@@ -152,7 +152,7 @@ class Builder final : public Walker {
     const std::size_t start = read.rfind('\n');
     const std::size_t column =
         start == std::string_view::npos ? read.size() : read.size() - start - 1;
-    // a number too large is reported where it ends, and the parser's words have no "parsing"
+    // overflow is reported at the end of the number, and the parser's message has no "parsing"
     const bool too_large = dynamic_cast<const Json::out_of_range*>(&error) != nullptr;
     const std::string what =
         too_large ? fmt::format(
@@ -192,7 +192,7 @@ class Builder final : public Walker {
       auto& array = open_.back()->get_ref<Json::array_t&>();
       placed = &array.emplace_back(std::move(value));
     } else {
-      // Past the map's own emplace, which looks through all keys each time: Key() has done that.
+      // Not the map's own emplace, which searches all keys: Key() has checked them.
       auto& object = open_.back()->get_ref<Json::object_t&>();
       placed = &object.emplace_back(current_key(), std::move(value)).second;
     }
@@ -248,7 +248,7 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   NoteInput(path);
   std::ifstream stream(path, std::ios::binary);
   if (!stream) fail("it cannot be opened");
-  // Piece by piece up to the limit: a pipe does not tell its size.
+  // Read in pieces up to the limit: the size of a pipe is unknown.
   std::string text;
   std::vector<char> piece(std::size_t{1} << 16);
   while (stream && text.size() <= kMaxConfigBytes) {
@@ -313,23 +313,23 @@ std::string PointerToken(std::string_view key) {
   return token;
 }
 
-// EncodingFault: text in other encodings than UTF-8, called by its name.
+// EncodingFault: detects text in encodings other than UTF-8.
 
 namespace {
 
 constexpr std::string_view kExpected = "expected UTF-8 text";
 
-/// A byte order mark or the zero bytes of wide characters at the start, or "".
+/// Returns the encoding from a byte order mark or zero bytes at the start, or "".
 std::string_view WideEncoding(std::string_view text) {
   using namespace std::string_view_literals;
-  // the longer marks first: that of UTF-32 begins like that of UTF-16
+  // longer marks first: the UTF-32 mark begins like the UTF-16 mark
   if (text.starts_with("\xFF\xFE\0\0"sv) || text.starts_with("\0\0\xFE\xFF"sv)) return "UTF-32";
   if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv)) return "UTF-16";
   if (text.size() < 2 || (text[0] == '\0') == (text[1] == '\0')) return "";
   return text.size() >= 4 && text[1] == '\0' && text[2] == '\0' ? "UTF-32" : "UTF-16";
 }
 
-/// Bytes of the UTF-8 character at the start of `text`, or 0 when there is none.
+/// Returns the bytes of the first UTF-8 character, or 0 if it is invalid.
 std::size_t CharacterLength(std::string_view text) {
   const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned first = byte(0);
@@ -385,11 +385,11 @@ std::string EncodingFault(std::string_view text) {
   return "";
 }
 
-// LinesOf: a second pass through the text, made only when there is something to complain about.
+// LinesOf: a second pass through the text, only if there are errors.
 
 namespace {
 
-/// Looks for the lines of some values.
+/// Finds the lines of given values.
 class LineFinder final : public Walker {
  public:
   explicit LineFinder(const std::vector<std::string>& wanted)
@@ -428,7 +428,7 @@ bool IsWordCharacter(char c) {
          c == '-' || c == '.' || c == '_';
 }
 
-/// The number or bare word that was read last, or the last character when there is none.
+/// Returns the number or bare word that was read last, or otherwise the last character.
 std::string_view LastWord(std::string_view text, std::size_t position) {
   if (position == 0 || text.empty()) return "";
   std::size_t begin = std::min(position, text.size()) - 1;
@@ -443,7 +443,7 @@ std::string_view LastWord(std::string_view text, std::size_t position) {
   return text.substr(begin, end - begin);
 }
 
-/// What the characters around a syntax error suggest, as " (...)" or "".
+/// Returns a hint from the characters around a syntax error, as " (...)" or "".
 std::string Hint(std::string_view text, std::size_t position, std::string_view word) {
   if (position == 0 || position > text.size() || word.empty()) return "";
   std::size_t at = position - 1;
@@ -472,7 +472,7 @@ std::string Hint(std::string_view text, std::size_t position, std::string_view w
   return trailing_comma ? " (remove the comma before the closing bracket)" : "";
 }
 
-/// What follows `start` in the message, up to `end` or to its end; "" without it.
+/// Returns the text after `start`, up to `end` or the end of the message; "" without `start`.
 std::string Between(const std::string& message, std::string_view start, std::string_view end) {
   const std::size_t at = message.find(start);
   if (at == std::string::npos) return "";
@@ -481,7 +481,7 @@ std::string Between(const std::string& message, std::string_view start, std::str
   return message.substr(from, to == std::string::npos ? to : to - from);
 }
 
-/// In words for people: the parser knows no "," where it expects a closing bracket.
+/// Returns readable expectations: the parser omits "," where it expects a closing bracket.
 std::string Expected(const std::string& parsers, bool in_key) {
   if (parsers == "'}'") return "',' or '}'";
   if (parsers == "']'") return "',' or ']'";
@@ -534,7 +534,7 @@ namespace {
 
 constexpr std::size_t kWidth = 100;  ///< characters of a line
 
-/// On one line where it fits behind `used` characters, else one element per line.
+/// Returns one line if it fits after `used` characters, otherwise one element per line.
 std::string Written(const Json& value, std::size_t indent, std::size_t used) {
   const std::string flat = FlatText(value);
   if (used + flat.size() < kWidth || !value.is_structured() || value.empty()) return flat;

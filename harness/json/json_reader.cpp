@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kLongestShown = 60;  ///< bytes of a value in a message
 constexpr std::size_t kMostListed = 32;    ///< names in a message
 
-/// The value as a reader finds it in the file, or its kind where it would be too long.
+/// Returns the value as in the file, or its type if it is too long.
 std::string Shown(const Json& value) {
   if (value.is_object()) return value.empty() ? "an empty object" : "an object";
   if (value.is_array() && value.empty()) return "an empty array";
@@ -28,7 +28,7 @@ std::string Shown(const Json& value) {
   return Abbreviated(text, kLongestShown);
 }
 
-/// "a", "b", "c" without empty names.
+/// Returns "a", "b", "c" without empty names.
 std::string Listed(const std::vector<std::string>& names) {
   std::vector<std::string> quoted;
   for (const std::string& name : names) {
@@ -145,7 +145,7 @@ bool JsonNode::ExpectObject(const NameList& known) const {
   }
   for (const auto& [key, value] : value_->items()) {
     if (known.Find(key)) continue;
-    // past the limit of messages, spellings would only cost time
+    // beyond the limit of messages, suggestions are not needed
     if (errors_->full()) {
       Child(value, key).FailAs("", "");
       continue;
@@ -284,7 +284,7 @@ std::vector<std::size_t> JsonNode::Choices(const NameList& known, std::string_vi
 
 namespace {
 
-/// The number a person would have written, where round-off alone is in its way: 1e-08 for the
+/// Returns the short decimal number if only round-off separates it from `value`: 1e-08 for the
 /// 1.0000000000000002e-08 that a power gives.
 double Clean(double value) {
   const std::string text = fmt::format("{:.13g}", value);

@@ -1,4 +1,4 @@
-// Values of a document with their places, and readers that report every mistake.
+// Values of a document with their locations, and readers that report all errors.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,40 +16,40 @@
 
 namespace loopbench::harness {
 
-// Where the values of a document come from: its own file, files taken into it, and settings.
+// Origin of the values of a document: its file, included files, and settings.
 //
-// A sweep and --set change a document after it was parsed, and a pointer that goes through the path
-// of a mechanism takes that file in. Messages must still name the file and line a person can edit.
-// Internal to harness/config.
+// A sweep and --set change a document after it was parsed, and a pointer through the path of a
+// mechanism includes that file. Messages must still name the file and line to edit. Internal to
+// harness/config.
 
 class Origins {
  public:
-  /// The document `file` with this text, which must outlive the object; "" when it is not at hand,
-  /// and messages then go without lines.
+  /// Origin in document `file` with this text, which must outlive the object. If the text is "",
+  /// messages have no line numbers.
   explicit Origins(std::string file, std::string_view text = "") {
     parts_.push_back({"", std::move(file), text, "", ""});
   }
 
-  /// The value at `pointer` is now the document `file`.
+  /// Records that the value at `pointer` is now the document `file`.
   void TakeIn(std::string pointer, std::string file, std::string_view text) {
     parts_.push_back({std::move(pointer), std::move(file), text, "", ""});
   }
 
-  /// The value at `pointer` was set; `note` says by what, and `source` is the pointer of that in
-  /// the first file, "" when it stands in no file.
+  /// Records that the value at `pointer` was set. `note` describes the setter; `source` is its
+  /// pointer in the first file, or "" if it is in no file.
   void Note(std::string pointer, std::string note, std::string source) {
     parts_.push_back({std::move(pointer), "", "", std::move(note), std::move(source)});
   }
 
   struct Place {
     std::string file;
-    std::string pointer;       ///< within `file`, as a message shows it
-    std::string line_pointer;  ///< whose line the message shows
+    std::string pointer;       ///< within `file`, for messages
+    std::string line_pointer;  ///< pointer whose line is reported
     std::string_view text;     ///< of `file`
-    std::string note;          ///< "" for what stands in a file
+    std::string note;          ///< "" for values from a file
   };
 
-  /// The innermost part that holds the value, the latest of those as deep.
+  /// Returns the innermost part that contains the value; of equally deep parts, the latest.
   Place Find(const std::string& pointer) const {
     const Part* found = &parts_.front();
     for (const Part& part : parts_) {
@@ -76,58 +76,58 @@ class Origins {
   std::vector<Part> parts_;
 };
 
-// A cursor over a JSON document whose getters report what they do not accept.
+// Cursor over a JSON document whose getters report invalid values.
 //
-// Reading goes on after an error with a stand-in value, so that one run shows all errors of a file:
+// After an error, reading continues with a placeholder value, so that all errors of a file are
+// reported:
 //   FILE:LINE: /json/pointer: found VALUE, expected WHAT (did you mean "x"?)
-// The caller ends with ErrorList::ThrowIfAny(); what was read before is not used when it throws.
-// For harness/config and harness/store (see json_document.h).
+// The caller ends with ErrorList::ThrowIfAny(); values read before are not used if it throws. For
+// harness/config and harness/store (see json_document.h).
 
-/// All complaints about one file, in the order they were found. Of more than kMostMessages the rest
-/// is counted.
+/// Errors of one file, in the order of detection. Errors beyond kMostMessages are only counted.
 class ErrorList {
  public:
-  /// `text` is the file's, for line numbers; it must outlive the list.
+  /// `text` is the file's text, for line numbers; it must outlive the list.
   ErrorList(std::string file, std::string_view text) : origins_(std::move(file), text) {}
   explicit ErrorList(Origins origins) : origins_(std::move(origins)) {}
 
-  /// Adds one complaint; `suggestion` is the nearest valid spelling or "".
+  /// Adds an error; `suggestion` is the nearest valid spelling or "".
   void Add(std::string_view pointer, std::string_view found, std::string_view expected,
            std::string_view suggestion = "");
 
-  /// Adds a complaint of which many may have one cause, such as a key that is missing elsewhere:
-  /// "found ..., expected ..., or CURE", and the places of others with this cure, which have no
-  /// messages of their own.
+  /// Adds an error that may share its cause with others, such as a key missing elsewhere. The
+  /// message is "found ..., expected ..., or CURE" with the locations of the other errors, which
+  /// have no own messages.
   void AddWithCure(std::string_view cure, std::string_view pointer, std::string_view found,
                    std::string_view expected);
 
-  /// Adds finished messages, such as those of a file that this file refers to; the same text twice
-  /// (two scenes with one broken mechanism) once.
+  /// Adds complete messages, such as messages of an included file. Equal texts (two problems with
+  /// one invalid mechanism) are added once.
   void AddText(const std::string& text);
 
   bool empty() const { return messages_.empty(); }
-  /// Further complaints are only counted: their words need not be found.
+  /// Returns true if further errors are only counted and need no text.
   bool full() const { return messages_.size() >= kMostMessages; }
 
-  /// Throws ConfigError with all messages, one per line, unless there are none. `ending` is one
-  /// more line.
+  /// Throws ConfigError with all messages, one per line, if there are any. `ending` is an
+  /// additional line.
   void ThrowIfAny(const std::string& ending = "") const;
 
  private:
   struct Message {
-    bool finished;        ///< text is all of it
-    std::string pointer;  ///< else: in front of it come file, line and pointer
+    bool finished;        ///< text is the complete message
+    std::string pointer;  ///< otherwise file, line and pointer precede the text
     std::string text;
     std::string cure = "";
-    std::vector<std::string> also = {};  ///< first places of others with this cure
-    std::size_t others = 0;              ///< how many there are
+    std::vector<std::string> also = {};  ///< first locations of other errors with this cure
+    std::size_t others = 0;              ///< number of these errors
   };
   Origins origins_;
   std::vector<Message> messages_;
   std::size_t more_ = 0;
 };
 
-/// Names in use and the index of each, found without a search.
+/// List of names with constant-time lookup of their indices.
 class NameList {
  public:
   NameList() = default;
@@ -136,13 +136,13 @@ class NameList {
   }
   NameList(std::initializer_list<std::string> names) : NameList(std::vector<std::string>(names)) {}
 
-  /// A name with the next index. Of equal names, which are an error of the file, the first counts;
-  /// the others are kept as empty ones.
+  /// Adds a name with the next index. Repeated names, which are errors of the file, are stored as
+  /// empty names.
   void Add(const std::string& name) {
     const bool first = indices_.emplace(name, names_.size()).second;
     names_.push_back(first ? name : "");
   }
-  /// The index of a name that is not empty, or nothing.
+  /// Returns the index of a name, or nothing if it is empty or unknown.
   std::optional<int> Find(const std::string& name) const {
     const auto found = indices_.find(name);
     if (name.empty() || found == indices_.end()) return std::nullopt;
@@ -155,12 +155,12 @@ class NameList {
   std::unordered_map<std::string, std::size_t> indices_;
 };
 
-/// The numbers a getter accepts.
+/// Range of numbers that a getter accepts.
 struct Range {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
-  bool above_min = false;     ///< min itself is refused
-  std::string_view why = "";  ///< of min, after it in messages: " (the spacing of doubles)"
+  bool above_min = false;     ///< min itself is excluded
+  std::string_view why = "";  ///< reason for min, appended in messages: " (the spacing of doubles)"
 
   bool Contains(double value) const {
     return (above_min ? value > min : value >= min) && value <= max;
@@ -169,13 +169,12 @@ struct Range {
   std::string Text() const;
 };
 
-inline constexpr int kMostInRange = 10000;  ///< numbers that one lin or log stands for
+inline constexpr int kMostInRange = 10000;  ///< maximum count of a lin or log range
 
 inline constexpr Range kPositive = {.min = 0.0, .above_min = true};
 inline constexpr Range kNotNegative = {.min = 0.0};
 
-/// One value of the document and its place. Refers to the document and to the error list, which
-/// must both outlive it.
+/// Value of a document with its location. The document and the error list must outlive it.
 class JsonNode {
  public:
   JsonNode(const Json& value, std::string pointer, ErrorList& errors)
@@ -183,54 +182,54 @@ class JsonNode {
 
   const Json& value() const { return *value_; }
 
-  /// Reports this value.
+  /// Reports this value as an error.
   void Fail(std::string_view expected, std::string_view suggestion = "") const;
-  /// Reports this place with a description of its own instead of the value.
+  /// Reports this location with the description `found` instead of the value.
   void FailAs(std::string_view found, std::string_view expected,
               std::string_view suggestion = "") const;
 
-  /// Reports this value, and what would make it and others like it right.
+  /// Reports this value, with a cure that may also correct similar errors.
   void FailWithCure(std::string_view cure, std::string_view expected) const;
 
-  /// True for an object. Reports anything else, and every key that is not in `known`.
+  /// Returns true for an object. Reports other values, and every key that is not in `known`.
   bool ExpectObject(const NameList& known) const;
-  /// The member, or nothing when it is absent or this is no object.
+  /// Returns the member, or nothing if it is absent or this is not an object.
   std::optional<JsonNode> Optional(const std::string& key) const;
-  /// The member; reports when it is absent. `expected` says what it would be.
+  /// Returns the member, or reports that it is absent. `expected` describes it.
   std::optional<JsonNode> Required(const std::string& key, std::string_view expected) const;
-  /// All members in the order of the file; reports when this is no object.
+  /// Returns all members in the order of the file; reports values that are not objects.
   std::vector<std::pair<std::string, JsonNode>> Members() const;
 
-  /// The elements of an array; reports anything else. `what` names them ("joints").
+  /// Returns the elements of an array; reports other values. `what` names the elements ("joints").
   std::vector<JsonNode> Elements(std::string_view what) const;
-  /// The elements of an array with at least one, or the value itself: `"x": 1` for `"x": [1]`.
+  /// Returns the elements of a non-empty array, or the value itself: `"x": 1` for `"x": [1]`.
   std::vector<JsonNode> OneOrMore(std::string_view what) const;
 
-  /// A number in the range; 0 after an error. JSON has no NaN and no infinity, and ParseDocument
-  /// refuses numbers that overflow, so it is finite.
+  /// Returns a number in the range, or 0 after an error. The number is finite: JSON has no NaN and
+  /// no infinity, and ParseDocument rejects overflow.
   double Number(const Range& range = {}) const;
-  /// An integer in [min, max]; 2.7 is an error, 1e3 is an integer. `min` after an error.
+  /// Returns an integer in [min, max], or `min` after an error. 2.7 is an error, 1e3 an integer.
   std::int64_t Integer(std::int64_t min, std::int64_t max) const;
   bool Bool() const;
-  /// A string with at least one character.
+  /// Returns a string with at least one character.
   std::string Text() const;
-  /// Two or three numbers; z = 0 when only two are given.
+  /// Returns a vector of two or three numbers; z = 0 if two are given.
   Eigen::Vector3d Vector() const;
-  /// Exactly `count` numbers.
+  /// Returns exactly `count` numbers.
   std::vector<double> Numbers(std::size_t count) const;
-  /// One number, a list of different numbers, or {"lin": [from, to, count]} or {"log": [from, to,
-  /// count]}, all in the range.
+  /// Returns one number, a list of different numbers, or a range {"lin": [from, to, count]} or
+  /// {"log": [from, to, count]}, all in the range.
   std::vector<double> NumberList(const Range& range = {}) const;
-  /// The same for integers in [min, max]; values of lin and log are rounded.
+  /// Returns integers in [min, max], as NumberList(); values of lin and log are rounded.
   std::vector<std::int64_t> IntegerList(std::int64_t min, std::int64_t max) const;
-  /// The numbers that {"lin": [from, to, count]} or {"log": [from, to, count]} stands for: evenly
-  /// spaced, in themselves or in their logarithms, both ends exact; 2 to kMostInRange of them.
+  /// Returns the numbers of {"lin": [from, to, count]} or {"log": [from, to, count]}: evenly spaced
+  /// linearly or logarithmically, with exact ends; count is 2 to kMostInRange.
   std::vector<double> Spaced(const Range& range = {}) const;
 
-  /// Index of this string in `known`; reports anything else with the nearest spelling. `what` names
-  /// the thing ("a body"). An enum is a choice among its names.
+  /// Returns the index of this string in `known`; reports other values with the nearest spelling.
+  /// `what` names the object ("a body").
   std::optional<int> Choice(const NameList& known, std::string_view what) const;
-  /// The same for one string or an array of different ones.
+  /// Returns the indices of one string or of an array of different strings, as Choice().
   std::vector<std::size_t> Choices(const NameList& known, std::string_view what) const;
 
   const std::string& pointer() const { return pointer_; }

@@ -11,7 +11,7 @@
 namespace loopbench::harness {
 namespace {
 
-/// Without a ".0" behind whole numbers, as a person writes them.
+/// Returns whole numbers without ".0".
 Json Plain(double number) {
   constexpr double kLargestPlain = 1e15;
   if (number == std::trunc(number) && std::abs(number) < kLargestPlain) {
@@ -118,7 +118,7 @@ Json ArraySchema(const Json& element, std::size_t least, std::size_t most) {
   if (least > 0) schema["minItems"] = least;
   if (most > 0) schema["maxItems"] = most;
   schema["items"] = element;
-  constexpr std::size_t kFew = 10;  // more is a limit for machines
+  constexpr std::size_t kFew = 10;  // larger values are technical limits
   std::string count = least > 1 ? fmt::format("{} ", least) : "";
   if (least > 0 && most > least && most < kFew) count = fmt::format("{} to {} ", least, most);
   if (least > 1 && most == 0) count += "or more ";
@@ -180,18 +180,18 @@ Json ObjectSchema(const std::string& sentence, const std::vector<FieldSchema>& f
   return object;
 }
 
-// A schema as a file for editors, and as tables for people.
+// Schema as a file for editors, and as tables for the documentation.
 
 namespace {
 
-/// Of a schema that Named() made.
+/// Returns the name of a schema from Named().
 std::string NameOf(const Json& reference) {
   const std::string path = reference["$ref"];
   return path.substr(path.rfind('/') + 1);
 }
 
-/// Takes out what is no word of draft 07: the schemas that Named() brought along, in the order of
-/// first use, and the words.
+/// Removes keys that are not in draft 07: the schemas from Named(), moved to `definitions` in the
+/// order of first use, and the words.
 void TakeOwn(Json* node, Json* definitions) {
   if (!node->is_structured()) return;
   if (node->is_object() && node->contains("$ref") && node->contains("schema")) {
@@ -199,7 +199,7 @@ void TakeOwn(Json* node, Json* definitions) {
     node->erase("schema");
     const std::string name = NameOf(*node);
     if (!definitions->contains(name)) {
-      (*definitions)[name] = nullptr;  // its place, before those that it refers to
+      (*definitions)[name] = nullptr;  // reserves its position before the schemas that it refers to
       TakeOwn(&named, definitions);
       (*definitions)[name] = std::move(named);
     }
@@ -210,7 +210,7 @@ void TakeOwn(Json* node, Json* definitions) {
   for (Json& child : *node) TakeOwn(&child, definitions);
 }
 
-/// As one cell of a table.
+/// Returns the text as a table cell.
 std::string Cell(const std::string& text) {
   std::string cell;
   for (const char c : text) cell += (c == '|' || c == '<' ? "\\" : "") + std::string(1, c);
@@ -232,7 +232,7 @@ std::string Table(const std::string& heading, const Json& object) {
   return text + '\n';
 }
 
-/// Tables of the objects within, in the order of first use, but for those among `done`.
+/// Adds tables of the contained objects in the order of first use, except objects in `done`.
 void AddTables(const Json& node, std::set<std::string>* done, std::string* text) {
   if (!node.is_structured()) return;
   const bool is_named = node.is_object() && node.contains("$ref") && node.contains("schema");

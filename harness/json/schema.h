@@ -1,8 +1,8 @@
-// JSON Schema, draft 07, as values: what fields.h says of a file, for editors and documents.
+// JSON Schema (draft 07) of the fields of a file, for editors and documentation.
 //
-// For the rooms that read JSON, like json_reader.h. Schemas here have two keys of their own, which
-// SchemaText() takes out: "words" says for people what a value may be, "schema" is what Named()
-// refers to, and goes under "definitions".
+// For modules that read JSON, like json_reader.h. Schemas have two additional keys, which
+// SchemaText() removes: "words" describes the value; "schema" is the target of Named(), moved to
+// "definitions".
 #pragma once
 
 #include <cstdint>
@@ -17,47 +17,47 @@ namespace loopbench::harness {
 Json NumberSchema(const Range& range = {});
 Json IntegerSchema(std::int64_t min, std::int64_t max);
 Json BoolSchema();
-/// A string that is not empty.
+/// Schema of a string that is not empty.
 Json TextSchema();
-/// A string that the regular expression finds.
+/// Schema of a string that matches the regular expression.
 Json PatternSchema(const std::string& expression);
-/// One of these words; one of them alone is a constant.
+/// Schema of one of these words; a single word is a constant.
 Json ChoiceSchema(const std::vector<std::string>& names);
-/// Two or three numbers.
+/// Schema of two or three numbers.
 Json VectorSchema();
-/// What JsonNode::NumberList and IntegerList take: one, several that are different, or a range.
+/// Schema for JsonNode::NumberList and IntegerList: one, several different numbers, or a range.
 Json NumberListSchema(const Range& range = {});
 Json IntegerListSchema(std::int64_t min, std::int64_t max);
-/// {"lin": [from, to, count]} or {"log": ...} with ends like `end`, which `positive` says are.
+/// Schema of {"lin": [from, to, count]} or {"log": ...}; `end`: schema of ends; `positive`: > 0.
 Json SpacedSchema(const Json& end, bool positive);
-/// An array of at least `least` elements and, unless it is 0, at most `most`.
+/// Schema of an array with at least `least` and, unless it is 0, at most `most` elements.
 Json ArraySchema(const Json& element, std::size_t least = 0, std::size_t most = 0);
-/// One, or an array of at least one (`different`: each once), or something else.
+/// Schema of one element, an array of one or more (`different`: each once), or `or_this`.
 Json OneOrMoreSchema(const Json& element, bool different = false, const Json& or_this = nullptr);
-/// An object with any keys, or at least `least`.
+/// Schema of an object with any keys, at least `least`.
 Json MapSchema(const Json& value, std::size_t least = 0);
-/// One of several.
+/// Schema of one of several alternatives.
 Json EitherSchema(const std::vector<Json>& alternatives);
-/// An object with these keys.
+/// Schema of an object that has these keys.
 Json Requires(const std::vector<std::string>& keys);
-/// A schema that has a name of its own and may stand in several places.
+/// Schema with a name, which several schemas may refer to.
 Json Named(const std::string& name, Json schema);
 
-/// One row of an object's fields. Without a name `schema` is what the object must satisfy besides.
+/// Field of an object. Without a name, `schema` is an additional condition on the object.
 struct FieldSchema {
   std::string name;
   Json schema;
   std::string sentence;
   bool required = false;
-  Json standard = nullptr;  ///< what it is where it is not there; null: said by the sentence
+  Json standard = nullptr;  ///< default; null: stated in the sentence
 };
-/// An object of these fields and no others.
+/// Returns the schema of an object with these fields only.
 Json ObjectSchema(const std::string& sentence, const std::vector<FieldSchema>& fields);
 
-/// The whole file configs/schema/*.schema.json, of an object's schema: lines of at most 100
-/// characters where that is possible.
+/// Returns the text of configs/schema/*.schema.json, with lines of at most 100 characters if
+/// possible.
 std::string SchemaText(const std::string& title, const Json& object);
-/// Markdown of kinds of files: a table of fields for each and one for each object in them.
+/// Returns Markdown tables of fields, one for each kind of file and for each object in it.
 std::string SchemaTables(const std::vector<std::pair<std::string, Json>>& kinds);
 
 }  // namespace loopbench::harness

@@ -30,22 +30,22 @@ bool IsQuantified(const Check& check) {
   return check.statistic == Statistic::kAll || check.statistic == Statistic::kAny;
 }
 
-// Rows of one selection, sorted by what they are good for.
+// Rows of one selection, counted by usability.
 struct Sample {
   std::vector<Record> rows;
-  std::vector<double> values;  // finite measures of the runs that count
+  std::vector<double> values;  // finite measures of usable runs
   std::size_t failed = 0, unmet = 0, missing = 0;
 };
 
 Sample Take(const Check& check, const Selection& selection, std::span<const Record> records) {
   const std::string& measure = check.demand.measure;
-  // where the outcome itself is examined, a run that failed is an observation and no defect
+  // if the outcome is checked, a failed run is a valid observation
   const bool examines_outcome =
       measure == "outcome" ||
       std::ranges::find(check.select, "outcome", &Condition::key) != check.select.end();
   Sample sample;
   std::vector<const Record*> selected;
-  std::set<std::string> kinds;  // those whose records may have the measure
+  std::set<std::string> kinds;  // kinds of records with the measure
   for (const Record& record : records) {
     if (!Matches(record, selection)) continue;
     selected.push_back(&record);
@@ -69,7 +69,7 @@ Sample Take(const Check& check, const Selection& selection, std::span<const Reco
   return sample;
 }
 
-// "2 of 3 runs failed", or "" when every row of the sample can be used.
+// Returns "2 of 3 runs failed", or "" if all rows of the sample are usable.
 std::string Defect(const Check& check, const Sample& sample) {
   const std::size_t rows = sample.rows.size();
   if (sample.failed > 0 && !check.failed_runs_hold) {
@@ -81,7 +81,7 @@ std::string Defect(const Check& check, const Sample& sample) {
   return "";
 }
 
-// "1 of 2 values missing or not finite", or "": nothing is decided by a sample that lacks some.
+// Returns "1 of 2 values missing or not finite", or "". Incomplete samples decide nothing.
 std::string NumbersMissing(const Sample& sample) {
   if (sample.missing == 0) return "";
   return fmt::format("{} of {} values missing or not finite", sample.missing, sample.rows.size());
@@ -94,7 +94,7 @@ double Apply(Statistic statistic, const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// Whether all values, or any of them, are as demanded.
+// Returns true if all values, or any value, meet the demand.
 template <typename Value>
 bool Quantify(const Check& check, const std::vector<Value>& values) {
   const auto meets = [&check](const Value& value) { return Meets(check.demand, value); };
@@ -102,7 +102,7 @@ bool Quantify(const Check& check, const std::vector<Value>& values) {
                                             : std::ranges::all_of(values, meets);
 }
 
-// Each of these says whether the demand is met, and the numbers.
+// HoldsOf...(): return true if the demand is met, with the numbers in `measured`.
 bool HoldsOfTexts(const Check& check, const Sample& sample, std::string* measured) {
   std::vector<std::string> words;
   std::map<std::string, int> counts;
@@ -115,7 +115,7 @@ bool HoldsOfTexts(const Check& check, const Sample& sample, std::string* measure
 }
 
 bool HoldsOfNumbers(const Check& check, const Sample& sample, std::string* measured) {
-  // all runs failed in a check that expects failure: there is no number, and it holds
+  // if all runs failed in a check that expects failure, it holds without a number
   bool holds = true;
   *measured = "no number";
   if (!sample.values.empty()) {
@@ -132,7 +132,7 @@ bool HoldsOfNumbers(const Check& check, const Sample& sample, std::string* measu
   return holds;
 }
 
-/// By how much times of these rows differ for the machine's sake alone; 1 of what is no time.
+/// Returns the ratio of machine speeds between these rows; 1 if the measure is not a time.
 double OtherSpeed(const Check& check, const Sample& above, const Sample& below) {
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
   for (const Sample* sample : {&above, &below}) {
@@ -199,7 +199,7 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
 }
 namespace {
 
-/// Reads `key` where the comparison uses it and reports it where it has no meaning.
+/// Reads `key` if the comparison uses it, otherwise reports it.
 std::optional<JsonNode> Belonging(const JsonNode& check, const std::string& key, bool belongs,
                                   const std::string& expected) {
   if (belongs) return check.Required(key, expected);
@@ -219,7 +219,7 @@ void ReadRelation(const JsonNode& node, Check& check) {
   check.demand.relation = kRelations[node.Choice(kRelationNames, "a comparison").value_or(0)];
 }
 
-/// What the comparison asks for, and what it and a ratio ask of the statistic.
+/// Reads the keys of the comparison and checks the statistic.
 void ReadDemand(const JsonNode& node, Check& check) {
   Demand& demand = check.demand;
   const bool words = demand.IsText(), within = demand.relation == Relation::kWithin;
@@ -251,37 +251,38 @@ constexpr const char* kDemandRules = R"({"allOf": [
 
 const Fields<Check>& CheckFields() {
   static const Fields<Check> fields(
-      "check", "A demand on a statistic of some records.",
-      {{"label", Text(&Check::label), "The condition in words.", kAnyText},
-       {"select", SelectionOf(&Check::select), "Which records.", "an object of keys and values"},
+      "check", "Condition on a statistic of selected records.",
+      {{"label", Text(&Check::label), "Condition in words.", kAnyText},
+       {"select", SelectionOf(&Check::select), "Selected records.", "an object of keys and values"},
        {"relative_to", SelectionOf(&Check::relative_to, 1),
-        "Records by whose statistic that of the selected ones is divided."},
+        "Records whose statistic divides the statistic of the selected records."},
        {"require", SelectionOf(&Check::require, 1),
-        "What every selected record must also satisfy, or the check fails."},
-       {"measure", By(TextSchema(), ReadMeasure), "A key of the records.", kAnyText},
+        "Conditions on every selected record; otherwise the check fails."},
+       {"measure", By(TextSchema(), ReadMeasure), "Key of the records.", kAnyText},
        {"statistic", Choice(&Check::statistic, {"max", "min", "mean", "all", "any"}, "a statistic"),
-        "Of the selected records.", "a statistic"},
-       {"compare", By(ChoiceSchema(kRelationNames.all()), ReadRelation), "How.", "a comparison"},
-       {"threshold", NumberSchema(), "Of <=, >= and within."},
-       {"tolerance", NumberSchema(kNotNegative), "Of within: how far from the threshold."},
-       {"word", TextSchema(), "Of is and is-not."},
+        "Statistic over the selected records.", "a statistic"},
+       {"compare", By(ChoiceSchema(kRelationNames.all()), ReadRelation), "Relation.",
+        "a comparison"},
+       {"threshold", NumberSchema(), "Threshold of <=, >= and within."},
+       {"tolerance", NumberSchema(kNotNegative), "Tolerance of within, around the threshold."},
+       {"word", TextSchema(), "Word of is and is-not."},
        {"", By(Json::parse(kDemandRules), ReadDemand)},
        {"failed_runs", Choice(&Check::failed_runs_hold, {"fail", "hold"}, "what a failed run does"),
-        "Hold: of a check that expects failure, a run that did not finish holds."}});
+        "hold: runs that did not finish satisfy a check that expects failure."}});
   return fields;
 }
 
 const Fields<Wording>& WordingFields() {
   static const Fields<Wording> fields(
-      "wording", "What a verdict says instead of its own words.",
-      {{"reproduced", Text(&Wording::reproduced), "All checks hold."},
-       {"not_reproduced", Text(&Wording::not_reproduced), "None holds."},
-       {"partially_reproduced", Text(&Wording::only_under), "Some hold."},
-       {"not_measured", Text(&Wording::not_measured), "There are no records."}});
+      "wording", "Sentences that are printed after the verdict.",
+      {{"reproduced", Text(&Wording::reproduced), "Sentence if all checks hold."},
+       {"not_reproduced", Text(&Wording::not_reproduced), "Sentence if no check holds."},
+       {"partially_reproduced", Text(&Wording::only_under), "Sentence if some checks hold."},
+       {"not_measured", Text(&Wording::not_measured), "Sentence if no check was measured."}});
   return fields;
 }
 
-/// A rule and what it selects for all its checks.
+/// Rule with the common selection of its checks.
 struct RuleInFile : ClaimRule {
   Selection common;
 };
@@ -302,13 +303,13 @@ void ReadChecks(const JsonNode& node, RuleInFile& rule) {
 
 const Fields<RuleInFile>& RuleFields() {
   static const Fields<RuleInFile> fields(
-      "claim", "What is claimed, and the checks that decide about it.",
-      {{"id", Text(&ClaimRule::id), "One that no other claim has.", kAnyText},
-       {"claim", Text(&ClaimRule::claim), "What is claimed, in a sentence.", kAnyText},
-       {"where", Text(&ClaimRule::where), "Where it is claimed.", kAnyText},
+      "claim", "A claim and its checks, which must all hold.",
+      {{"id", Text(&ClaimRule::id), "Unique identifier of the claim.", kAnyText},
+       {"claim", Text(&ClaimRule::claim), "The claim in one sentence.", kAnyText},
+       {"where", Text(&ClaimRule::where), "Section or figure that makes the claim.", kAnyText},
        {"note", Text(&ClaimRule::note), "Origin of the thresholds."},
-       {"select", SelectionOf(&RuleInFile::common, 1), "Joins the selection of every check."},
-       {"checks", By(ArraySchema(CheckFields().Schema(), 1), ReadChecks), "All must hold.",
+       {"select", SelectionOf(&RuleInFile::common, 1), "Selection that is added to every check."},
+       {"checks", By(ArraySchema(CheckFields().Schema(), 1), ReadChecks), "Checks.",
         "an array of checks"},
        {"wording", Object(&ClaimRule::wording, WordingFields())}});
   return fields;
@@ -331,11 +332,10 @@ void ReadRules(const JsonNode& node, ClaimsFile& file) {
 const Fields<ClaimsFile>& ClaimsFields() {
   static const Fields<ClaimsFile> fields(
       "claims",
-      "Rules that turn stored records into verdicts (loopbench check-claims). The program checks "
-      "more "
-      "than this schema: that ids, and labels of one claim, are different.",
+      "Rules that turn stored records into verdicts (loopbench check-claims). The program also "
+      "checks that ids, and labels of one claim, are different.",
       DocumentRows<ClaimsFile>({{"claims", By(ArraySchema(RuleFields().Schema()), ReadRules),
-                                 "One after the other.", "an array of claims"}}));
+                                 "List of claims.", "an array of claims"}}));
   return fields;
 }
 
@@ -407,7 +407,7 @@ std::string ClaimsMarkdown(std::span<const ClaimResult> results,
   return out + (notes.empty() ? "" : "\n");
 }
 
-// The verdict on a claim, from the states of its checks.
+// Verdict on a claim, from the states of its checks.
 
 namespace {
 

@@ -1,4 +1,4 @@
-// Claims on stored records: their file, verdicts and report.
+// Claims about stored records: their file, verdicts and report.
 #pragma once
 
 #include <cstddef>
@@ -18,26 +18,25 @@ namespace loopbench::harness {
 // Verdicts on claims, computed from records by rules.
 //
 // A rule (configs/experiments/paper/claims.json) restates one claim as checks. Each check selects
-// records, takes a statistic of one measure and compares it with a threshold. The verdict follows
-// from the checks alone, so that other data turn it and nobody writes it by hand.
+// records, takes a statistic of one measure and compares it with a threshold. The verdict depends
+// on the checks only and is never written by hand.
 
-/// What is made of the selected rows: one number (max, min, mean), or a demand on every row or on
-/// at least one.
+/// Statistic of the selected rows: one number (max, min, mean), or a demand on every row or on at
+/// least one row.
 enum class Statistic { kMax, kMin, kMean, kAll, kAny };
 
-/// One condition under which the claim is examined: a demand on the statistic of some records.
+/// Condition of a claim: a demand on a statistic of selected records.
 struct Check {
   std::string label;      ///< the condition in words: "square four-bar, joint coordinates"
-  Selection select;       ///< which records
-  Selection relative_to;  ///< when not empty: the statistic is divided by that of these records
-  Selection require;      ///< what every selected record must also satisfy, or the check fails
+  Selection select;       ///< selection of records
+  Selection relative_to;  ///< if not empty: records whose statistic is the divisor
+  Selection require;      ///< conditions on every selected record; otherwise the check fails
   Demand demand;          ///< without `of` and `when`
   Statistic statistic = Statistic::kMax;
-  bool failed_runs_hold =
-      false;  ///< for checks that expect failure: a run that did not finish holds
+  bool failed_runs_hold = false;  ///< for checks that expect failure: unfinished runs hold
 };
 
-/// A sentence for each verdict, printed after it. Empty sentences are left out.
+/// Sentence for each verdict, printed after it. Empty sentences are left out.
 struct Wording {
   std::string reproduced;
   std::string not_reproduced;
@@ -45,31 +44,31 @@ struct Wording {
   std::string not_measured;
 };
 
-/// One claim of the paper and how it is examined.
+/// Claim of the paper with its checks.
 struct ClaimRule {
   std::string id;
-  std::string claim;  ///< in our own words
+  std::string claim;  ///< claim in one sentence
   std::string where;  ///< section or figure of the paper
-  std::string note;   ///< where the thresholds come from
+  std::string note;   ///< origin of the thresholds
   std::vector<Check> checks;
   Wording wording;
 };
 
 enum class CheckState { kHolds, kFails, kNotMeasured };
 
-/// What one check found.
+/// Result of a check.
 struct CheckResult {
   std::string label;
   CheckState state = CheckState::kNotMeasured;
-  std::size_t rows = 0;  ///< records examined, both sides of a ratio
+  std::size_t rows = 0;  ///< number of records, both sides of a ratio
   std::string measured;  ///< the numbers: "2.02 (1.98 .. 2.05)", "finished (3)"
   std::string expected;  ///< the demand: "mean growth_exponent = 2 +- 0.15"
-  std::string reason;    ///< why it fails or is not measured, beyond the numbers
+  std::string reason;    ///< reason for failing or missing measurement, in addition to the numbers
 };
 
 enum class Verdict { kReproduced, kNotReproduced, kOnlyUnder, kNotMeasured };
 
-/// A rule with what its checks found.
+/// Rule with the results of its checks.
 struct ClaimResult {
   ClaimRule rule;
   std::vector<CheckResult> checks;
@@ -77,46 +76,46 @@ struct ClaimResult {
   std::string text;  ///< verdict, conditions and wording, ready to print
 };
 
-/// Examines one check. Records of a kind of which none that matches `select` has the measure
-/// (timing next to drift) do not count, unless their run failed. With no record left the state is
-/// kNotMeasured, never kHolds. A run that did not finish (an "outcome" other than "finished") or a
-/// record that misses `require` makes the check fail. Failed runs are admitted where the check
-/// measures or selects the outcome, or where failed_runs_hold. Otherwise a value that is missing or
-/// not finite leaves the check kNotMeasured: it may decide. A ratio of times is kNotMeasured if a
-/// change of the machine's speed between them, measured by the yardstick, may decide it.
+/// Evaluates one check. Kinds of records without the measure (timing for a drift check) are
+/// ignored, unless their run failed. If no record is left, the state is kNotMeasured, never kHolds.
+/// An unfinished run ("outcome" other than "finished") or a record that violates `require` makes
+/// the check fail. Failed runs are allowed if the check measures or selects the outcome, or if
+/// failed_runs_hold. A missing or non-finite value makes the check kNotMeasured, because it may be
+/// decisive. A ratio of times is kNotMeasured if a change of the machine's speed between them,
+/// measured by the yardstick, may decide it.
 CheckResult Evaluate(const Check& check, std::span<const Record> records);
 
-/// Examines all checks of a rule. All hold: reproduced. None holds and at least one fails: not
-/// reproduced. No check was measured: not measured. Everything else is "only under", naming the
-/// checks that hold, those that fail and those not measured.
+/// Evaluates all checks of a rule. All hold: reproduced. None holds and at least one fails: not
+/// reproduced. No check was measured: not measured. Otherwise "partially reproduced", with the
+/// checks that hold, fail and are not measured.
 ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records);
 
-/// "reproduced", "not reproduced", "only under", "not measured".
+/// Returns "reproduced", "not reproduced", "partially reproduced" or "not measured".
 std::string_view ToString(Verdict verdict);
 /// "holds", "fails", "not measured".
 std::string_view ToString(CheckState state);
 
-// Reads the rules that turn results into verdicts (configs/experiments/paper/claims.json).
-// What such a file may hold: docs/fields.md, claims.
+// Reads the rules that turn results into verdicts (configs/experiments/paper/claims.json). Keys of
+// the file: docs/fields.md, claims.
 
-/// Reads a file. Throws ConfigError with all mistakes in it (unknown keys, wrong types, a threshold
-/// missing or out of place, an id or a label used twice), each with file, JSON Pointer, value found
-/// and what was expected.
+/// Reads a file. Throws ConfigError with all errors (unknown keys, wrong types, missing or
+/// misplaced thresholds, repeated ids or labels), each with file, JSON Pointer, found and expected
+/// value.
 std::vector<ClaimRule> ReadClaims(const std::filesystem::path& path);
 
-/// The same from text; `file` is the name used in messages.
+/// Reads rules from text; `file` is the name used in messages.
 std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& file);
 
-// Verdicts as a page: every claim with its verdict, and below it the numbers it follows from.
+// Page of verdicts: every claim with its verdict and the measured numbers.
 
-/// One row per claim: id, claim, place in the paper, verdict.
+/// Returns one row per claim: id, claim, section of the paper, verdict.
 Table VerdictTable(std::span<const ClaimResult> results);
 
-/// One row per check of a claim: condition, expected, measured, number of rows, result, reason.
+/// Returns a row per check of a claim: condition, expected, measured, rows, result, reason.
 Table CheckTable(const ClaimResult& result);
 
-/// All verdicts as Markdown (results/paper/README.md), `notes` (provenance, the command) at the
-/// end.
+/// Returns all verdicts as Markdown (results/paper/README.md), with `notes` (provenance, command)
+/// at the end.
 std::string ClaimsMarkdown(std::span<const ClaimResult> results,
                            const std::vector<std::string>& notes);
 

@@ -27,7 +27,7 @@ struct Pair {
   const Record& base;
   const Record& fresh;
   bool same_arithmetic, same_machine;
-  bool same_settings;  ///< else equal bits are not expected
+  bool same_settings;  ///< otherwise equal bits are not expected
 };
 
 /// A judgement with its reason.
@@ -44,7 +44,7 @@ Ruling OfTexts(Rule rule, const std::string& base, const std::string& fresh) {
     return Meets(ends_well, fresh) ? Ruling{Judgement::kBetter, "failed before"}
                                    : Ruling{Judgement::kWorse, "ends otherwise"};
   }
-  // worse with a reason for doubt that BASE did not have, better without one
+  // worse with a warning that BASE does not have, better without a warning of BASE
   const auto codes = [](const std::string& text) {
     std::istringstream words(text);
     return std::set<std::string>(std::istream_iterator<std::string>(words), {});
@@ -75,7 +75,7 @@ Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* findi
   finding->ratio = fresh / base;
   switch (finding->measure.rule) {
     case Rule::kError: {
-      // round-off has no size worth comparing
+      // round-off is not compared
       const double floor = options.error_floor;
       finding->ratio = std::max(std::abs(fresh), floor) / std::max(std::abs(base), floor);
       return OfRatio(finding->ratio,
@@ -91,8 +91,8 @@ Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* findi
   return base == fresh ? Ruling{} : Ruling{Judgement::kWorse, "must be equal"};
 }
 
-/// Samples of at least three times that do not overlap, with a gap of half of their size. No rank
-/// test of few repetitions can decide among many times, and no noise of one machine is so large.
+/// Returns true if samples of at least three times are separated by a factor of 1.5. Rank tests of
+/// few repetitions cannot decide among many times, and noise of one machine is smaller.
 bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh) {
   constexpr std::size_t kFewest = 3;
   constexpr double kGap = 1.5;
@@ -102,7 +102,7 @@ bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh)
   return fresh_least > kGap * base_most || base_least > kGap * fresh_most;
 }
 
-/// Leaves the unadjusted p of "different by more than the ratio" in the finding; Holm decides.
+/// Stores the unadjusted p of "different by more than the ratio" in the finding, for Holm's method.
 void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding) {
   const std::vector<double>& base = pair.base.Numbers(finding->measure.key);
   const std::vector<double>& fresh = pair.fresh.Numbers(finding->measure.key);
@@ -120,8 +120,7 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
   finding->is_apart = AreApart(base, fresh);
 }
 
-/// Of a pair of which a side lacks the measure, or holds what it is not made of; nothing when both
-/// have it.
+/// Returns the ruling for a missing or invalid measure; nothing if both sides have it.
 std::optional<Ruling> OfWhatIsMissing(const Pair& pair, const Measure& measure) {
   const Held base = HeldBy(pair.base, measure), fresh = HeldBy(pair.fresh, measure);
   if (base == Held::kFit && fresh == Held::kFit) return std::nullopt;
@@ -134,7 +133,7 @@ std::optional<Ruling> OfWhatIsMissing(const Pair& pair, const Measure& measure) 
                                    : Ruling{Judgement::kDifferent, "not in BASE"};
   }
   const char* side = base != Held::kUnfit ? "NEW" : fresh != Held::kUnfit ? "BASE" : "BASE and NEW";
-  // a run that failed on both sides in one way may well end in NaN on both
+  // a run that failed equally on both sides may give NaN on both
   const bool failed_alike = base_failed && fresh_failed &&
                             Shown(pair.base, measure.key) == "null" &&
                             Shown(pair.fresh, measure.key) == "null";
@@ -144,7 +143,7 @@ std::optional<Ruling> OfWhatIsMissing(const Pair& pair, const Measure& measure) 
                 fmt::format("in {}: expected {}", side, Expected(measure.rule))};
 }
 
-/// Why values that both sides have cannot be compared; "" when they can.
+/// Returns the reason why values cannot be compared, or "".
 std::string ObstacleOf(const Measure& measure, const Pair& pair) {
   if (measure.rule == Rule::kTime && !pair.same_machine) {
     return OriginOf(pair.base).machine.empty() || OriginOf(pair.fresh).machine.empty()
@@ -152,7 +151,7 @@ std::string ObstacleOf(const Measure& measure, const Pair& pair) {
                : "another machine";
   }
   const double speed = YardstickOf(pair.fresh, measure.key) / YardstickOf(pair.base, measure.key);
-  // not where it is not known; another compiler may make other instructions of it
+  // only if known and compiled equally; compilers may generate different instructions
   const bool is_equal_work = OriginOf(pair.base).compiler == OriginOf(pair.fresh).compiler;
   if (is_equal_work && (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed)) {
     return fmt::format("the machine took {:.3g} of the time for equal work", speed);
@@ -201,7 +200,7 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
   std::vector<Finding*> times;
   std::vector<double> p;
   for (Finding& finding : *findings) {
-    if (std::isnan(finding.p)) continue;  // no time, or not tested
+    if (std::isnan(finding.p)) continue;  // not a time, or not tested
     times.push_back(&finding);
     p.push_back(finding.p);
   }
@@ -210,7 +209,7 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
   for (std::size_t i = 0; i < times.size(); ++i) {
     Finding& finding = *times[i];
     finding.p = adjusted[i];
-    // medians that are both zero have no ratio, and no difference
+    // two zero medians have no ratio and no difference
     const bool is_sure = finding.p <= options.alpha;
     if ((is_sure || finding.is_apart) && !std::isnan(finding.ratio)) {
       finding.judgement = finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter;
@@ -223,8 +222,8 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
   }
 }
 
-/// Doubts of accuracy runs that each record has by itself: what runs beside it say depends on the
-/// store.
+/// Restricts warnings of accuracy runs to warnings from the record alone: comparisons with other
+/// runs depend on the store.
 std::vector<Record> WithOwnDoubts(std::vector<Record> records) {
   for (Record& record : records) {
     if (record.Text("kind") == "accuracy") record.Set("warnings", OwnDoubts(record));

@@ -1,10 +1,8 @@
-// Whether new measurements are as good as those of a base: the gate of CI, and of anyone who
-// changes code.
+// Comparison of new measurements with a base, used as the gate of CI.
 //
-// Counts and hashes are held against each other exactly, errors and instructions by their ratio,
-// times by a test, and never those of two machines. What could not be compared is said, with the
-// reason, and is never taken for "the same": a value that one side lacks, or that is not what its
-// measure is made of, is a difference.
+// Counts and hashes are compared exactly, errors and instructions by their ratio, times by a
+// statistical test on one machine only. Incomparable values are reported with the reason, never
+// counted as equal. A missing or invalid value is a difference.
 #pragma once
 
 #include <limits>
@@ -17,62 +15,64 @@
 namespace loopbench::harness {
 
 struct CompareOptions {
-  double error_ratio = 1.05;  ///< of errors, under one arithmetic: equal code gives equal bits
-  /// The same if the arithmetic differs. Different round-off moves steps, and drift with them.
+  double error_ratio =
+      1.05;  ///< limit for errors with equal arithmetic: equal code gives equal bits
+  /// Limit for errors if the arithmetic differs: different round-off changes steps and drift.
   double error_ratio_other = 1.5;
-  /// Errors below it are round-off and equal: above the largest round-off drift of 100 s of the
-  /// paper's scenes, 2e-12 m.
+  /// Errors below it count as equal round-off. It exceeds the largest round-off drift of the
+  /// paper's problems in 100 s, 2e-12 m.
   double error_floor = 1e-11;
-  double instruction_ratio = 1.02;  ///< far above what an unchanged build shows, which is nothing
-  double time_ratio = 1.02;         ///< smaller effects are not worth a message
+  double instruction_ratio = 1.02;  ///< an unchanged build shows no difference
+  double time_ratio = 1.02;         ///< smaller effects are not reported
   double alpha = 0.05;              ///< probability of any false alarm among all times
   std::vector<std::string> only;    ///< groups (GroupNames()); empty: all
   bool subset = false;              ///< NEW may lack cases of BASE
   bool added = false;               ///< NEW may have cases that BASE lacks
-  /// Keys by which cases of BASE and NEW meet; all other settings may differ. Empty: by all keys
-  /// and the content.
+  /// Keys by which cases of BASE and NEW are matched; all other settings may differ. Empty: all
+  /// keys and the content.
   std::vector<std::string> match;
 };
 
 enum class Judgement {
   kSame,
   kBetter,
-  kWorse,      ///< also what BASE has and NEW has lost or holds as no value of the measure
-  kDifferent,  ///< only in NEW, or no value of the measure in BASE: neither better nor worse
+  kWorse,      ///< also a value of BASE that is missing or invalid in NEW
+  kDifferent,  ///< only in NEW, or invalid in BASE: neither better nor worse
   kNotMeasured,
 };
 std::string_view ToString(Judgement judgement);
 
-/// One measure of one case.
+/// Result for one measure of one case.
 struct Finding {
   std::string one = {};  ///< the case
   Measure measure = {};
   Judgement judgement = Judgement::kSame;
   std::string base = {}, fresh = {};  ///< as printed: numbers, medians, hashes
-  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< new / base, where it says anything
-  double p = std::numeric_limits<double>::quiet_NaN();      ///< of times: adjusted by Holm
-  double least_p = 0.0;   ///< of times: the least that samples of their sizes can give, unadjusted
-  bool is_apart = false;  ///< of times: the samples are too far apart for any chance (compare.cpp)
+  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< new / base, if meaningful
+  double p = std::numeric_limits<double>::quiet_NaN();      ///< for times: p-value adjusted by Holm
+  double least_p = 0.0;   ///< for times: smallest possible p-value of the sample sizes, unadjusted
+  bool is_apart = false;  ///< for times: separated samples (compare.cpp)
   bool on_both = true;    ///< both sides have a value of the measure
-  std::string why = {};   ///< the rule it broke, or the reason why it was not measured
+  std::string why = {};   ///< violated rule, or reason for kNotMeasured
 };
 
 struct ComparisonReport {
   std::vector<Finding> findings;        ///< all, in the order of BASE
   std::vector<std::string> only_base;   ///< cases that NEW lacks
   std::vector<std::string> only_fresh;  ///< cases that BASE lacks
-  std::vector<std::string> ambiguous;   ///< cases that one side holds twice, so not compared
-  /// Cases of equal keys that ran something else (case_id: mechanism, limits, ensemble, ...), so
-  /// not compared.
+  std::vector<std::string> ambiguous;   ///< cases that occur twice on one side, not compared
+  /// Cases with equal keys but different content (case_id: mechanism, limits, ensemble, ...), not
+  /// compared.
   std::vector<std::string> other_content;
-  /// Compared all the same, by options.match: the case and what differs (OtherSettings).
+  /// Cases compared by options.match, with their differences (OtherSettings).
   std::vector<std::string> other_settings;
 
   int Count(Judgement judgement, std::string_view group = "") const;
-  /// Why the comparison decides nothing, or "": no value was compared, no time of those that both
-  /// sides have, or cases are missing (unless options allow it), ambiguous or of other content.
+  /// Returns the reason why the comparison is inconclusive, or "": no value or no common time was
+  /// compared, or cases are missing (unless allowed by options), ambiguous or of other content.
   std::string Obstacle(const CompareOptions& options) const;
-  /// 1: something is worse or different. 2: there is an Obstacle(). 0: the same or better.
+  /// Returns 1 if a value is worse or different, 2 if there is an Obstacle(), 0 if all are equal or
+  /// better.
   int ExitCode(const CompareOptions& options) const;
 };
 

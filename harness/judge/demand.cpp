@@ -11,14 +11,14 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Records begin with what names their case (CaseKeys); one of these ends it.
+/// Returns true for keys that end the case keys (CaseKeys) at the start of a record.
 bool EndsCase(std::string_view key) {
   return key == "case_id" || key == "id" || key == "version" || key == "outcome";
 }
 
 bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
 
-/// The group that `--only` and the summary name, and what values the rule is for.
+/// Group of a rule (`--only`, summary), and its valid values.
 struct Facts {
   std::string_view group, expected;
 };
@@ -49,7 +49,7 @@ Facts FactsOf(Rule rule) {
 void AppendKey(const Record& record, const std::string& key, std::string* text) {
   const std::string shown = record.Text(key);
   if (shown.empty()) return;
-  // names speak for themselves, numbers do not
+  // names are clear without a key, numbers are not
   const bool is_name = std::holds_alternative<std::string>(*record.Find(key));
   *text += (text->empty() ? "" : " ") + (is_name ? shown : key + " " + shown);
 }
@@ -151,7 +151,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// How far beyond its limit a value is.
+// Returns the value relative to its limit.
 double Ratio(const Demand& demand, double value, double limit) {
   switch (demand.relation) {
     case Relation::kAtMost:

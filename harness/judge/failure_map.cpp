@@ -33,7 +33,7 @@ CellState StateOfEnding(const std::string& outcome) {
   return known == kRunEndings.end() ? CellState::kBroken : known->state;
 }
 
-// Which of two judgements decides a cell: the greater one. Runs that stopped compare by when.
+// Returns the rank of a run; the greatest decides a cell. Stopped runs are ranked by time.
 auto Badness(const MapCell& cell) {
   return std::tuple(cell.state, std::isnan(cell.decided.ratio) ? 0.0 : cell.decided.ratio,
                     std::isnan(cell.t_reached) ? 0.0 : -cell.t_reached);
@@ -74,7 +74,7 @@ std::vector<std::string> UnknownKeys(const MapRules& rules, std::span<const Reco
   return remarks;
 }
 
-// A run that ended otherwise than is right.
+// Evaluates a run with an unexpected outcome.
 void JudgeEnding(const MapRow& row, const Record& record, MapCell* cell) {
   cell->state = StateOfEnding(cell->outcome);
   cell->word = cell->state == CellState::kInaccurate ? ToString(cell->state) : cell->outcome;
@@ -111,7 +111,7 @@ MapCell JudgeRun(const MapRow& row, const Record& record) {
       lacking = judged.reason;
       continue;
     }
-    // of those that are met the closest to its limit decides, until one is not
+    // the met demand closest to its limit decides, unless a demand is not met
     if (judged.met ? beyond.empty() && !(judged.ratio <= cell.decided.ratio)
                    : beyond.empty() || judged.ratio > cell.decided.ratio) {
       cell.decided = judged;
@@ -246,7 +246,7 @@ Json EndingsSchema() {
   return Named("endings", OneOrMoreSchema(ChoiceSchema(EndingNames().all())));
 }
 
-/// A demand, and how the runs may end that it is made on.
+/// Demand with the expected outcomes of its row.
 struct DemandOfRow : Demand {
   const std::vector<std::string>* right = nullptr;
 };
@@ -260,7 +260,7 @@ void ReadNumber(const JsonNode& node, DemandOfRow& demand) {
     if (!number) continue;
     if (++found > 1) number->Fail("one of \"limit\", \"at_least\" and \"equal\"");
     demand.relation = relation;
-    // ratios to a limit of 0 say nothing; what must be 0 is "equal" to it
+    // ratios to a limit of 0 are meaningless; "equal" allows 0
     demand.number = number->Number(relation == Relation::kEqual ? Range{} : kPositive);
   }
   if (found == 0 && node.value().is_object()) {
@@ -288,17 +288,16 @@ const Fields<DemandOfRow>& DemandFields() {
   static const Json one_number = {
       {"oneOf", {Requires({"limit"}), Requires({"at_least"}), Requires({"equal"})}}};
   static const Fields<DemandOfRow> fields(
-      "demand", "A measure and the number it is held to.",
-      {{"measure", Text(&Demand::measure), "A key of the records.", kAnyText},
-       {"limit", NumberSchema(kPositive), "At most this."},
-       {"at_least", NumberSchema(kPositive), "At least this."},
-       {"equal", NumberSchema(), "Exactly this."},
-       {"relative_to", Text(&Demand::of),
-        "The number counts this many times another key of the record."},
+      "demand", "A measure and its limit.",
+      {{"measure", Text(&Demand::measure), "Key of the records.", kAnyText},
+       {"limit", NumberSchema(kPositive), "Largest allowed value."},
+       {"at_least", NumberSchema(kPositive), "Smallest allowed value."},
+       {"equal", NumberSchema(), "Required value."},
+       {"relative_to", Text(&Demand::of), "Key of the record whose value multiplies the number."},
        {"when", By(EndingsSchema(), ReadWhen),
-        "Endings of runs that it applies to, default finished."},
-       {"name", Text(&Demand::name), "A short word for cells."},
-       {"unit", Text(&Demand::unit), "Of the measure, for cells."},
+        "Outcomes of runs to which it applies; default: finished."},
+       {"name", Text(&Demand::name), "Short name for cells."},
+       {"unit", Text(&Demand::unit), "Unit of the measure, for cells."},
        {"", By(Json::object(), CheckWhen)},
        {"", By(one_number, ReadNumber)}});
   return fields;
@@ -315,7 +314,7 @@ std::vector<Demand> ReadDemands(const JsonNode& node, const std::vector<std::str
   return demands;
 }
 
-/// A row, or what a group says of its rows, and the labels of the columns.
+/// Row, or common values of a group's rows, with the labels of columns.
 struct RowOfMap : MapRow {
   const NameList* columns = nullptr;
 };
@@ -331,7 +330,7 @@ void ReadNotApplicable(const JsonNode& reasons, RowOfMap* row) {
   if (!reasons.ExpectObject(*row->columns)) return;
   for (const auto& [column, reason] : reasons.Members()) {
     row->not_applicable[column] = reason.Text();
-    const auto index = row->columns->Find(column);  // what a group demands of all its rows
+    const auto index = row->columns->Find(column);  // overrides the group's "required"
     if (index) row->must_hold[static_cast<std::size_t>(*index)] = false;
   }
 }
@@ -348,7 +347,7 @@ void ReadMustHold(const JsonNode& demanded, RowOfMap* row) {
   const bool is_list = demanded.value().is_array();
   for (const JsonNode& element :
        is_list ? demanded.Elements("column labels") : std::vector<JsonNode>{demanded}) {
-    const auto column = element.Choice(*row->columns, "\"all\" or a column");
+    const auto column = element.Choice(*row->columns, "\"all\" or a method");
     if (!column) continue;
     row->must_hold[static_cast<std::size_t>(*column)] = true;
     if (row->not_applicable.contains(columns[static_cast<std::size_t>(*column)])) {
@@ -359,8 +358,8 @@ void ReadMustHold(const JsonNode& demanded, RowOfMap* row) {
 
 constexpr std::int64_t kMostCases = 1'000'000;
 
-/// What groups and rows may say; `row` holds what the group said. Some keys look at others, so they
-/// are read in an order of their own.
+/// Reads the common keys of groups and rows; `row` contains the group's values. Some keys depend on
+/// others, so the order is fixed.
 void ReadShared(const JsonNode& node, RowOfMap* row) {
   if (const auto select = node.Optional("select")) {
     const Selection own = ReadSelection(*select, 1);
@@ -374,26 +373,26 @@ void ReadShared(const JsonNode& node, RowOfMap* row) {
     row->cases = static_cast<std::size_t>(cases->Integer(1, kMostCases));
   }
   if (const auto why = node.Optional("rationale")) row->why = why->Text();
-  // without columns everything that names one would be a mistake, and none of its own
+  // without columns, every reference to a column would be a consequential error
   if (row->columns->all().empty()) return;
   if (const auto reasons = node.Optional("not_applicable")) ReadNotApplicable(*reasons, row);
   if (const auto demanded = node.Optional("required")) ReadMustHold(*demanded, row);
 }
 
-/// The rows of ReadShared() behind others.
+/// Returns `rows` followed by the rows of ReadShared().
 template <class T>
 std::vector<Field<T>> WithShared(std::vector<Field<T>> rows) {
   const Json text = TextSchema();
   const std::vector<Field<T>> shared = {
-      {"select", SelectionSchema(1), "Which records, with those of the group and the column."},
-      {"criteria", ArraySchema(DemandFields().Schema()), "Measures that must all be as demanded."},
-      {"expected_outcome", EndingsSchema(), "How a run may end, default finished."},
+      {"select", SelectionSchema(1), "Selection of records, added to the group's and method's."},
+      {"criteria", ArraySchema(DemandFields().Schema()), "Criteria that must all be met."},
+      {"expected_outcome", EndingsSchema(), "Expected outcomes of a run; default: finished."},
       {"required", EitherSchema({text, ArraySchema(text)}),
-       "\"all\" or labels of methods, for --fail-on required."},
+       "\"all\" or labels of methods that must pass, for --fail-on required."},
       {"not_applicable", EitherSchema({text, MapSchema(text)}),
-       "Why a column has no record here, by its label, or one reason for all that need not hold."},
-      {"cases", IntegerSchema(1, kMostCases), "How many records there should be, default 1."},
-      {"rationale", text, "Where the limits come from."}};
+       "Reason for missing records, by method label, or one reason for all methods not required."},
+      {"cases", IntegerSchema(1, kMostCases), "Expected number of records; default: 1."},
+      {"rationale", text, "Origin of the limits."}};
   rows.insert(rows.end(), shared.begin(), shared.end());
   return rows;
 }
@@ -416,8 +415,8 @@ void ReadRow(const JsonNode& node, RowOfMap& row) {
 
 const Fields<RowOfMap>& RowFields() {
   static const Fields<RowOfMap> fields(
-      "row", "An extreme, and what decides about it.",
-      WithShared<RowOfMap>({{"label", Text(&MapRow::label), "Its name.", kAnyText},
+      "row", "A stress test and its criteria.",
+      WithShared<RowOfMap>({{"label", Text(&MapRow::label), "Name of the row.", kAnyText},
                             {"", By(Json::object(), ReadRow)}}));
   return fields;
 }
@@ -441,22 +440,23 @@ void ReadMapRows(const JsonNode& node, GroupOfMap& group) {
 const Fields<GroupOfMap>& MapGroupFields() {
   static const Fields<GroupOfMap> fields(
       "group",
-      "What a group says of its rows: select and not_applicable join theirs, each other key stands "
-      "where a row has none.",
-      WithShared<GroupOfMap>({{"", By(Json::object(), ReadCommon)},
-                              {"label", Text(&MapGroup::label), "Its name.", kAnyText},
-                              {"short", Text(&MapGroup::short_label),
-                               "A shorter one for pictures, default the label."},
-                              {"rows", By(ArraySchema(RowFields().Schema(), 1), ReadMapRows),
-                               "Extremes.", "an array of rows"}}));
+      "Group of rows. Its select and not_applicable are added to each row's; its other keys are "
+      "defaults for the rows.",
+      WithShared<GroupOfMap>(
+          {{"", By(Json::object(), ReadCommon)},
+           {"label", Text(&MapGroup::label), "Name of the group.", kAnyText},
+           {"short", Text(&MapGroup::short_label), "Short name for pictures; default: the label."},
+           {"rows", By(ArraySchema(RowFields().Schema(), 1), ReadMapRows), "Rows of stress tests.",
+            "an array of rows"}}));
   return fields;
 }
 
 const Fields<MapColumn>& MethodFields() {
-  static const Fields<MapColumn> fields("method", "A method: a column of the map.",
-                                        {{"label", Text(&MapColumn::label), "Its name.", kAnyText},
-                                         {"select", SelectionOf(&MapColumn::select, 1),
-                                          "Which records.", "an object of keys and values"}});
+  static const Fields<MapColumn> fields(
+      "method", "Method: a column of the map.",
+      {{"label", Text(&MapColumn::label), "Method name.", kAnyText},
+       {"select", SelectionOf(&MapColumn::select, 1), "Selection of records.",
+        "an object of keys and values"}});
   return fields;
 }
 
@@ -467,7 +467,7 @@ void ReadMapColumns(const JsonNode& node, MapRules& rules) {
     if (!MethodFields().Read(element, &column)) continue;
     ReportRepeated(element, "label", column.label, &labels);
   }
-  if (node.value().is_array() && rules.columns.empty()) node.Fail("at least one column");
+  if (node.value().is_array() && rules.columns.empty()) node.Fail("at least one method");
 }
 
 void ReadMapGroups(const JsonNode& node, MapRules& rules) {
@@ -487,18 +487,17 @@ void ReadMapGroups(const JsonNode& node, MapRules& rules) {
 const Fields<MapRules>& MapFields() {
   static const Fields<MapRules> fields(
       "map",
-      "Rules that hold stored records against limits, a cell per row and column (loopbench "
-      "robustness). "
-      "The program checks more than this schema: that labels are different, that \"required\" and "
-      "\"not_applicable\" name columns, and that a row, with its group, selects records and says "
-      "what decides about a run that ends as it should.",
+      "Rules that compare stored records with limits, one cell per row and column (loopbench "
+      "robustness). The program also checks that labels are different, that \"required\" and "
+      "\"not_applicable\" name methods, and that each row, with its group, selects records and "
+      "has a criterion for finished runs if it expects them.",
       DocumentRows<MapRules>(
-          {{"title", Text(&MapRules::title), "Of the map.", kAnyText},
+          {{"title", Text(&MapRules::title), "Title of the map.", kAnyText},
            {"comment", Text(&MapRules::comment), "Free text for readers."},
-           {"methods", By(ArraySchema(MethodFields().Schema(), 1), ReadMapColumns), "Methods.",
-            "an array of columns"},
+           {"methods", By(ArraySchema(MethodFields().Schema(), 1), ReadMapColumns),
+            "Methods, the columns of the map.", "an array of methods"},
            {"groups", By(ArraySchema(MapGroupFields().Schema(), 1), ReadMapGroups),
-            "Rows, in groups.", "an array of groups of rows"}}));
+            "Groups of rows.", "an array of groups of rows"}}));
   return fields;
 }
 

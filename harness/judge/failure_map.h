@@ -1,4 +1,4 @@
-// Which methods pass which stress tests: rules, their file, cells.
+// Robustness map of methods and stress tests: rules, their file, cells.
 #pragma once
 
 #include <array>
@@ -17,23 +17,23 @@
 
 namespace loopbench::harness {
 
-// The robustness map: methods against extremes, each cell judged from records by rules.
+// Robustness map: methods and stress tests, each cell evaluated from records by rules.
 //
-// A rules file (configs/experiments/extremes/map.json) names columns (methods), rows (extremes) and
-// for each row the measures that decide. A cell's class and the number that decided it follow from
-// the records alone, so that other data turn it and nobody writes it by hand.
+// A rules file (configs/experiments/extremes/map.json) contains methods (columns), stress tests
+// (rows) and for each row the deciding measures. A cell's class and deciding number depend on the
+// records only and are never written by hand.
 
-/// One extreme.
+/// Stress test: a row of the map.
 struct MapRow {
   std::string label;
-  Selection select;                               ///< which records, with the column's selection
-  std::vector<Demand> decides;                    ///< all must be met
-  std::vector<std::string> right = {"finished"};  ///< how a run should end
-  std::vector<bool> must_hold;                    ///< by column: whether the gate asks for it
+  Selection select;             ///< selection of records, with the column's selection
+  std::vector<Demand> decides;  ///< demands that must all be met
+  std::vector<std::string> right = {"finished"};      ///< expected outcomes of a run
+  std::vector<bool> must_hold;                        ///< by column: true if required by the gate
   std::map<std::string, std::string> not_applicable;  ///< reason by column label
-  std::string others_not_applicable;  ///< reason for all other columns that need not hold, or ""
-  std::size_t cases = 1;              ///< fewer records than these do not hold
-  std::string why;                    ///< where the limits come from
+  std::string others_not_applicable;  ///< reason for all other columns not required, or ""
+  std::size_t cases = 1;              ///< minimum number of records to hold
+  std::string why;                    ///< origin of the limits
 };
 
 struct MapGroup {
@@ -42,7 +42,7 @@ struct MapGroup {
   std::vector<MapRow> rows;
 };
 
-/// One method.
+/// Method: a column of the map.
 struct MapColumn {
   std::string label;
   Selection select;
@@ -54,16 +54,16 @@ struct MapRules {
   std::vector<MapGroup> groups;
 };
 
-/// What may become of a cell, from good to bad: of several records the worst decides. A number that
-/// is wrong without a word is worse than a run that ends and says why, or that does not end.
+/// State of a cell, from good to bad; the worst of several records decides. A wrong result without
+/// an error is worse than a run that stops with a reason or does not end.
 enum class CellState {
-  kHolds,          ///< ended as it should, every measure as demanded
-  kNotApplicable,  ///< no record, and the rules say why there is none
-  kNotMeasured,    ///< too few records, or one without a measure that decides
+  kHolds,          ///< expected outcome, all demands met
+  kNotApplicable,  ///< no record, and the rules contain a reason
+  kNotMeasured,    ///< too few records, or a record without a deciding measure
   kStopped,        ///< ended early with a numerical reason: singular, locked, ...
-  kLimit,          ///< did not end by itself: step-limit, time-limit, ...
-  kInaccurate,     ///< ended as if all were well, with a measure that is not as demanded
-  kBroken,         ///< crashed, or answered what is no result
+  kLimit,          ///< stopped by a limit: step-limit, time-limit, ...
+  kInaccurate,     ///< ended normally, but a demand is not met
+  kBroken,         ///< crashed, or returned an invalid result
 };
 inline constexpr std::array kCellStates = {CellState::kHolds,        CellState::kStopped,
                                            CellState::kLimit,        CellState::kInaccurate,
@@ -73,8 +73,7 @@ inline constexpr std::array kCellStates = {CellState::kHolds,        CellState::
 /// "holds", "stopped", "limit", "inaccurate", "broken", "not measured", "not applicable".
 std::string_view ToString(CellState state);
 
-/// All endings of runs that rules may name, and the state of a run that should have ended
-/// otherwise.
+/// Outcomes that rules may name, and the state of a run with this outcome if it is not expected.
 struct RunEnding {
   std::string_view word;
   CellState state;
@@ -96,46 +95,45 @@ inline constexpr std::array kRunEndings = {RunEnding{"finished", CellState::kIna
                                            RunEnding{"crashed", CellState::kBroken},
                                            RunEnding{"invalid-result", CellState::kBroken}};
 
-/// What a cell shows and why.
+/// Cell of the map, with its reasons.
 struct MapCell {
   CellState state = CellState::kNotMeasured;
-  /// The class: "singular", "time-limit", ... for a run that ended so and should not; else the
-  /// state's name.
+  /// Class: "singular", "time-limit", ... for an unexpected outcome, otherwise the state's name.
   std::string word = "not measured";
-  std::string outcome;  ///< of the run that decided
-  std::string case_id;  ///< of that run
-  /// What decided: of the measures that are not as demanded the one furthest beyond its limit, else
-  /// the one closest to its limit. Without a measure where the ending decided.
+  std::string outcome;  ///< outcome of the deciding run
+  std::string case_id;  ///< of the deciding run
+  /// Deciding measure: the unmet measure furthest beyond its limit, otherwise the measure closest
+  /// to its limit. Empty if the outcome decided.
   Judged decided;
   double t_reached = std::numeric_limits<double>::quiet_NaN();  ///< [s]
   std::size_t holding = 0, records = 0;
-  /// Of the runs that hold those with a doubt, and its codes, each with how often: "energy 2".
+  /// Number of holding runs with warnings, and the warning codes with counts: "energy 2".
   std::size_t doubted = 0;
   std::string doubts;
-  std::size_t cases = 0;  ///< how many records there should be, at least `records`
-  std::string reason;     ///< in words: all measures beyond their limits, the run's message, ...
+  std::size_t cases = 0;  ///< expected number of records, at least `records`
+  std::string reason;     ///< text: all measures beyond their limits, the run's message, ...
   bool demanded = false;
 };
 
-/// The judgement on one run.
+/// Evaluates one run.
 MapCell JudgeRun(const MapRow& row, const Record& record);
 
-/// The judgement on one cell: the worst of its runs. Records of kind "accuracy" count, unless a
-/// selection names the kind.
+/// Evaluates one cell: its worst run. Only records of kind "accuracy" are used, unless a selection
+/// names the kind.
 MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method,
                   std::span<const Record> records);
 
-/// Whether the cell holds and one of its runs that hold has a doubt: that run is right by what the
-/// map demands, so that the doubt is a false alarm, or the map demands less.
+/// Returns true if the cell holds and one of its holding runs has a warning. The warning is then a
+/// false alarm, or the map's demands are weaker.
 inline bool HoldsInDoubt(const MapCell& cell) {
   return cell.state == CellState::kHolds && cell.doubted > 0;
 }
 
-/// Rules and, by group, row and column, the cells.
+/// Rules, and the cells by group, row and column.
 struct FailureMap {
   MapRules rules;
   std::vector<std::vector<std::vector<MapCell>>> cells;
-  /// Keys that rules name and no record has: misspelt, or not run yet. One sentence each.
+  /// One sentence for each key of the rules that no record has: misspelt, or not run yet.
   std::vector<std::string> remarks;
 };
 FailureMap MakeFailureMap(const MapRules& rules, std::span<const Record> records);
@@ -153,29 +151,29 @@ void EachCell(const FailureMap& map, const Visit& visit) {
   }
 }
 
-/// The class, with the ending where another one than "finished" is right: "holds: locked".
+/// Returns the class, with the outcome if it is not "finished": "holds: locked".
 std::string ClassText(const MapCell& cell);
 
-/// The number that decided: "branch 2.1e-09 rad", "397 of 400", "at 0.31 s"; "" where there is
+/// Returns the deciding number: "branch 2.1e-09 rad", "397 of 400", "at 0.31 s"; "" if there is
 /// none.
 std::string DecidingNumber(const MapCell& cell);
 
-/// "3/4" where there is, or should be, more than one record, else "".
+/// Returns "3/4" if more than one record exists or is expected, otherwise "".
 std::string HoldingCount(const MapCell& cell);
 
-/// "O-DCA, position / parallelogram: singular at 0.31 s" for every cell that must hold and does
-/// not.
+/// Returns "O-DCA, position / parallelogram: singular at 0.31 s" for each required cell that does
+/// not hold.
 std::vector<std::string> BrokenDemands(const FailureMap& map);
 
-// Reads the rules of a robustness map (configs/experiments/extremes/map.json).
-// What such a file may hold: docs/fields.md, map.
+// Reads the rules of a robustness map (configs/experiments/extremes/map.json). Keys of the file:
+// docs/fields.md, map.
 
-/// Reads a file. Throws ConfigError with all mistakes in it (unknown keys, wrong types, an ending
-/// or a column label that does not exist, a label used twice, a row that nothing decides), each
-/// with file, JSON Pointer, value found and what was expected.
+/// Reads a file. Throws ConfigError with all errors (unknown keys, wrong types, unknown outcomes or
+/// column labels, repeated labels, rows without criteria), each with file, JSON Pointer, found and
+/// expected value.
 MapRules ReadMapRules(const std::filesystem::path& path);
 
-/// The same from text; `file` is the name used in messages.
+/// Reads rules from text; `file` is the name used in messages.
 MapRules ParseMapRules(std::string_view text, const std::string& file);
 
 }  // namespace loopbench::harness

@@ -19,8 +19,8 @@
 namespace loopbench::harness {
 namespace {
 
-/// Fields of one line; a quoted one may have commas and doubled quotes. Texts have no line ends
-/// (EscapeCsv).
+/// Returns the fields of a line; quoted fields may have commas and doubled quotes. Texts have no
+/// line ends (EscapeCsv).
 std::vector<std::string> FieldsOf(std::string_view line) {
   std::vector<std::string> fields(1);
   bool quoted = false;
@@ -39,7 +39,7 @@ std::vector<std::string> FieldsOf(std::string_view line) {
   return fields;
 }
 
-/// As the file has it.
+/// Returns the label as in the file.
 std::string Written(const std::string& label) { return FieldsOf(EscapeCsv(label)).front(); }
 
 std::optional<CellState> StateNamed(std::string_view name) {
@@ -123,7 +123,7 @@ namespace {
 
 std::string ColumnKey(std::size_t column) { return fmt::format("column{}", column); }
 
-// `shown`, the number and the count, as far as there are any.
+// Returns `shown`, the number and the count, if present.
 std::string MapCellText(const MapCell& cell, const std::string& shown) {
   std::string text = shown;
   for (const std::string& part : {DecidingNumber(cell), HoldingCount(cell)}) {
@@ -132,7 +132,7 @@ std::string MapCellText(const MapCell& cell, const std::string& shown) {
   return text;
 }
 
-// Short, because a terminal is narrow: numbers without names and units, methods by letter.
+// Returns a short cell for terminals: numbers without names and units, methods by letter.
 std::string TerminalCell(const MapCell& cell) {
   if (cell.state == CellState::kNotApplicable) return "-";
   MapCell plain = cell;
@@ -148,7 +148,7 @@ std::string MethodLetter(std::size_t column) {
   return column < kLetters ? letter : fmt::format("{}{}", letter, column / kLetters);
 }
 
-// The table's cells are texts that begin with their class.
+// Returns the colour of a cell, whose text begins with its class.
 std::string MapColour(const Record& row, const TableColumn& column) {
   const std::string text = row.Text(column.key);
   const std::string word = text.substr(0, text.find(' '));
@@ -162,7 +162,7 @@ std::string MapColour(const Record& row, const TableColumn& column) {
   return word == "ok" || word == "ok:" ? "32" : "";
 }
 
-// The rows of one group under the methods.
+// Adds the rows of one group.
 void AddMapRows(const FailureMap& map, std::size_t group,
                 const std::function<std::string(const MapCell&)>& text, Table* table) {
   for (std::size_t r = 0; r < map.cells[group].size(); ++r) {
@@ -202,7 +202,7 @@ Table LimitTable(const FailureMap& map) {
   return table;
 }
 
-// Cells with a reason to be read: all but those that hold.
+// Returns all cells that do not hold.
 Table DetailTable(const FailureMap& map) {
   Table table{.title = "Cells that do not hold",
               .columns = {{"row", "stress test"},
@@ -221,7 +221,7 @@ Table DetailTable(const FailureMap& map) {
   return table;
 }
 
-// Cells that hold with a run that trust does not let read "ok": each to be explained.
+// Returns cells that hold with warnings, each to be explained.
 Table DoubtTable(const FailureMap& map) {
   Table table{.title = "Cells that hold, with runs with warnings",
               .columns = {{"row", "stress test"},
@@ -337,7 +337,7 @@ namespace {
 
 constexpr const char* kNobody = "none reached it";
 
-/// Green on the front, yellow in doubt, red where the run failed.
+/// Returns green on the front, yellow for warnings, red for failed runs.
 std::string FrontColour(const Record& row, const TableColumn& column) {
   if (column.key == "front") return row.Text("front") == "*" ? "32" : "";
   if (column.key != "reason") return "";
@@ -345,7 +345,7 @@ std::string FrontColour(const Record& row, const TableColumn& column) {
   return row.Text("warnings").empty() ? "" : "33";
 }
 
-/// Keys that name the cases of a problem: not what all rows of it share.
+/// Returns true for keys that identify a method, not shared by all rows of a problem.
 bool NamesMethod(const std::string& key) {
   static const std::set<std::string> others = {"kind", "experiment", "mechanism", "horizon",
                                                "atol"};
@@ -365,8 +365,8 @@ bool IsAlike(const std::vector<Record>& records, const std::string& key) {
       records, [&](const Record& record) { return record.Text(key) == records.front().Text(key); });
 }
 
-/// The columns that name methods: with short words where the terminal's tables have them, and
-/// without those in which no row differs, unless it is the formulation; or all.
+/// Returns the columns of methods. Compact tables have short words and no constant columns except
+/// the formulation.
 std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool compact) {
   std::vector<TableColumn> columns;
   for (const std::string& key : CaseKeysOf(records)) {
@@ -381,7 +381,7 @@ std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool 
   return columns;
 }
 
-/// The row of a table: the record with the problem and what was made of it.
+/// Returns a row of a table: the record with the problem and the results.
 Record ShownRow(const TradeoffProblem& problem, const TradeoffRow& row) {
   Record shown = row.record;
   shown.Set("problem", problem.name);
@@ -433,7 +433,7 @@ std::vector<TableColumn> FrontColumns(const Tradeoff& tradeoff,
   return columns;
 }
 
-/// "accel joint ode45 1e-06": the method within a formulation, by what tells rows apart.
+/// "accel joint ode45 1e-06": the method within a formulation, by the keys that differ.
 std::string MethodText(const Record& record, const std::vector<TableColumn>& columns) {
   std::string text;
   for (const TableColumn& column : columns) {

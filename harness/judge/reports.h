@@ -1,4 +1,4 @@
-// The robustness map, and work and precision, as tables and documents.
+// Tables and documents of robustness maps and work-precision comparisons.
 #pragma once
 
 #include <string>
@@ -13,58 +13,57 @@ namespace loopbench::harness {
 
 // The robustness map as CSV and as text.
 
-// A robustness map read back from its CSV, for pictures: the store that it was made of is large,
-// and seldom kept.
+// Robustness map read from its CSV, for pictures: the original store is large and rarely kept.
 
-/// The map of these rules with the cells of robustness-map.csv (MapCellTable()): of each its state
-/// and whether it must hold; numbers and reasons stay in the file.
+/// Returns the map of these rules with the cells of robustness-map.csv (MapCellTable()). Each cell
+/// has its state and requirement; numbers and reasons are not read.
 ///
-/// @throws ConfigError with file, line and what was found, where the text is no such CSV, or has
-/// other cells than the rules.
+/// @throws ConfigError with file, line and found text if the CSV is invalid or its cells differ
+/// from the rules.
 FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file);
 
-// The robustness map as tables: for a terminal, for programs, and as a page.
+// Robustness map as tables for a terminal and for programs, and as a page.
 
-/// "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
+/// Returns "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
 std::string CountCells(const FailureMap& map);
-/// "3 of 877 cells that hold have runs in doubt".
+/// Returns "3 of 877 cells that hold have runs with warnings".
 std::string CountDoubts(const FailureMap& map);
 
-/// One row per extreme, one column per method (by letter, named in the notes), coloured by state on
-/// a terminal: "ok 2.1e-09", "singular at 0.31 s 3/4", "?" for what was not measured, "-" for what
-/// is not applicable.
+/// Returns one row per stress test and one column per method (by letter, named in the notes),
+/// coloured by state on a terminal: "ok 2.1e-09", "singular at 0.31 s 3/4", "?" for not measured,
+/// "-" for not applicable.
 Table MapTable(const FailureMap& map);
 
-/// One row per cell with all that decided it, every digit: robustness-map.csv.
+/// Returns one row per cell with all deciding data in full precision: robustness-map.csv.
 Table MapCellTable(const FailureMap& map);
 
-/// robustness-map.md: a table per group, the limits with their reasons, and every cell that does
-/// not hold with its number and message. `notes` (provenance) at the end.
+/// Returns robustness-map.md: a table per group, the limits with reasons, and every cell that does
+/// not hold with number and message. `notes` (provenance) are at the end.
 std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& notes);
 
-// What accuracy costs, as tables: for a terminal, for programs, and as a page.
+// Work-precision comparison as tables for a terminal and for programs, and as a page.
 
-/// Which rows a table shows, and how wide it may be.
+/// Rows and width of a table.
 struct TradeoffView {
-  bool compact = true;  ///< few columns and short words, for a terminal of some 100 columns
-  bool all = false;     ///< every row; else those on the front and those that are not compared
+  bool compact = true;  ///< few columns and short words, for a terminal of about 100 columns
+  bool all = false;     ///< all rows; otherwise only the front and rows not compared
 };
 
-/// One table per problem: rows in order of cost, those on the front with a '*', those that are not
-/// compared with their reason. Columns in which no row differs are left out of a compact table. In
-/// full, "error" and "cost" are numbers of one key each, which the notes name.
+/// Returns rows in order of cost, grouped by problem. Rows on the front have a '*', rows not
+/// compared their reason. A compact table omits constant columns. In a full table, "error" and
+/// "cost" are numbers of one key each, named in the notes.
 Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view);
 
-/// Per problem and class of errors a row, per formulation a column: what its cheapest method costs,
-/// how many times the cheapest of all, and "none reached it" where none did.
+/// Returns one row per problem and error limit, one column per formulation: the cost of its
+/// cheapest method, the ratio to the cheapest of all, or "none reached it".
 Table OverviewTable(const Tradeoff& tradeoff);
 
-/// The same, a row per problem, class and formulation with the method, its error and cost:
+/// Returns one row per problem, error limit and formulation with the method, error and cost:
 /// tradeoff-overview.csv.
 Table CheapestTable(const Tradeoff& tradeoff);
 
-/// tradeoff.md: overview, fairness statement, the cheapest methods, and all rows of all problems.
-/// `notes` (provenance) at the end.
+/// Returns tradeoff.md: overview, fairness statement, the cheapest methods, and all rows of all
+/// problems. `notes` (provenance) are at the end.
 std::string TradeoffMarkdown(const Tradeoff& tradeoff, const std::vector<std::string>& notes);
 
 }  // namespace loopbench::harness

@@ -1,4 +1,4 @@
-// The schemas of files of rules, as harness/json/schema.h prints them.
+// Schemas of files of rules, printed by harness/json/schema.h.
 #pragma once
 
 #include "harness/json/schema.h"

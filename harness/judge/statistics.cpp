@@ -129,7 +129,7 @@ struct FamilyName {
   double size = 0.0;
 };
 
-/// `name` is empty when there is not exactly one numeric part.
+/// Splits a name; `name` is empty unless there is exactly one numeric part.
 FamilyName Split(const std::string& benchmark) {
   FamilyName family;
   int numbers = 0;
@@ -149,8 +149,8 @@ FamilyName Split(const std::string& benchmark) {
   return family;
 }
 
-/// Of a benchmark its own; of a timing the name that a benchmark of it would have, with the number
-/// at the end of its mechanism's name as a part ("chain-10" is "chain/10").
+/// Returns the name of a benchmark, or for a timing the equivalent name, with the number at the end
+/// of the mechanism's name as a part ("chain-10" is "chain/10").
 std::string BenchmarkNameOf(const Record& record) {
   if (record.Find("benchmark") != nullptr) return record.Text("benchmark");
   if (record.Text("kind") != "timing") return "";
@@ -198,7 +198,7 @@ std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from
   for (const std::string& name : order) {
     const Points& points = families[name];
     const PowerFit fit = FitPower(points.sizes, points.times);
-    // a family of which too few finished is a row without an exponent
+    // a family with too few finished members has no exponent
     if (fit.sizes + points.failed < 2) continue;
     Record row;
     row.Set("family", name);

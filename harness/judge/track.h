@@ -1,4 +1,4 @@
-// Tracks of measurements over commits, for trackers and for a table.
+// Measurements over commits, for trackers and for a table.
 #pragma once
 
 #include <limits>
@@ -9,15 +9,15 @@
 
 namespace loopbench::harness {
 
-// Measurements in the JSON that trackers of continuous benchmarking take.
+// Measurements in JSON formats of continuous-benchmarking trackers.
 
-/// One number to be tracked; smaller is better.
+/// Tracked number; smaller is better.
 struct TrackedValue {
   std::string benchmark, measure, unit = {};
   double value = 0.0;
-  double lower = 0.0, upper = 0.0;  ///< spread; equal to value where there is none
-  double least = 0.0;               ///< of a sample, which other work on the machine disturbs least
-  /// Of times [ns], NaN where not known: how fast the machine was.
+  double lower = 0.0, upper = 0.0;  ///< spread; equal to value if there is none
+  double least = 0.0;  ///< minimum of a sample, least disturbed by other work on the machine
+  /// Calibration time of the machine for times [ns]; NaN if unknown.
   double yardstick = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -30,14 +30,14 @@ std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values);
 /// are part of the measure's name, "cpu (ns)": the format has no place for them.
 std::string ToBencherMetricFormat(const std::vector<TrackedValue>& values);
 
-// Which numbers of a record are worth tracking over commits.
+// Selection of numbers of a record to track over commits.
 
 struct TrackedRecords {
   /// Counts, errors, instructions and times (median, with the 10th and 90th percentile as spread)
-  /// of the records that ended well, all finite; hashes and outcomes are no numbers.
+  /// of finished records, all finite; hashes and outcomes are excluded.
   std::vector<TrackedValue> values;
-  /// What a tracker cannot take, a line each with the case and the reason: runs that failed, values
-  /// that are none (demand.h), cases that are there more than once.
+  /// Excluded values, one line each with case and reason: failed runs, invalid values (demand.h),
+  /// repeated cases.
   std::vector<std::string> left_out;
 };
 

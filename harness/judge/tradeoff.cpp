@@ -22,7 +22,7 @@ namespace {
 constexpr std::array kErrors = {"error_position_max",    "error_position_end", "error_path_max",
                                 "closed_form_error_max", "branch_error_max",   "energy_error_max",
                                 "drift_position_max"};
-// those that are no distance from the right motion
+// indirect indicators, not distances from the exact motion
 constexpr std::array kNoErrors = {"energy_error_max", "drift_position_max"};
 
 constexpr const char* kWall = "wall_s_median";
@@ -33,7 +33,7 @@ bool HasNumber(std::span<const Record> records, const std::string& key, std::str
   });
 }
 
-/// All that names a case, but what it was run for: equal for a run and its timing.
+/// Returns the name of a case without its kind: equal for a run and its timing.
 std::string NameOfCase(const Record& record) {
   std::string text;
   for (const auto& [key, value] : record.items()) {
@@ -72,7 +72,7 @@ std::string ErrorKey(std::span<const Record> records, const TradeoffOptions& opt
 /// Timings by the name of their case.
 using Timings = std::map<std::string, const Record*>;
 
-/// Of the same case; a record without keys where there is none.
+/// Returns the timing of the same case, or a record without keys.
 const Record& TimingOf(const Record& run, const Timings& timings) {
   static const Record kNone;
   const auto place = timings.find(NameOfCase(run));
@@ -82,7 +82,7 @@ const Record& TimingOf(const Record& run, const Timings& timings) {
 std::string CostKey(std::span<const Record> records, const Timings& timings,
                     const TradeoffOptions& options, std::vector<std::string>* remarks) {
   if (options.cost.empty()) {
-    // timings of other cases, such as those at one tolerance for all, are none of these
+    // timings of other cases, such as timings at a common tolerance, do not match
     const bool any = std::ranges::any_of(records, [&](const Record& record) {
       return record.Text("kind") == "accuracy" &&
              std::isfinite(TimingOf(record, timings).Number(kWall));
@@ -100,7 +100,7 @@ std::string CostKey(std::span<const Record> records, const Timings& timings,
   throw ConfigError(fmt::format("--cost-key {}: no record has a number there", options.cost));
 }
 
-/// The run with what only its timing has.
+/// Returns the run with additional keys of its timing.
 Record Joined(const Record& run, const Record& timing) {
   Record joined = run;
   for (const auto& [key, value] : timing.items()) {
@@ -143,7 +143,7 @@ TradeoffRow MakeRow(const Record& run, const Record& timing, const Tradeoff& tra
   return row;
 }
 
-/// "four-bar, horizon 10": texts as they are, numbers with their key.
+/// "four-bar, horizon 10": texts unchanged, numbers with their key.
 std::string NameOfProblem(const Record& record, const std::vector<std::string>& per) {
   std::string name;
   for (const std::string& key : per) {
@@ -155,8 +155,8 @@ std::string NameOfProblem(const Record& record, const std::vector<std::string>& 
   return name;
 }
 
-/// Rows are in order of cost, those of one cost in order of error: a row is on the front if it is
-/// better than all before it, or has an equal there.
+/// Marks the front. Rows are sorted by cost, then error: a row is on the front if it is better than
+/// all before it, or equal to a row of the front.
 void MarkFront(std::vector<TradeoffRow>* rows) {
   const TradeoffRow* last = nullptr;
   for (TradeoffRow& row : *rows) {
@@ -177,7 +177,7 @@ std::vector<std::string> FormulationsOf(const std::vector<TradeoffRow>& rows) {
   return names;
 }
 
-/// Rows are in order of cost: the first that will do is the cheapest.
+/// Returns the first suitable row, which is the cheapest: rows are in order of cost.
 int CheapestOf(const std::vector<TradeoffRow>& rows, const std::string& formulation,
                double error_class) {
   const auto found = std::ranges::find_if(rows, [&](const TradeoffRow& row) {
@@ -205,7 +205,7 @@ void FindCheapest(const std::vector<double>& classes, TradeoffProblem* problem) 
   }
 }
 
-/// What is no number comes last.
+/// Compares costs; NaN comes last.
 bool IsCheaper(const TradeoffRow& a, const TradeoffRow& b) {
   const auto key = [](double value) {
     return std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
@@ -255,12 +255,12 @@ Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& op
 }
 namespace {
 
-/// What may differ between two runs, and where records say it.
+/// Setting that may differ between runs, and its key in records.
 struct Aspect {
   const char* words;
   const char* key;
-  bool is_of_machine = false;  ///< what decides times: of the timing where there is one
-  const char* standard = "";   ///< what a record means that does not say it
+  bool is_of_machine = false;  ///< affects times: taken from the timing if there is one
+  const char* standard = "";   ///< value if the key is missing
 };
 
 constexpr std::array kAspects = {
@@ -293,11 +293,11 @@ std::string ValueOf(const TradeoffRow& row, const Aspect& aspect) {
   return text.empty() ? aspect.standard : text;
 }
 
-/// What the compared rows of all problems say under one aspect.
+/// Values of one setting in the compared rows of all problems.
 struct Finding {
   bool is_equal = true;             ///< within each problem
   std::vector<std::string> values;  ///< in order of first appearance
-  std::vector<int> rows;            ///< that have them
+  std::vector<int> rows;            ///< numbers of rows with each value
 };
 
 Finding FindValues(const Tradeoff& tradeoff, const Aspect& aspect) {
@@ -336,7 +336,7 @@ std::string Joined(const std::vector<std::string>& parts) {
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
-/// Reasons without their numbers and how many rows have them: "singular 3, doubts: energy 2".
+/// Reasons without their numbers and how many rows have them: "singular 3, warnings: energy 2".
 std::string CountReasons(const Tradeoff& tradeoff, std::size_t* left_out) {
   std::map<std::string, int> counts;
   for (const TradeoffProblem& problem : tradeoff.problems) {
@@ -366,7 +366,7 @@ bool IsTime(const std::string& cost) {
          cost == "ns_per_body" || cost == "step_us_median";
 }
 
-/// What the error is, what the references are certified to, and where that decides.
+/// Returns a line with the error, the certified error of references, and its influence.
 std::string ErrorLine(const Tradeoff& tradeoff) {
   double least = INFINITY, most = 0.0;
   int known = 0, bounds = 0, beyond = 0;
@@ -422,7 +422,7 @@ std::string CostLine(const Tradeoff& tradeoff) {
   return line;
 }
 
-/// Whether formulations of compared rows run as the library's code, which is not alike for all.
+/// Returns true if compared formulations run library code, which is not equally optimized.
 bool ComparesLibraryCode(const Tradeoff& tradeoff) {
   std::set<std::string> formulations;
   for (const TradeoffProblem& problem : tradeoff.problems) {

@@ -1,4 +1,4 @@
-// Work and precision: Pareto fronts, and what was equal among the methods compared.
+// Work-precision comparison: Pareto fronts, and equality of settings among the compared methods.
 #pragma once
 
 #include <limits>
@@ -11,57 +11,57 @@
 
 namespace loopbench::harness {
 
-// What accuracy costs: each accuracy run of a store beside the time that the very same case took,
-// the Pareto front of each problem, and the cheapest method of each formulation for an error.
+// Cost of accuracy: each accuracy run of a store with the time of the same case, the Pareto front
+// of each problem, and the cheapest method of each formulation for an error.
 //
-// A run that failed, or finished with doubts, is a row with its reason, but stands on no front and
-// is nobody's cheapest: its error is not one to rely on.
+// A run that failed or has warnings is a row with its reason. It is excluded from fronts and from
+// the cheapest methods, because its error is unreliable.
 
-/// What is compared with what.
+/// Options of the work-precision comparison.
 struct TradeoffOptions {
-  /// Key of records that is the error; "" for the first of UsualErrors() that records have.
+  /// Key of the error; "" for the first of UsualErrors() that records have.
   std::string error = "";
-  /// Key that is the cost: of accuracy records, or else of the timing of the same case. "wall_s" is
-  /// the median of timed simulations, never the wall time of accuracy runs, which share the machine
-  /// and are observed. "" for that, or where nothing was timed for "rhs_equivalents".
+  /// Key of the cost, in accuracy records or in the timing of the same case. "wall_s" is the median
+  /// of timed simulations, never the wall time of accuracy runs, which share the machine and are
+  /// observed. "": "wall_s", or "rhs_equivalents" without timings.
   std::string cost = "";
-  /// Rows that share the values of these keys are one problem, and only they are compared.
+  /// Rows with equal values of these keys form a problem; only rows of one problem are compared.
   std::vector<std::string> per = {"mechanism", "horizon"};
-  std::vector<double> classes = {1e-3, 1e-6, 1e-9};  ///< errors that are asked for
-  Selection where = {};  ///< of accuracy records with what their timings add
+  std::vector<double> classes = {1e-3, 1e-6, 1e-9};  ///< error limits
+  Selection where = {};  ///< selection of accuracy records, joined with their timings
 };
 
-/// The errors that a store may have, the best known first: against a certified reference, against
-/// exact motions; at the end what is no error but speaks of one.
+/// Returns keys of errors, most reliable first: errors against a certified reference, errors
+/// against exact motions, then indirect indicators of error.
 std::span<const char* const> UsualErrors();
 
-/// Whether an error is a length [m] between points and those of a certified reference.
+/// Returns true if an error is a distance [m] between points and a certified reference's points.
 bool IsErrorOfPositions(const std::string& key);
 
-/// One accuracy run with what it cost.
+/// Accuracy run with its cost.
 struct TradeoffRow {
-  Record record;  ///< the run's, and what its timing says besides
-  Record timing;  ///< of the same case; without keys where there is none
+  Record record;  ///< the run's record with additional keys of its timing
+  Record timing;  ///< timing of the same case; without keys if there is none
   double error = std::numeric_limits<double>::quiet_NaN();
   double cost = std::numeric_limits<double>::quiet_NaN();
-  /// The measured error is not above what the reference itself is certified to; `error` is then
-  /// the bound that both allow, their sum.
+  /// True if the measured error is not above the certified error of the reference. `error` is then
+  /// an upper bound, the sum of both.
   bool is_bound = false;
-  std::string reason = "";  ///< why it is not compared, "" for a row that is
-  bool on_front =
-      false;  ///< no compared row of its problem is better in one and not worse in the other
+  std::string reason = "";  ///< reason why it is not compared, or ""
+  bool on_front = false;    ///< Pareto-optimal among the compared rows of its problem
 };
 
-/// The cheapest compared row of a formulation whose error is in a class.
+/// Cheapest compared row of a formulation within an error limit.
 struct Cheapest {
   double error_class = 0.0;
   std::string formulation;
-  int row = -1;  ///< index into the problem's rows; -1: none reached it
-  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< to the cheapest of all formulations
+  int row = -1;  ///< index into the problem's rows; -1: none
+  double ratio = std::numeric_limits<double>::quiet_NaN();  ///< cost relative to the cheapest of
+                                                            ///< all formulations
 };
 
-/// Rows of one mechanism and horizon (TradeoffOptions::per), the cheapest first, those without a
-/// cost last, and for each class in turn each formulation.
+/// Rows of one mechanism and horizon (TradeoffOptions::per), cheapest first, rows without cost
+/// last; and for each error limit the cheapest row of each formulation.
 struct TradeoffProblem {
   std::string name;  ///< "four-bar, horizon 10"
   std::vector<TradeoffRow> rows;
@@ -69,23 +69,23 @@ struct TradeoffProblem {
 };
 
 struct Tradeoff {
-  std::string error;  ///< the key that was taken
-  std::string cost;   ///< likewise; "wall_s_median" for "wall_s"
+  std::string error;  ///< key of the error
+  std::string cost;   ///< key of the cost; "wall_s_median" for "wall_s"
   std::vector<TradeoffProblem> problems;
-  std::vector<std::string> remarks;  ///< what was taken instead of what, one sentence each
+  std::vector<std::string> remarks;  ///< one sentence for each substituted key
 };
 
-/// @throws ConfigError when no accuracy record passes `where`, no record has the error or the cost,
+/// @throws ConfigError if no accuracy record passes `where`, no record has the error or the cost,
 /// or an option names a key that no record has.
 Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& options);
 
-// Whether rows that are compared differ in more than what the comparison is about: what was equal
-// in all of them and what was not, read from the records.
+// Fairness of the comparison: settings that were equal and different among the compared rows, read
+// from the records.
 
-/// One line each: what was equal among the compared rows of every problem, with its value where all
-/// problems share it; what was not, with its values and how many rows had them; what no record
-/// says; the error and the cost, and what they can be trusted to; how many rows were not compared,
-/// and why; warnings ("warning: ...") where costs are times that do not compare.
+/// Returns one line each: equal settings, with values shared by all problems; different settings,
+/// with values and numbers of rows; settings missing in records; the error and the cost, with their
+/// accuracy; numbers of rows not compared, with reasons; warnings ("warning: ...") if costs are
+/// incomparable times.
 std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff);
 
 }  // namespace loopbench::harness

@@ -98,7 +98,7 @@ std::string ToJsonObject(const Record& record) { return Dump<nlohmann::ordered_j
 std::string ToJsonLine(const Record& record) {
   std::string object = ToJsonObject(record);
   const bool is_empty = record.items().empty();
-  object.replace(0, 1, fmt::format("{{\"format\":{}{}", kFileFormat, is_empty ? "" : ","));
+  object.replace(0, 1, fmt::format("{{\"format\":{}{}", kRecordFormat, is_empty ? "" : ","));
   return WithChecksum(std::move(object));
 }
 

@@ -104,7 +104,7 @@ using LineJson = nlohmann::ordered_json;
 
 /// Beginnings of a run's line; before 1.0 lines had no format.
 const std::array<std::string, 2> kBeginnings = {
-    fmt::format("{{\"format\":{},\"kind\":\"", kFileFormat), "{\"kind\":\""};
+    fmt::format("{{\"format\":{},\"kind\":\"", kRecordFormat), "{\"kind\":\""};
 
 class RecordReader final : public nlohmann::json_sax<LineJson> {
  public:
@@ -199,8 +199,8 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
     if (place_ != Place::kObject || (key_type_ != type && key_type_ != ValueType::kAny)) {
       return Reject(Expected(), shown);
     }
-    if (key_ == "format" && value != Value(std::int64_t{kFileFormat})) {
-      return Reject(fmt::format(kExpectedFormat, kFileFormat), shown);
+    if (key_ == "format" && value != Value(std::int64_t{kRecordFormat})) {
+      return Reject(fmt::format(kExpectedFormat, kRecordFormat), shown);
     }
     if (key_ != "checksum" && key_ != "format") record_.Append(std::move(key_), std::move(value));
     return true;

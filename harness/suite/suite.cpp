@@ -275,6 +275,8 @@ std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
 /// Comment with the hash of all bytes of the file, computed with zeros in place of the hash.
 constexpr std::string_view kChecksum = "Kept by a run; checksum ", kZeros = "0000000000000000";
 
+}  // namespace
+
 std::string WithOwnHash(std::string text) {
   const std::size_t at = text.find(kChecksum);
   if (at == std::string::npos) return text;  // format version 1.0
@@ -282,12 +284,8 @@ std::string WithOwnHash(std::string text) {
   return text.replace(at + kChecksum.size(), kZeros.size(), Fnv1a(text));
 }
 
-bool IsAsWritten(const std::string& text) { return WithOwnHash(text) == text; }
-
-}  // namespace
-
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file) {
-  if (!IsAsWritten(ReadFile(file))) {
+  if (const std::string text = ReadFile(file); WithOwnHash(text) != text) {
     throw ChangedFile(fmt::format(
         "{}: the file was changed after its run wrote it: its checksum is not that of the file; "
         "remove it: the same run writes it again",
@@ -333,7 +331,7 @@ void CopyMechanisms(const std::vector<Record>& records,
       const std::filesystem::path from = MechanismOf(record, store);
       if (!std::filesystem::exists(from)) continue;
       const std::string text = ReadFile(from);
-      if (!IsAsWritten(text)) continue;
+      if (WithOwnHash(text) != text) continue;
       WriteFileAtomically(to, text);
       break;
     }

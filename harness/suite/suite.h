@@ -105,6 +105,10 @@ class GroupMarks {
 /// empty without an id, or for an id that no run writes.
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file);
 
+/// Returns the text of such a file with the checksum of its other bytes in its comment; other texts
+/// stay.
+std::string WithOwnHash(std::string text);
+
 /// Reads such a file. Throws ChangedFile (trajectory/store_files.h) if its checksum is wrong, and
 /// as ReadMechanism().
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file);

@@ -160,14 +160,15 @@ class OutputFile {
   int descriptor_ = -1;
 };
 
-// Version of all files that Loopbench reads: configurations, lines of stores, histories.
+// Versions of files (docs/release.md). A version is raised if an old program could misread a new
+// file, or a new program an old file.
 
-/// It is raised if an old program could misread a new file, or a new program an old file. Files
-/// without a version are older than 1.0 and read as 1: no meaning has changed. docs/release.md has
-/// the promise.
+/// Configuration files; those without a version read as 1.
 inline constexpr int kFileFormat = 1;
+/// Lines of stores and histories. 2: keys and values have other names (`loopbench migrate`).
+inline constexpr int kRecordFormat = 2;
 
-/// Expected format in messages; {}: kFileFormat.
+/// Expected format in messages.
 inline constexpr const char* kExpectedFormat = "{}, the format that this version reads";
 
 }  // namespace loopbench::harness

@@ -1,8 +1,13 @@
 // `loopbench migrate`: files with names of earlier versions are read afterwards, and nothing else
 // of them has changed.
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <fstream>
 
 #include "harness/record/record.h"
+#include "harness/store/store_lock.h"
+#include "harness/suite/suite.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -90,6 +95,19 @@ class MigrateTest : public CommandLineTest {
     record.Set("message", std::string("at the position \"softened_steps\": \\ \""));
     return record;
   }
+
+  /// The line of a record as earlier versions wrote it.
+  static std::string OldLine(const Record& record) {
+    std::string line = ToJsonLine(record);
+    line.replace(line.find("\"format\":2"), 10, "\"format\":1");
+    line.resize(line.rfind(",\"checksum\":"));
+    return WithChecksum(line + "}");
+  }
+
+  void WriteStore(const std::string& text) const {
+    fs::create_directories(folder_ / "out");
+    Write("out/results.jsonl", text);
+  }
 };
 
 TEST_F(MigrateTest, AnOldExperimentIsReadAfterwards) {
@@ -110,13 +128,12 @@ TEST_F(MigrateTest, OldRulesAreReadAfterwards) {
 }
 
 TEST_F(MigrateTest, AnOldStoreIsReadAfterwards) {
-  {
-    ResultStore store(folder_ / "out");
-    store.Append(OldRecord("odca"));
-    store.Append(OldRecord("lagrange"));
-  }
+  WriteStore(OldLine(OldRecord("odca")) + "\n" + OldLine(OldRecord("lagrange")) + "\n");
   const fs::path file = folder_ / "out/results.jsonl";
-  ExpectEnding(Call("migrate out"), 0, {"out/results.jsonl: 16 names replaced"});
+  // read as it is, its warnings and crossings would be missing
+  ExpectEnding(Call("table out --fail-on warnings"), 2,
+               {"expected 2", "found 1", "loopbench migrate"});
+  ExpectEnding(Call("migrate out"), 0, {"out/results.jsonl: 18 names replaced"});
   const std::string text = ReadFile(file);
   for (std::size_t begin = 0, end; (end = text.find('\n', begin)) != text.npos; begin = end + 1) {
     EXPECT_TRUE(VerifyChecksum(std::string_view(text).substr(begin, end - begin)));
@@ -137,6 +154,40 @@ TEST_F(MigrateTest, AnOldStoreIsReadAfterwards) {
   EXPECT_EQ(ReadFile(file), text);
 }
 
+TEST_F(MigrateTest, LineEndsAndTornLinesStay) {
+  const std::string torn = R"({"format":1,"kind":"accuracy","doubts":"ene)";
+  WriteStore(OldLine(OldRecord("odca")) + "\r\n\r\n" + torn);
+  ExpectEnding(Call("migrate out"), 0, {"9 names replaced"});
+  const std::string text = ReadFile(folder_ / "out/results.jsonl");
+  const std::size_t end = text.find('\r');
+  EXPECT_TRUE(VerifyChecksum(std::string_view(text).substr(0, end)));
+  EXPECT_EQ(text.substr(end), "\r\n\r\n" + torn);
+}
+
+TEST_F(MigrateTest, MechanismsOfAStoreKeepTheirChecksum) {
+  WriteStore(OldLine(OldRecord("odca")) + "\n");
+  fs::create_directories(folder_ / "out/mechanisms");
+  std::string mechanism = OldMechanism();
+  mechanism.insert(mechanism.find("\"comment\": \"") + 12,
+                   "Kept by a run; checksum 0000000000000000. ");
+  Write("out/mechanisms/00ff.json", WithOwnHash(mechanism));
+  ExpectEnding(Call("migrate out"), 0, {"00ff.json: 1 names replaced"});
+  EXPECT_EQ(ReadKeptMechanism(folder_ / "out/mechanisms/00ff.json").name, "four-bar");
+}
+
+TEST_F(MigrateTest, ValuesOfASweepFollowItsField) {
+  EXPECT_EQ(Migrated("sweep.json", R"({"scenes": [], "sweep": [
+    {"values": ["position", "velocity"], "field": "/columns/0/enforcement/0"},
+    {"values": ["position"], "field": "/scenes/0/mechanism/name"}]})"),
+            R"({"problems": [], "sweep": [
+    {"values": ["projection", "velocity"], "field": "/methods/0/enforcement/0"},
+    {"values": ["position"], "field": "/problems/0/mechanism/name"}]})");
+  EXPECT_EQ(Migrated("claims.json", R"({"claims": [{"checks": [{"select": {"content": "a"},
+    "relative_to": {"solver": "as-published", "content": "b"}}]}]})"),
+            R"({"claims": [{"checks": [{"select": {"config_hash": "a"},
+    "relative_to": {"solver": "plain", "config_hash": "b"}}]}]})");
+}
+
 TEST_F(MigrateTest, NamesOfTheUserStay) {
   const std::string text = R"({"name": "scenes", "comment": "as-published doubts",
     "bodies": [{"name": "held", "mass": 1, "points": {"right": [0, 0], "columns": [1, 0]}}],
@@ -153,7 +204,9 @@ TEST_F(MigrateTest, OtherFilesAreRefusedAsTheyAre) {
   }
   std::string changed = ReadFile(folder_ / "changed.jsonl");
   changed.replace(changed.find("1.25e-07"), 8, "1.25e-09");
+  record.Set("warnings", std::string("a sweep's axis of this name"));
   const std::pair<const char*, std::string> files[] = {
+      {"collision.jsonl", OldLine(record) + "\n"},
       {"text.json", "columns: 3\n"},
       {"both.json", R"({"columns": [], "methods": []})"},
       {"changed.jsonl", changed},
@@ -163,7 +216,16 @@ TEST_F(MigrateTest, OtherFilesAreRefusedAsTheyAre) {
     ExpectEnding(Call(std::string("migrate tiny.json ") + name), 2, {name, "tiny.json: no old"});
     EXPECT_EQ(ReadFile(folder_ / name), text);
   }
-  ExpectEnding(Call("migrate none.json"), 2, {"none.json"});
+  for (const char* name : {"none.json", "/dev/null", "pipe.json"}) {
+    if (std::string_view(name) == "pipe.json") {
+      ASSERT_EQ(::mkfifo((folder_ / name).c_str(), 0600), 0);
+    }
+    ExpectEnding(Call(std::string("migrate ") + name), 2, {name, "expected a regular file"});
+  }
+  WriteStore(OldLine(OldRecord("odca")) + "\n");
+  const int lock = OpenLocked(folder_ / "out/results.jsonl");
+  ExpectEnding(Call("migrate out"), 2, {"results.jsonl", "process"});
+  ::close(lock);
 }
 
 }  // namespace migrate_test

@@ -99,7 +99,7 @@ TEST_F(StoreIntegrity, AMissingChecksumIsRefusedByEveryReader) {
   const std::size_t first = text_.find('\n') + 1;
   std::string with_format = text_.substr(0, text_.find(",\"checksum\"")) + "}\n";
   std::string bare = with_format;
-  bare.replace(bare.find("\"format\":1,"), 11, "");
+  bare.replace(bare.find("\"format\":2,"), 11, "");
   const auto expect = [this](const std::string& text, int line) {
     const std::string named =
         fmt::format("changed.jsonl:{}: found a line without its checksum, expected one", line);
@@ -225,16 +225,16 @@ TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
 }
 
 TEST_F(StoreIntegrity, AnotherFormatIsRefusedByNameAndNoneIsThatOfBefore) {
-  EXPECT_TRUE(Contains(Complaint("{\"format\":1,\"kind\":\"timing\",\"bodies\":3}\n"),
+  EXPECT_TRUE(Contains(Complaint("{\"format\":2,\"kind\":\"timing\",\"bodies\":3}\n"),
                        "found a line without its checksum"));
   EXPECT_EQ(FromJsonLine(text_.substr(0, text_.find('\n'))).Find("format"), nullptr);
-  for (const char* other : {"2", "0", "1.0", "\"1\"", "null", "[1]"}) {
+  for (const char* other : {"1", "3", "2.0", "\"2\"", "null", "[2]"}) {
     const std::string said =
         Complaint(std::string("{\"format\":") + other + ",\"kind\":\"timing\"}\n");
     EXPECT_NE(said.find("key 'format': expected "), std::string::npos) << said;
   }
-  const std::string later = Complaint("{\"format\":2,\"kind\":\"timing\",\"more\":{}}\n");
-  EXPECT_NE(later.find("expected 1, the format that this version reads, found 2"),
+  const std::string later = Complaint("{\"format\":3,\"kind\":\"timing\",\"more\":{}}\n");
+  EXPECT_NE(later.find("expected 2, the format that this version reads, found 3"),
             std::string::npos)
       << later;
 }

@@ -83,7 +83,7 @@ TEST(RecordJson, NonFiniteNumbersBecomeNull) {
   record.Set("series.drift", std::vector<double>{1.0, kNan, kInf});
   const std::string line = ToJsonLine(record);
   EXPECT_TRUE(line.starts_with(
-      R"({"format":1,"drift":null,"energy":null,"series.drift":[1.0,null,null],"checksum":")"))
+      R"({"format":2,"drift":null,"energy":null,"series.drift":[1.0,null,null],"checksum":")"))
       << line;
   const Record back = FromJsonLine(line);
   EXPECT_TRUE(std::holds_alternative<std::monostate>(*back.Find("drift")));
@@ -134,7 +134,7 @@ TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppen
   Record whole;
   whole.Set("kind", std::string("a"));
   const std::string line = ToJsonLine(whole) + "\n";
-  WriteFileAtomically(file, line + "{\"format\":1,\"kind\":\"a\",\"b\":[1.0,");
+  WriteFileAtomically(file, line + "{\"format\":2,\"kind\":\"a\",\"b\":[1.0,");
   std::vector<std::string> warnings;
   EXPECT_EQ(ReadRecords(file, &warnings).size(), 1u);
   ASSERT_EQ(warnings.size(), 1u);

@@ -55,17 +55,18 @@ if(TARGET loopbench_count)
   install(TARGETS loopbench_count RUNTIME COMPONENT runtime)  # for loopbench baseline --counts
 endif()
 
-# The program itself knows its options: it writes its manual page and what shells complete.
+# The program itself knows its options: it writes its manual pages and completions.
 set(shell_files ${CMAKE_BINARY_DIR}/shell)
 file(MAKE_DIRECTORY ${shell_files})
-add_custom_command(OUTPUT ${shell_files}/loopbench.1 ${shell_files}/loopbench ${shell_files}/_loopbench ${shell_files}/loopbench.fish
-  COMMAND loopbench manual > ${shell_files}/loopbench.1
+file(MAKE_DIRECTORY ${shell_files}/man1)
+add_custom_command(OUTPUT ${shell_files}/man1/loopbench.1 ${shell_files}/loopbench ${shell_files}/_loopbench ${shell_files}/loopbench.fish
+  COMMAND loopbench manual --out ${shell_files}/man1
   COMMAND loopbench completion bash > ${shell_files}/loopbench
   COMMAND loopbench completion zsh > ${shell_files}/_loopbench
   COMMAND loopbench completion fish > ${shell_files}/loopbench.fish
   DEPENDS loopbench VERBATIM)
-add_custom_target(loopbench_shell ALL DEPENDS ${shell_files}/loopbench.1)
-install(FILES ${shell_files}/loopbench.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+add_custom_target(loopbench_shell ALL DEPENDS ${shell_files}/man1/loopbench.1)
+install(DIRECTORY ${shell_files}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT runtime)
 install(FILES ${shell_files}/loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT runtime)
 install(FILES ${shell_files}/_loopbench DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions COMPONENT runtime)
 install(FILES ${shell_files}/loopbench.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d COMPONENT runtime)

@@ -66,8 +66,8 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
     warnings->push_back(
         {WarningKind::kRounded,
          fmt::format(
-             "{} constraints of {} lean against the others by {:.2g} rad or lengths, within "
-             "the accuracy {:g} of the input: runs leave them out",
+             "{} constraints of {} differ from dependent ones by {:.2g} rad or lengths, within "
+             "the accuracy {:g} of the input: runs remove them",
              structure.redundant.size(), joints, structure.rounding, description.accuracy)});
   }
   const bool driven = std::ranges::any_of(
@@ -85,9 +85,10 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
          fmt::format("{} is locked: its joints{} leave no motion at the start", description.name,
                      joints.empty() ? "" : " and the loops closed by " + joints)});
   } else if (structure.singular_start()) {
-    warnings->push_back({WarningKind::kSingularStart,
-                         fmt::format("the start is a singular position: rank {} there, {} close by",
-                                     structure.rank, structure.rank_nearby)});
+    warnings->push_back(
+        {WarningKind::kSingularStart,
+         fmt::format("the start is a singular configuration: rank {} at the start, {} nearby",
+                     structure.rank, structure.rank_nearby)});
   } else if (structure.conditioning() < kNearSingularRatio) {
     warnings->push_back(
         {WarningKind::kNearSingular,

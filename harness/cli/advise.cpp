@@ -345,7 +345,7 @@ void PrintModels(const AdviseCommand& command, const MechanismFile& file,
     if (model.name == "full" || model.name.starts_with("islands")) continue;
     table.rows.push_back(RowOfModel(command, file, certain, model, whole));
   }
-  Print("\nSimpler models of it, against the whole one's certified motion\n\n");
+  Print("\nSimpler models, compared with the certified motion of the full model\n\n");
   if (table.rows.empty()) {
     Print("  none: nothing can be left out (loopbench simplify says why)\n");
     return;
@@ -441,19 +441,11 @@ void AddAdvise(Commands& commands) {
                 "Also time generated code of all formulations with the advice's settings");
   app->add_flag("--exhaustive", command.exhaustive,
                 "Try all combinations of formulation, level, integrator and tolerance");
-  app->add_option("-o,--out", command.out, "File for the experiment that reproduces it");
-  AddChoice(app, "--format", &command.format, "Format of the finalists' table",
+  app->add_option("-o,--out", command.out, "Experiment file that reproduces the recommendation");
+  AddChoice(app, "--format", &command.format, "Output format",
             {"text", "csv", "markdown", "json", "latex"});
   AddLimits(app, &command.limits);
   AddWide(app);
-  app->footer(
-      "Errors are true ones, against a certified reference; times are of bare runs, one at a "
-      "time.\n"
-      "Exit codes: 0 found, 1 nothing reached what was asked for (the nearest is shown), 2 no "
-      "reference or bad input.\n"
-      "  loopbench advise four-bar.json --max-error 1e-6\n"
-      "  loopbench advise arm.json --budget 0.001 --horizon 5 --points gripper.tip --out "
-      "best.json");
 }
 
 }  // namespace loopbench::harness

@@ -258,31 +258,13 @@ int Baseline(const BaselineCommand& command, const std::string& typed) {
   return 0;
 }
 
-constexpr const char* kBaselineFooter = R"(
-renew     measures and replaces DIR/results.jsonl: commit it, with the reason
-check     measures and compares with DIR, as loopbench compare does
-selftest  measures, plants changes of values (3 times the drift, a step more, a lost case, ...) and says
-          whether a check would catch each
-
-Outcomes and counts are compared wherever the baseline was made; what depends on round-off (hashes,
-steps, instructions) only under its compiler, flags and mathematical library. Times are left out: they
-belong to one machine (loopbench history).
-
-Examples:
-  loopbench baseline renew --experiments bench/arm.json --dir bench/baseline
-  loopbench baseline check --experiments bench/*.json --dir bench/baseline --jobs 2
-  loopbench baseline selftest --experiments bench/arm.json --dir bench/baseline --counts bench/rhs.json
-
-Exit codes: 0 same or better (renewed, all caught), 1 worse (not caught), 2 could not measure.)";
-
 }  // namespace
 
 void AddBaseline(Commands& commands) {
   auto& command = commands.Keep<BaselineCommand>();
   CLI::App* app = commands.Add("baseline", "Keep and check a baseline of drift and counts",
                                [&](const Typed& typed) { return Baseline(command, typed.line); });
-  app->footer(kBaselineFooter);
-  app->add_option("action", command.action, "Action: renew, check or selftest")
+  app->add_option("action", command.action, "Action")
       ->required()
       ->check(CLI::IsMember({"check", "renew", "selftest"}));
   app->add_option("--experiments", command.experiments, "Experiment files (JSON)")
@@ -290,15 +272,14 @@ void AddBaseline(Commands& commands) {
       ->check(CLI::ExistingFile);
   app->add_option("--dir", command.dir, "Folder of the baseline, to be committed")->required();
   app->add_option("--counts", command.counts,
-                  "Benchmarks (JSON) whose instructions are counted too, by valgrind")
+                  "Benchmarks (JSON) for instruction counts by valgrind")
       ->check(CLI::ExistingFile);
   app->add_option("--count-program", command.counter,
-                  "The program loopbench_count, where it is not beside this one nor in PATH");
-  app->add_option("-j,--jobs", command.jobs, "Runs at once")
+                  "Path of loopbench_count (default: beside this program, or in PATH)");
+  app->add_option("-j,--jobs", command.jobs, "Cases to run in parallel")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
-  app->add_option("--keep-output", command.keep,
-                  "New folder for what was measured (default: none)");
+  app->add_option("--keep-output", command.keep, "New folder for the measurements (default: none)");
 }
 
 }  // namespace loopbench::harness

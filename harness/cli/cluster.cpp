@@ -304,18 +304,6 @@ int Collect(const std::filesystem::path& folder) {
   return Merge(merge);
 }
 
-constexpr const char* kSubmitFooter = R"(
-The parts run as one array job of Slurm, the merge as a job behind it. A part that is killed, preempted or
-started twice goes on where its store stopped; --resubmit submits the parts that are not done and not queued.
-Without Slurm: --no-queue writes the folder, and any engine calls `sh DIR/part.sh K` for each K, then
-`loopbench collect DIR`. docs/clusters.md has GNU parallel, Kubernetes and GitHub.
-
-Examples:
-  loopbench submit sweep.json --tasks 100 --out /shared/sweep --time 1:00:00 --partition cpu --no-timing
-  loopbench submit sweep.json --tasks 100 --out /shared/sweep --dry-run
-  loopbench status /shared/sweep
-  loopbench submit --resubmit --out /shared/sweep)";
-
 /// Rejects further options: the folder contains all options of the first submission.
 void RequireNothingElse(const CLI::App& submit) {
   const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
@@ -359,30 +347,30 @@ void AddCluster(Commands& commands) {
   CLI::App*& app = commands.Keep<CLI::App*>();
   app = commands.Add("submit", "Run experiments in parts on a cluster (Slurm)",
                      [&](const Typed&) { return SubmitAsTyped(*app, &typed); });
-  app->footer(kSubmitFooter);
   ClusterRun& run = typed.submit.run;
   app->add_option("experiment", run.experiments, "Experiment files (JSON)")
       ->check(CLI::ExistingFile);
-  app->add_option("-o,--out", typed.submit.folder, "New folder that all machines see")->required();
-  app->add_option("--tasks", run.parts, "Parts, each a task of the array job")
+  app->add_option("-o,--out", typed.submit.folder,
+                  "New folder on a file system that all machines share")
+      ->required();
+  app->add_option("--tasks", run.parts, "Number of parts, one array task each")
       ->check(NumberFrom(1, kMostParts));
-  app->add_option("-j,--jobs", run.jobs, "Cases at once in a part, and processors of its task")
+  app->add_option("-j,--jobs", run.jobs, "Cases in parallel per part, and processors of its task")
       ->check(NumberFrom(1, kMostJobs))
       ->capture_default_str();
-  app->add_option("--time", typed.time, "Limit of a part, as sbatch takes it");
+  app->add_option("--time", typed.time, "Time limit of a part, in the format of sbatch");
   app->add_option("--partition", typed.partition, "Slurm partition");
   app->add_option("--sbatch", run.batch_options,
-                  "Another option of sbatch, whole: --sbatch=--account=mine (repeatable)");
+                  "Further option of sbatch: --sbatch=--account=mine (repeatable)");
   app->add_option("--filter", run.conditions,
                   "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
   app->add_option("--set", run.settings, "Set a field before reading: /json/pointer=value");
   app->add_flag("--no-timing", typed.no_timing,
-                "Leave the timings out: parts on one machine disturb each other's");
-  app->add_flag("--isolate", run.isolate, "Every case in a process of its own");
-  app->add_flag("--resubmit", typed.submit.again,
-                "Only the parts of this folder that are not done");
-  app->add_flag("--no-queue", typed.no_queue, "Write the folder, submit nothing");
-  app->add_flag("--dry-run", typed.submit.dry_run, "Print the scripts, write nothing");
+                "Skip timings: parts on one machine disturb each other");
+  app->add_flag("--isolate", run.isolate, "Run each case in its own process");
+  app->add_flag("--resubmit", typed.submit.again, "Submit only incomplete parts of this folder");
+  app->add_flag("--no-queue", typed.no_queue, "Write the folder without submitting");
+  app->add_flag("--dry-run", typed.submit.dry_run, "Print the scripts without writing");
 
   auto& folder = commands.Keep<std::filesystem::path>();
   auto& json = commands.Keep<bool>();
@@ -395,9 +383,6 @@ void AddCluster(Commands& commands) {
   CLI::App* collect = commands.Add("collect", "Merge the parts of a submitted run",
                                    [&](const Typed&) { return Collect(folder); });
   collect->add_option("folder", folder, "Folder created by submit")->required();
-  collect->footer(
-      "DIR/whole gets every case once, in the order of the experiments. Exit codes: 0 merged, 1 a "
-      "part or a\ncase is missing and nothing was written, 2 bad input.");
 }
 
 }  // namespace loopbench::harness

@@ -22,6 +22,12 @@ struct Typed {
   std::string again;  ///< in shell syntax (ShellLine)
 };
 
+/// Returns the section of a command in docs/reference/commands.md as plain text.
+std::string HelpSection(const std::string& command);
+
+/// Returns the layout of --help: a metavariable and the default of each option.
+std::shared_ptr<CLI::FormatterBase> HelpLayout();
+
 /// The subcommands of the program. The object owns option values: `app` parses into them.
 class Commands {
  public:
@@ -41,7 +47,7 @@ class Commands {
 
   CLI::App* Add(const std::string& name, const std::string& sentence, Runner run) {
     runners_.emplace_back(app_->add_subcommand(name, sentence), std::move(run));
-    return runners_.back().first;
+    return runners_.back().first->footer(HelpSection(name));
   }
 
   /// Runs the parsed subcommand and returns its exit code, 0 if there is none.
@@ -87,9 +93,8 @@ void AddCluster(Commands& commands);
 void AddHistory(Commands& commands);
 void AddShell(Commands& commands);
 
-/// Returns one line for each word that no subcommand or option accepts, with a spelling suggestion;
-/// "" if there are none. `app` is the whole program after a failed parse.
-std::string WhatWasMeant(const CLI::App& app);
+/// Returns the message of a failed parse: unknown words with spelling suggestions, or `error`.
+std::string ParseFailure(const CLI::App& app, const CLI::Error& error);
 
 /// Returns the message, with the remedy if an unknown key in it is an old name.
 std::string WithMigrationHint(std::string message);
@@ -133,17 +138,17 @@ inline CLI::Option* AddJson(CLI::App* app, bool* json) {
 
 inline void AddFilter(CLI::App* app, std::vector<std::string>* conditions) {
   app->add_option("--filter", *conditions,
-                  "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
+                  "Only these cases: key=value[,value] (or !=, <, <=, >, >=)");
 }
 
 inline void AddWhere(CLI::App* app, std::vector<std::string>* conditions) {
   app->add_option("--where", *conditions,
-                  "Only records with key=value[,value] (or !=, <, <=, >, >=)");
+                  "Only these records: key=value[,value] (or !=, <, <=, >, >=)");
 }
 
 /// Repeatable option with one value each: a second word would be a file name.
 inline void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
-  app->add_option("--set", *settings, "Set a field before reading: /json/pointer=value");
+  app->add_option("--set", *settings, "Change a field of the file: /json/pointer=value");
 }
 
 inline void AddSize(CLI::App* app, std::string* size) {
@@ -154,7 +159,7 @@ inline void AddSize(CLI::App* app, std::string* size) {
 inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {
   return app
       ->add_option("--fail-on", *gate,
-                   "warnings: exit with 1 if an accuracy run shown did not finish or has warnings")
+                   "Exit with status 1 if a shown accuracy run has warnings or did not finish")
       ->check(CLI::IsMember({"warnings"}));
 }
 

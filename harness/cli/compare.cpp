@@ -381,38 +381,6 @@ int ExportMeasurements(const ExportCommand& command) {
 
 const std::string kMeasurements = "Folder of a run, a .jsonl file, or JSON of Google Benchmark";
 
-constexpr const char* kCompareFooter = R"(
-Counts, hashes and outcomes are compared exactly; errors and instructions by their ratio; times by a
-Mann-Whitney test for effects beyond 2 % (Holm's correction over all times), on one machine only.
-Samples that lie a factor of 1.5 apart differ, however few they are.
-What depends on round-off is compared under one compiler, flags and mathematical library only.
-A value that one side lacks, or that is none (null, a text for a number), is a difference.
-
-Examples:
-  loopbench compare results/baselines results/runs/now
-  loopbench compare old.json new.json --only times
-  loopbench compare --history bench/history results/runs/now --markdown summary.md --junit junit.xml
-  loopbench compare results/runs/before results/runs/after --only counts --only hashes
-  loopbench compare before after --match mechanism,formulation   # with other tolerances, masses, ...
-
-Exit codes: 0 the same or better, 1 something is worse or different, 2 could not measure: no time of
-those on both sides could be compared, or a case is missing on one side.)";
-
-constexpr const char* kFitFooter = R"(
-Examples:
-  loopbench_bench --benchmark_filter=/chain/ --benchmark_out=chain.json
-  loopbench fit-scaling chain.json
-  loopbench fit-scaling chain.json --min-size 30 --format markdown --out chain.md
-  loopbench fit-scaling results/runs/paper                     # timings of "chain-3", "chain-10", ...)";
-
-constexpr const char* kExportFooter = R"(
-Examples:
-  loopbench export-metrics new.json --out benchmarks.json      # github-action-benchmark, customSmallerIsBetter
-  loopbench export-metrics results/runs/paper --format bmf --out bmf.json    # Bencher, adapter json
-
-Cases that failed, and values that are no numbers, cannot be tracked: each is named.
-Exit codes: 0 all exported, 1 all but those named, 2 nothing to export or bad input.)";
-
 /// Takes BASE and NEW of compare.
 void TakeFiles(const std::vector<std::filesystem::path>& files, CompareCommand* command) {
   const bool has_history = !command->history.empty() || !command->branch.empty();
@@ -435,8 +403,7 @@ void AddCompare(Commands& commands) {
                                  TakeFiles(files, &command);
                                  return PrintComparison(command, typed.line);
                                });
-  app->footer(kCompareFooter);
-  app->add_option("base", files, kMeasurements + "; left out beside --history and --branch")
+  app->add_option("base", files, kMeasurements + "; omit BASE with --history or --branch")
       ->required()
       ->expected(1, 2)
       ->option_text("BASE NEW");
@@ -461,7 +428,7 @@ void AddCompare(Commands& commands) {
   app->add_option("--error-ratio", command.options.error_ratio, "Allowed on the same build")
       ->check(NumberFrom(1.0, 1e9))
       ->capture_default_str();
-  AddChoice(app, "--format", &command.format, "How tables are written (csv: all measures)",
+  AddChoice(app, "--format", &command.format, "Output format (csv: all measures)",
             {"text", "csv", "markdown"});
   AddWide(app);
   AddJson(app, &command.json);
@@ -472,15 +439,13 @@ void AddFit(Commands& commands) {
   CLI::App* app = commands.Add("fit-scaling",
                                "Fit scaling exponents of right-hand sides against mechanism size",
                                [&](const Typed& typed) { return PrintFits(command, typed.line); });
-  app->footer(kFitFooter);
   app->add_option("file", command.file,
                   "JSON of Google Benchmark, or a result store with timings of families")
       ->required();
   app->add_option("--min-size", command.from, "Leave out sizes below [bodies]")
       ->check(NumberFrom(0.0, 1e9));
-  AddChoice(app, "--format", &command.format, "How the table is written",
-            {"text", "csv", "markdown"});
-  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+  AddChoice(app, "--format", &command.format, "Output format", {"text", "csv", "markdown"});
+  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
   AddWide(app);
 }
 
@@ -488,11 +453,10 @@ void AddExport(Commands& commands) {
   auto& command = commands.Keep<ExportCommand>();
   CLI::App* app = commands.Add("export-metrics", "Write measurements for a benchmark tracker",
                                [&](const Typed&) { return ExportMeasurements(command); });
-  app->footer(kExportFooter);
   app->add_option("file", command.file, kMeasurements)->required();
   AddChoice(app, "--format", &command.format, "Output format: github-action-benchmark or Bencher",
             {"customSmallerIsBetter", "bmf"});
-  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
 }
 
 }  // namespace

@@ -321,19 +321,6 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   return code;
 }
 
-constexpr const char* kCountFooter = R"(
-Each row is one right-hand side, recorded shortly after the mechanism's start. Counts are exact and depend on no clock.
-docs/operation-counts.md explains the columns.
-
-Examples:
-  loopbench count configs/mechanisms/four-bar.json
-  loopbench count configs/mechanisms/*.json --enforcement acceleration --format csv --out counts.csv
-  loopbench count --family chain --sizes $(seq -s, 3 40) --enforcement acceleration --format jsonl --out chain.jsonl
-  loopbench plot chain.jsonl --out chain.svg --x bodies --y flops_per_body --group formulation,coordinates
-  loopbench count my.json --formulation odca --coordinates joint --solver plain --format json
-
-Exit codes: 0 done, 2 bad input or no right-hand side was recorded.)";
-
 }  // namespace
 
 void AddCount(Commands& commands) {
@@ -363,12 +350,11 @@ void AddCount(Commands& commands) {
       ->delimiter(',')
       ->check(CLI::IsMember({"plain", "rank-revealing"}))
       ->capture_default_str();
-  AddChoice(app, "--format", &command.format, "Format of the table",
+  AddChoice(app, "--format", &command.format, "Output format",
             {"text", "csv", "markdown", "json", "latex", "jsonl"});
-  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
   AddWide(app);
   AddLimits(app, &command.limits);
-  app->footer(kCountFooter);
 }
 
 }  // namespace loopbench::harness

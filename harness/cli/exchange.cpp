@@ -96,18 +96,6 @@ int Import(const ImportCommand& command) {
   return PrintFromChild(command.file.string(), command.limits, [&] { return ImportHere(command); });
 }
 
-constexpr const char* kImportFooter = R"(
-The format is what the root element says: <mujoco>, <robot> (URDF) or <sdf>. Every line of output is one element
-that is not there or there in another way, with its line in the file and the reason. What URDF cannot say, loops,
-forces and a start, stands in a sidecar (--loops) with the keys of mechanism files; docs/exchange.md has tables of
-what each element becomes.
-
-Examples:
-  loopbench import arm.urdf --loops arm-loops.json --out arm.json
-  loopbench import four-bar.xml --planar --out four-bar.json
-  loopbench import model.sdf --json
-  loopbench explain arm.json)";
-
 /// Parses three numbers: "0,0,-1.62".
 Eigen::Vector3d ParseGravity(const std::string& text) {
   Eigen::Vector3d gravity;
@@ -135,20 +123,19 @@ void AddImport(Commands& commands) {
         if (!gravity.empty()) command.options.gravity = ParseGravity(gravity);
         return Import(command);
       });
-  app->footer(kImportFooter);
   ImportOptions& options = command.options;
-  app->add_option("file", command.file, "The description (XML)")->required();
-  app->add_option("-o,--out", command.out,
-                  "Mechanism file (default: the file's name with .json, here)");
+  app->add_option("file", command.file, "Model file (XML)")->required();
+  app->add_option("-o,--out", command.out, "Mechanism file (default: NAME.json here)");
   app->add_option("--input-format", options.format, "Expected input format")
       ->check(CLI::IsMember(ImportFormats()));
   app->add_option("--loops", options.sidecar,
-                  "Sidecar (JSON): loops, joints, forces, initial, gravity, observe");
-  app->add_flag("--planar", options.planar, "As a planar mechanism, which it must be");
-  app->add_flag("--floating", options.floats, "URDF: the root link is free, not fixed");
+                  "Sidecar file (JSON): loops, joints, forces, initial, gravity, known_solution");
+  app->add_flag("--planar", options.planar,
+                "Import as a planar mechanism; an error if it is spatial");
+  app->add_flag("--floating", options.floats, "Free root link instead of a fixed one (URDF)");
   app->add_flag("--keep-digits", options.keeps_digits,
                 "Keep rounded angles and directions (1.5708) as written");
-  app->add_option("--gravity", gravity, "x,y,z in place of the file's [m/s^2]");
+  app->add_option("--gravity", gravity, "Gravity x,y,z [m/s^2] instead of the file's");
   app->add_flag("--json", command.json,
                 "One JSON document instead (docs/exchange.md has its keys)");
   AddLimits(app, &command.limits);
@@ -237,18 +224,6 @@ std::vector<std::string> ExportFormatNames() {
   return names;
 }
 
-constexpr const char* kConvertFooter = R"(
-The file has the mechanism at its assembled start, with the user's names; what is said in other words, and what is
-lost, stands in its first comment and is printed. What a format does not have is named, with exit code 2, and nothing
-is written: prescribed motions, forces that depend on time, drag, forces along a joint that closes a loop; docs/exchange-out.md.
-
-  loopbench export-mechanism my.json --to mjcf                  # my.xml: python3 -m mujoco.viewer --mjcf=my.xml
-  loopbench export-mechanism my.json --to mjcf --step 1e-4      # stiff springs, and loops that come apart less
-  loopbench export-mechanism my.json --to simbody --out my.cpp
-  g++ -std=c++17 -O2 -isystem /usr/include/simbody my.cpp -o my -lSimTKsimbody -lSimTKmath -lSimTKcommon
-  ./my                                                 # JSON: coordinates, speeds, accelerations, places
-  ./my 1 1e-10                                         # the same after 1 s)";
-
 }  // namespace
 
 void AddConvert(Commands& commands) {
@@ -256,19 +231,16 @@ void AddConvert(Commands& commands) {
   CLI::App* app = commands.Add("export-mechanism", "Write a mechanism for MuJoCo or Simbody",
                                [&](const Typed&) { return Convert(command); });
   app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
-  app->add_option("--to", command.to,
-                  "mjcf: a model that MuJoCo loads; simbody: a C++17 program that builds a System")
+  app->add_option("--to", command.to, "mjcf: MuJoCo model; simbody: C++17 program")
       ->required()
       ->check(CLI::IsMember(ExportFormatNames()));
-  app->add_option("-o,--out", command.out,
-                  "File (default: the mechanism file's name with .xml or .cpp, here)");
+  app->add_option("-o,--out", command.out, "Output file (default: NAME.xml or NAME.cpp here)");
   app->add_option("--step", command.options.time_step,
-                  "mjcf: MuJoCo's step [s], of which its closures are as stiff as they may be")
+                  "MuJoCo's step [s]; loop constraints are as stiff as it permits (mjcf)")
       ->check(NumberFrom(1e-12, 1e3))
       ->capture_default_str();
   AddJson(app, &command.json);
   AddLimits(app, &command.limits);
-  app->footer(kConvertFooter);
 }
 
 }  // namespace loopbench::harness

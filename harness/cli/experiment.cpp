@@ -340,7 +340,7 @@ void AddCheck(Commands& commands) {
         return CheckFiles(command);
       });
   app->add_option("file", command.files.paths, "Files (JSON)")->required();
-  app->add_flag("--no-assembly", no_assembly, "Read only, assemble no start");
+  app->add_flag("--no-assembly", no_assembly, "Read files without assembling mechanisms");
   AddLimits(app, &command.limits);
   AddJson(app, &command.json);
   AddSettings(app, &settings);

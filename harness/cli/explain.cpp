@@ -1,4 +1,4 @@
-// explain: the runs and measures of an experiment, in sentences.
+// explain: problems, methods, runs and measures of an experiment.
 #include "harness/cli/explain.h"
 
 #include <fmt/format.h>
@@ -30,63 +30,63 @@ std::string Numbers(const std::vector<double>& numbers) {
   return ListInWords(words);
 }
 
-/// Returns true if some method passes.
-template <class Is>
-bool Any(const Experiment& experiment, Is is) {
-  return std::any_of(experiment.columns.begin(), experiment.columns.end(), is);
-}
-
-void ExplainScenes(const Experiment& experiment) {
-  Print("\nMechanisms\n");
+/// Prints the problems as a table.
+void ExplainProblems(const Experiment& experiment) {
+  Table table;
+  table.columns = {{"name", "problem"},
+                   {"space", "space"},
+                   {"bodies", "bodies", Format::kInteger},
+                   {"joints", "joints", Format::kInteger},
+                   {"horizons", "horizon [s]"},
+                   {"file", "file"}};
   for (const ExperimentScene& scene : experiment.scenes) {
     const MechanismDescription& description = scene.mechanism.description;
-    Print("  {} is {} mechanism of {} and {}{}. It is simulated for {} s of its own time.\n",
-          scene.name, description.space == SpaceKind::kPlanar ? "a planar" : "a spatial",
-          description.bodies.size() == 2 ? "1 body"
-                                         : fmt::format("{} bodies", description.bodies.size() - 1),
-          WithCount(description.joints.size(), "joint"),
-          scene.path.empty() ? "" : " (" + scene.path.string() + ")", Numbers(scene.horizons));
+    AddRow(
+        {scene.name, std::string(ToString(description.space)), Count(description.bodies.size() - 1),
+         Count(description.joints.size()), Numbers(scene.horizons), scene.path.string()},
+        &table);
   }
+  PrintSection("Problems", table, ViewOfOutput(true));
 }
 
-void ExplainFormulations(const Experiment& experiment) {
-  Print("\nColumns: {} ways of keeping the loops closed\n", experiment.columns.size());
-  for (const Column& column : experiment.columns) Print("  {}\n", ToString(column));
-  Print("  The words stand for formulation/enforcement/coordinates/solver.\n");
-  for (const FormulationRow& row : Formulations()) {
-    const bool used =
-        Any(experiment, [&row](const Column& one) { return one.formulation == row.name; });
-    if (used) Print("  {}: {}\n", row.name, row.sentence);
-  }
-}
-
-void ExplainChoices(const Experiment& experiment) {
-  const auto any = [&](auto is) { return Any(experiment, is); };
-  for (const LevelTraits& level : Levels()) {
-    if (any([&](const Column& c) { return ToString(c.enforcement) == level.name; })) {
-      Print("  {}: {}\n", level.name, level.sentence);
+/// Prints the methods as a table, and the meaning of their words.
+void ExplainMethods(const Experiment& experiment) {
+  Table table;
+  table.columns = {{"formulation", "formulation"},
+                   {"enforcement", "enforcement"},
+                   {"coordinates", "coordinates"},
+                   {"solver", "solver"}};
+  for (const Column& method : experiment.columns) {
+    std::vector<Value> row;
+    for (const std::string& word : CLI::detail::split(ToString(method), '/')) row.push_back(word);
+    if (row.size() > table.columns.size()) {  // a peer's name contains a slash
+      row.front() = std::get<std::string>(row[0]) + "/" + std::get<std::string>(row[1]);
+      row.erase(row.begin() + 1);
     }
+    AddRow(row, &table);
   }
-  if (any([](const Column& c) { return c.coordinates == Coordinates::kJoint; })) {
-    Print(
-        "  joint: the coordinates are those of the joints, but for one cut joint per loop, "
-        "where drift shows.\n");
+  PrintSection("Methods", table, ViewOfOutput(true));
+  const auto define = [&](std::string_view word, std::string_view sentence, auto is) {
+    if (std::ranges::any_of(experiment.columns, is)) Print("  {}: {}\n", word, sentence);
+  };
+  for (const FormulationRow& row : Formulations()) {
+    define(row.name, row.sentence, [&](const Column& c) { return c.formulation == row.name; });
   }
-  if (any([](const Column& c) { return c.coordinates == Coordinates::kAbsolute; })) {
-    Print(
-        "  absolute: the coordinates are every body's position and angle; drift may show "
-        "at every joint.\n");
+  for (const LevelTraits& level : Levels()) {
+    define(level.name, level.sentence,
+           [&](const Column& c) { return ToString(c.enforcement) == level.name; });
   }
-  if (any([](const Column& c) { return c.solver == SolverKind::kAsPublished; })) {
-    Print(
-        "  plain: plain factorisations (for reduction: the mechanism's fixed "
-        "independent speeds), which fail or go wrong where the loops lose rank.\n");
-  }
-  if (any([](const Column& c) { return c.solver == SolverKind::kRankRevealing; })) {
-    Print(
-        "  rank-revealing: solvers that notice lost rank (for reduction: independent speeds "
-        "chosen anew).\n");
-  }
+  define("joint", "joint coordinates, without one cut joint per loop, where drift appears.",
+         [](const Column& c) { return c.coordinates == Coordinates::kJoint; });
+  define("absolute", "position and orientation of each body; drift can appear at each joint.",
+         [](const Column& c) { return c.coordinates == Coordinates::kAbsolute; });
+  define("plain",
+         "plain factorisations (reduction: fixed independent speeds); they fail or lose accuracy "
+         "if constraints lose rank.",
+         [](const Column& c) { return c.solver == SolverKind::kAsPublished; });
+  define("rank-revealing",
+         "solvers that detect rank loss (reduction: independent speeds are chosen anew).",
+         [](const Column& c) { return c.solver == SolverKind::kRankRevealing; });
 }
 
 /// Returns the unit of a joint's coordinate, from the first problem with this joint.
@@ -102,74 +102,58 @@ std::string_view UnitOf(const Experiment& experiment, const std::string& joint) 
 }
 
 void ExplainRuns(const Experiment& experiment) {
-  const bool alone = experiment.integrators.size() == 1;
-  Print("\nRuns\n  The integrator{} {}; ", alone ? " is" : "s are",
-        fmt::join(experiment.integrators, ", "));
+  Print("\nRuns\n  integrators: {}\n", fmt::join(experiment.integrators, ", "));
   if (!experiment.tolerances.empty()) {
-    Print("{} relative and absolute tolerances are equal: {}. Smaller is more accurate.\n",
-          alone ? "its" : "their", Numbers(experiment.tolerances));
+    Print("  relative and absolute tolerances: {}\n", Numbers(experiment.tolerances));
   }
   if (!experiment.fixed_steps.empty()) {
-    Print("{}steps of fixed length without error test: {} s.\n",
-          experiment.tolerances.empty() ? "" : "  Each case also runs with ",
-          Numbers(experiment.fixed_steps));
+    Print("  fixed steps without error control [s]: {}\n", Numbers(experiment.fixed_steps));
   }
   if (experiment.ensembles.empty()) {
-    Print(
-        "  Each case runs once. One run resolves no exponent of growth with confidence; "
-        "\"ensembles\" would.\n");
+    Print("  ensembles: none; a single run gives no confidence interval of growth exponents\n");
   }
   for (const EnsembleRule& rule : experiment.ensembles) {
     const std::vector<Case> cases = Expand(experiment);
     const auto count = static_cast<std::size_t>(std::count_if(
         cases.begin(), cases.end(), [&rule](const Case& one) { return Matches(rule, one); }));
     std::string start =
-        fmt::format("each held coordinate moved by up to {:g} (rad or m)", rule.perturb);
+        fmt::format("each fixed coordinate perturbed by up to {:g} rad or m", rule.perturb);
     if (!rule.between.empty()) start.clear();
     for (const DrawnCoordinate& drawn : rule.between) {
-      start += fmt::format("{}{} between {:g} and {:g} ({})", start.empty() ? "" : ", ",
-                           drawn.joint, drawn.from, drawn.to, UnitOf(experiment, drawn.joint));
+      start += fmt::format("{}{} between {:g} and {:g} {}", start.empty() ? "" : ", ", drawn.joint,
+                           drawn.from, drawn.to, UnitOf(experiment, drawn.joint));
     }
-    Print(
-        "  {} also run{} {} times from perturbed starts: {}, drawn from seed {}. The spread of the "
-        "results says how far a single run can be trusted; where the problem knows a branch, "
-        "ensemble_branch_kept counts the runs that stay within {:g} rad of it.\n",
-        WithCount(count, "case"), count == 1 ? "s" : "", rule.size, start, rule.seed,
-        rule.branch_bound);
+    Print("  ensembles: {}, {} runs each, seed {}; {}\n", WithCount(count, "case"), rule.size,
+          rule.seed, start);
+    Print("  ensemble_branch_kept counts runs within {:g} rad of a known branch\n",
+          rule.branch_bound);
   }
   const Limits& limits = experiment.limits;
-  Print(
-      "  A run is given up after {:g} s of CPU time, {} accepted steps, or {:g} MiB of "
-      "memory; its row then says so.\n",
-      limits.cpu_s, limits.steps, limits.memory_mb);
+  Print("  limits of a run: {:g} s of CPU time, {} steps, {:g} MiB of memory\n", limits.cpu_s,
+        limits.steps, limits.memory_mb);
 }
 
 void ExplainMeasures(const Experiment& experiment, const Selection& filter) {
   Print(
-      "\nMeasured at every accepted step\n"
-      "  drift [m, rad]: how far the joints that ought to hold have come apart, and the "
-      "power of time it grows with;\n"
-      "  energy error [J]; rank and conditioning of the loops; how the run ended.\n"
-      "  Series keep {} points for figures.\n",
+      "\nMeasures at each accepted step\n"
+      "  drift [m, rad]: constraint violation, and its exponent of growth\n"
+      "  energy error [J], rank and conditioning of the constraints, outcome\n"
+      "  series for figures: {} points\n",
       experiment.series_points);
   for (const ObserverRow& row : RegisteredObservers()) Print("  {}: {}\n", row.name, row.sentence);
   if (const std::size_t rungs = CountRungs(experiment); rungs > 0) {
-    Print(
-        "  {} in several scalars with one integrator: error and drift against tolerance, and "
-        "whether truncation or round-off rules them.\n",
-        WithCount(rungs, "run"));
+    Print("  precision: {} in several floating-point types; error and drift against tolerance\n",
+          WithCount(rungs, "run"));
   }
   const std::size_t timings = CountTimings(experiment, filter);
   if (timings == 0) {
-    Print("  There are no timings.\n");
+    Print("  no timings\n");
     return;
   }
-  Print(
-      "  {}, in runs of their own and never two at once: time of one right-hand side [ns] "
-      "and of whole simulations, {} repeats {}.\n",
-      WithCount(timings, "timing"), experiment.timing.repeats,
-      experiment.timing.cases ? "of each case as it is"
-                              : fmt::format("at tolerance {}", experiment.timing.tolerance));
+  Print("  {}, one at a time: right-hand side [ns] and whole simulations, {} repetitions {}\n",
+        WithCount(timings, "timing"), experiment.timing.repeats,
+        experiment.timing.cases ? "of each case"
+                                : fmt::format("at tolerance {}", experiment.timing.tolerance));
 }
 
 /// Returns the used values of an axis, each once, in their order.
@@ -186,7 +170,7 @@ std::vector<std::string> ValuesOf(const std::string& axis,
 void ExplainSweep(const Overview& overview) {
   const Experiment& first = overview.experiments.front();
   if (!first.parameters.items().empty()) {
-    Print("\nSweep: {} of values; what follows is the first\n",
+    Print("\nSweep: {}; the first is described below\n",
           WithCount(overview.combinations, "combination"));
     for (const auto& [name, number] : overview.axes) {
       std::vector<std::string> values = ValuesOf(name, overview.experiments);
@@ -197,14 +181,12 @@ void ExplainSweep(const Overview& overview) {
         values.push_back("...");
         values.push_back(last);
       }
-      Print("  {}: {}", name, fmt::join(values, ", "));
-      Print("{}", overview.is_sample ? fmt::format(" ({} values, some shown)\n", number) : "\n");
+      Print("  {}: {}{}\n", name, fmt::join(values, ", "),
+            overview.is_sample ? fmt::format(" ({} values, some shown)", number) : "");
     }
-    Print("  Every record carries these values, for --filter {}=...\n",
-          first.parameters.items().front().first);
   }
   if (!first.exclusions.empty()) {
-    Print("\nLeft out are cases with");
+    Print("\nExcluded cases:");
     for (const Selection& rule : first.exclusions) Print(" [{}]", ToText(rule));
     Print("\n");
   }
@@ -216,20 +198,13 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
   for (const Experiment& one : overview.experiments) CheckLadders(one);
   Print("{} ({})\n", first.name, path.string());
   if (!first.comment.empty()) Print("  {}\n", first.comment);
-  Print(
-      "  {}: each is one mechanism, column, tolerance and horizon. Units are SI, angles "
-      "in rad.\n",
-      WithCount(overview.cases(), "case"));
+  Print("  {}: each combination of problem, horizon, method and tolerance\n",
+        WithCount(overview.cases(), "case"));
   ExplainSweep(overview);
-  ExplainScenes(first);
-  ExplainFormulations(first);
-  ExplainChoices(first);
+  ExplainProblems(first);
+  ExplainMethods(first);
   ExplainRuns(first);
   ExplainMeasures(first, files.filter);
-  Print(
-      "\nloopbench list {0} shows every case, loopbench estimate {0} the time they will "
-      "take.\n",
-      path.string());
 }
 
 JsonObject ExperimentDocument(const std::filesystem::path& path, const ExperimentFiles& files) {
@@ -439,7 +414,7 @@ void AddExplain(Commands& commands) {
   AddSettings(app, &settings);
   AddWide(app);
   AddJson(app, &json);
-  app->add_flag("--all", all, "Every row of long tables of a mechanism");
+  app->add_flag("--all", all, "Print all rows of long tables");
 }
 
 }  // namespace loopbench::harness

@@ -21,16 +21,16 @@ constexpr std::size_t kMostNames = 12;
 std::string Names(const std::vector<std::string>& names, const ExplainView& view) {
   if (view.all || names.size() <= kMostNames) return fmt::format("{}", fmt::join(names, " "));
   const std::vector<std::string> first(names.begin(), names.begin() + kMostNames - 2);
-  return fmt::format("{} ... ({} left out) {}", fmt::join(first, " "),
-                     names.size() - kMostNames + 1, names.back());
+  return fmt::format("{} ... ({} omitted) {}", fmt::join(first, " "), names.size() - kMostNames + 1,
+                     names.back());
 }
 
 Table LoopTable(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
   Table table;
   table.columns = {{"cut", "cut joint", Format::kText, {}},
-                   {"shift", "open [m]", Format::kScientific, {}},
-                   {"turn", "open [rad]", Format::kScientific, {}},
+                   {"shift", "gap [m]", Format::kScientific, {}},
+                   {"turn", "gap [rad]", Format::kScientific, {}},
                    {"what", "of", Format::kText, {}},
                    {"through", "through", Format::kText, {}}};
   for (const LoopPath& loop : structure.loops) {
@@ -67,11 +67,11 @@ void PrintFreedom(const Structure& s, const ExplainView& view) {
     return;
   }
   if (s.freedom_of_parts) {
-    Say(view, "  {} that lead anywhere: a part cannot move, see Warnings\n", *s.freedom_of_parts);
+    Say(view, "  {} finite motions: a part cannot move, see Warnings\n", *s.freedom_of_parts);
     return;
   }
   if (s.freedom_at_start() != s.freedom()) {
-    Say(view, "  {} at the start, a singular position: rank {} there\n", s.freedom_at_start(),
+    Say(view, "  {} at the start, a singular configuration of rank {}\n", s.freedom_at_start(),
         s.rank);
   }
   if (s.rank > 0 && s.singular_values.size() == 0) {
@@ -93,9 +93,9 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
     released = released || one.released;
   }
   if (!released) return;
-  Say(view, "  All of these can be dropped at once; the loops then stay closed as they do now.\n");
+  Say(view, "  All of them can be removed at once; the motion stays the same.\n");
   if (structure.rounding > 0.0) {
-    Say(view, "  They are redundant within {:.2g} lengths: a run leaves them out (\"accuracy\").\n",
+    Say(view, "  They are redundant within {:.2g} lengths: a run removes them (\"accuracy\").\n",
         structure.rounding);
   } else {
     Say(view,
@@ -110,14 +110,14 @@ void PrintIslands(const MechanismDescription& description, const Structure& stru
   table.columns = {{"subsystem", "subsystem", Format::kInteger, {}},
                    {"bodies", "bodies", Format::kInteger, {}},
                    {"first", "first body", Format::kText, {}},
-                   {"held", "held by", Format::kText, {}}};
+                   {"held", "connected to", Format::kText, {}}};
   for (std::size_t i = 0; i < structure.islands.size(); ++i) {
     const Island& island = structure.islands[i];
     Record row;
     row.Set("subsystem", static_cast<std::int64_t>(i + 1));
     row.Set("bodies", static_cast<std::int64_t>(island.bodies.size()));
     row.Set("first", description.bodies[island.bodies.front()].name);
-    row.Set("held", std::string(island.grounded ? "ground" : "nothing: it floats"));
+    row.Set("held", std::string(island.grounded ? "ground" : "nothing (floating)"));
     table.rows.push_back(row);
   }
   PrintSection("Separate subsystems, connected through ground at most", table, view, "subsystems");
@@ -235,8 +235,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
              std::vector<double>(description.gravity.begin(), description.gravity.end()));
     DescribeStructure(description, structure, view.document);
   }
-  Say(view, "{} ({})\n  described in {}; lengths in m, angles in rad\n", description.name,
-      path.string(), description.space == SpaceKind::kPlanar ? "the plane" : "space");
+  Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
+      path.string(), description.space == SpaceKind::kPlanar ? "planar" : "spatial");
   PrintModel(description, structure, view);
   PrintStart(description, structure, view);
   PrintFreedom(structure, view);
@@ -250,7 +250,7 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   if (compiled.report.empty()) Say(view, "  none\n");
   for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
   if (compiled.done != CompileOptions::None()) {
-    Say(view, "  Savings found: {}. By default a run makes: {} (\"compile\" of an experiment).\n",
+    Say(view, "  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
         ToString(compiled.done), ToString(CompileOptions()));
   }
   if (view.document != nullptr) {
@@ -333,7 +333,7 @@ class StartText {
       return std::ranges::find(list, joint, &JointValues::joint) != list.end();
     };
     if (std::ranges::find(initial.held, joint) != initial.held.end()) {
-      text = "held";
+      text = "fixed";
     } else if (has(initial.coordinates)) {
       text = "guessed";
     }
@@ -375,7 +375,7 @@ void PrintOf(const MechanismDescription& description, const Start<double>& start
              const ExplainView& view) {
   const StartText<Space> text(description, start);
   const bool closed = start.outcome != Outcome::kInconsistentStart;
-  PrintSection(closed ? "Start as assembled, t = 0" : "Start, where the assembly gave up",
+  PrintSection(closed ? "Start as assembled, t = 0" : "Start, not assembled",
                text.JointValuesTable(), view, "start");
   if (!closed) return;
   const Energy<double> energy = text.EnergyAtStart();
@@ -388,8 +388,8 @@ void PrintOf(const MechanismDescription& description, const Start<double>& start
   Say(view, "  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
       ShortNumber(energy.potential), ShortNumber(energy.total()));
   Say(view,
-      "  Potential 0: coms and constant forces in the ground origin, springs at rest, joint\n");
-  Say(view, "  torques at coordinate 0.\n");
+      "  Zero potential: centres of mass and constant forces at the ground's origin, springs at "
+      "rest,\n  joint torques at coordinate 0.\n");
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ std::string InertiaText(const Eigen::Matrix3d& I, SpaceKind space) {
 Table BodyTable(const MechanismDescription& description, const Structure& structure) {
   Table table;
   table.columns = {{"name", "body", Format::kText, {}},
-                   {"part", "part", Format::kInteger, {}},
+                   {"part", "subsystem", Format::kInteger, {}},
                    {"mass", "mass [kg]", Format::kShortest, {}},
                    {"inertia", "inertia [kg m^2]", Format::kText, {}},
                    {"com", "com [m]", Format::kText, {}},
@@ -159,7 +159,7 @@ Table FrameTable(const MechanismDescription& description) {
   table.columns = {
       {"name", "joint", Format::kText, {}},   {"side", "frame", Format::kText, {}},
       {"body", "on body", Format::kText, {}}, {"at", "origin [m]", Format::kText, {}},
-      {"axes", "axis", Format::kText, {}},    {"turn", "turned by [rad]", Format::kText, {}}};
+      {"axes", "axis", Format::kText, {}},    {"turn", "rotation vector [rad]", Format::kText, {}}};
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
@@ -237,13 +237,15 @@ void PrintModel(const MechanismDescription& description, const Structure& struct
   Say(view, "  gravity ({}) m/s^2 in ground axes\n",
       VectorText(description.gravity, description.space));
   PrintSection("Bodies", BodyTable(description, structure), view, "bodies");
-  Say(view, "  Points and com are seen from the body's origin, inertia is about com.\n");
-  if (!planar) Say(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz where they are not zero.\n");
+  Say(view, "  Points and com are relative to the body's origin; inertia is about com.\n");
+  if (!planar) Say(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz unless zero.\n");
   PrintSection("Joints", JointTable(description, structure), view, "joints");
   PrintSection("Frames of joints",
                planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view,
                "frames");
-  Say(view, "  Origin, axis and turn are in axes of the body; coordinates say how M moves in F.\n");
+  Say(view,
+      "  Origin, axis and rotation vector are in body axes. Coordinates describe M relative to "
+      "F.\n");
   PrintSection("Forces", ForceTable(description), view, "forces");
 }
 

@@ -34,20 +34,6 @@ struct GenerateCommand {
   ProcessLimits limits = kFileLimits;
 };
 
-constexpr const char* kGenerateFooter = R"(
-DIR receives NAME.h, NAME.c, NAME_example.c and CMakeLists.txt: C99 without heap or libraries, for controllers, hardware in
-the loop and other languages. docs/generated-code.md describes the functions and calls them from Python.
-
-Code is generated for each branch (pivots, singular values) that the motion takes within the horizon. In a state of
-another branch the functions return 1.
-
-Examples:
-  loopbench generate configs/mechanisms/four-bar.json --out four-bar-c
-  cmake -S four-bar-c -B four-bar-c/build && cmake --build four-bar-c/build && four-bar-c/build/four_bar_example 1 1e-3
-  loopbench generate configs/mechanisms/stewart-platform.json --formulation lagrange --out stewart --fmu stewart.fmu
-
-Exit codes: 0 done, 2 bad input or the mechanism cannot be generated.)";
-
 // integrator of the motion along which branches are recorded
 constexpr const char* kProfile = "ode45";
 constexpr double kTolerance = 1e-6;
@@ -216,7 +202,6 @@ void AddGenerate(Commands& commands) {
       ->check(NumberFrom(1e-9, 1e3));
   AddJson(app, &command.json);
   AddLimits(app, &command.limits);
-  app->footer(kGenerateFooter);
 }
 
 }  // namespace loopbench::harness

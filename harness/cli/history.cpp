@@ -243,22 +243,10 @@ std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string
 
 namespace {
 
-constexpr const char* kHistoryFooter = R"(
-A history is a folder (--store) or a branch of the repository that you are in (--branch, which add begins when it
-is not there). Steps are found in the logarithms of each measure of each case on each machine, by the least penalised
-cost with a bounded loss (Fearnhead and Rigaill 2019), so that single slow runs are none; docs/history.md.
-
-Examples:
-  loopbench history add results/runs/bench --branch loopbench-history
-  loopbench history show --branch loopbench-history --measure wall_s
-  loopbench history report --branch loopbench-history --out history.html
-  loopbench history mark 1a2b3c accepted --note 'exact mass matrix, slower' --branch loopbench-history
-  loopbench compare --branch loopbench-history results/runs/bench --markdown summary.md)";
-
 void AddPlace(CLI::App* app, HistoryPlace* place) {
   CLI::Option* store = app->add_option("--store", place->store, "Folder of the history");
   app->add_option("--branch", place->branch,
-                  "Branch of the git repository here, instead of a folder")
+                  "Git branch that contains the history, instead of a folder")
       ->excludes(store);
 }
 
@@ -285,7 +273,6 @@ void AddHistory(Commands& commands) {
   auto& typed = commands.Keep<TypedHistory>();
   CLI::App* app = commands.Add("history", "Follow measurements over commits and find change points",
                                [&](const Typed& words) { return RunHistory(&typed, words.line); });
-  app->footer(kHistoryFooter);
   app->require_subcommand(1);
 
   typed.add_app = app->add_subcommand("add", "Add the results of a commit");
@@ -296,7 +283,7 @@ void AddHistory(Commands& commands) {
   typed.add_app->add_option("--commit", typed.add.commit,
                             "Commit of the results (default: the one checked out)");
   typed.add_app->add_option("--date", typed.add.date,
-                            "ISO 8601, by which commits are ordered (default: the commit's)");
+                            "ISO 8601 date that orders commits (default: the commit's)");
   typed.add_app->add_flag("--replace", typed.add.replaces,
                           "Replace an earlier measurement of this commit");
   AddPlace(typed.add_app, &typed.place);
@@ -314,7 +301,7 @@ void AddHistory(Commands& commands) {
   typed.report_app =
       app->add_subcommand("report", "Write an HTML page with all change points and charts");
   typed.report_app->add_option("-o,--out", typed.report.out,
-                               "The page (default: history.html in the folder)");
+                               "Output file (default: history.html in the folder)");
   typed.report_app->add_option("--title", typed.report.title, "Page title")
       ->default_val("Measurements over commits");
   AddPlace(typed.report_app, &typed.place);
@@ -323,12 +310,12 @@ void AddHistory(Commands& commands) {
   typed.mark_app->add_option("commit", typed.mark.commit, "Commit hash or prefix")->required();
   typed.mark_app
       ->add_option("mark", typed.mark.mark,
-                   "good and accepted: compare takes it as base; bad: never")
+                   "good and accepted: valid base of comparisons; bad: never a base")
       ->required()
       ->check(CLI::IsMember({"good", "accepted", "bad"}));
   typed.mark_app->add_option("--note", typed.mark.note, "Reason, stored with the mark");
   typed.mark_app->add_flag("--keep-accepted", typed.mark.keeps_accepted,
-                           "Leave it as it is where somebody accepted it (for jobs)");
+                           "Keep an existing mark 'accepted' (for automatic jobs)");
   AddPlace(typed.mark_app, &typed.place);
 }
 

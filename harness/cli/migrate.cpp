@@ -355,13 +355,6 @@ void AddMigrate(Commands& commands) {
                                [&](const Typed&) { return Migrate(files); });
   app->add_option("file", files, "Configuration files (JSON), stores and files of records")
       ->required();
-  app->footer(
-      "Keys and values with old names are replaced in place. All other bytes stay, and checksums "
-      "are\n"
-      "renewed. A file without old names is not written. Folders are stores with their mechanisms\n"
-      "and references. Migrated records serve tables and figures: a new run repeats their cases,\n"
-      "because identities of cases contain names.\n"
-      "  loopbench migrate my-experiment.json results/runs/my-experiment");
 }
 
 std::string WithMigrationHint(std::string message) {

@@ -72,13 +72,13 @@ std::string Sentence(std::string text) {
 
 std::string CommentOf(const SceneModel& model, const std::string& whole) {
   std::string text =
-      fmt::format("{} of {}: {}", model.is_exact ? "The same motion" : "A simpler model", whole,
+      fmt::format("{} of {}: {}", model.is_exact ? "Exact model" : "Simplified model", whole,
                   Sentence(fmt::format("{}", fmt::join(model.done, "; "))));
   if (!model.dropped.empty()) {
-    text += fmt::format(" No longer there: {}",
-                        Sentence(fmt::format("{}", fmt::join(model.dropped, "; "))));
+    text +=
+        fmt::format(" Removed: {}", Sentence(fmt::format("{}", fmt::join(model.dropped, "; "))));
   }
-  if (!model.assumption.empty()) text += fmt::format(" Right where {}", Sentence(model.assumption));
+  if (!model.assumption.empty()) text += fmt::format(" Assumption: {}", Sentence(model.assumption));
   return text;
 }
 
@@ -96,7 +96,7 @@ std::string LadderName(const SceneModels& ladder) {
 std::string PageOf(const SceneModels& ladder, double horizon, const std::string& typed) {
   const MechanismDescription& whole = ladder.models.front().description;
   std::string page = fmt::format(
-      "# Models of {}\n\nWritten by `{}`. `{}` runs all of them alike for {} s.\n\n"
+      "# Models of {}\n\nWritten by `{}`. `{}` runs all of them for {} s.\n\n"
       "| file | motion | bodies | joints | forces | model error [m] | evaluations |\n"
       "|---|---|---|---|---|---|---|\n",
       EscapeMarkdown(whole.name), EscapeMarkdown(typed), LadderFileName(ladder), horizon);
@@ -109,28 +109,26 @@ std::string PageOf(const SceneModels& ladder, double horizon, const std::string&
   }
   if (ladder.models.front().rhs_evaluations >= 0) {
     page +=
-        "\n*model error*: the largest distance of a named point from where the whole model has it, "
-        "at "
-        "50 "
-        "times of a run in tight steps (multipliers at level projection, dormand-prince at 1e-10); "
-        "*evaluations*: right-hand sides that run took.\n";
+        "\n*model error*: the largest distance of a named point from its place in the full model, "
+        "at 50 times of an accurate run (multipliers at level projection, dormand-prince at "
+        "1e-10); "
+        "*evaluations*: right-hand sides of that run.\n";
   }
   for (std::size_t i = 1; i < ladder.models.size(); ++i) {
     const SceneModel& model = ladder.models[i];
     page += fmt::format("\n## {}\n\n{}", model.name, List(model.done));
-    if (!model.dropped.empty())
-      page += fmt::format("\nNo longer there:\n\n{}", List(model.dropped));
+    if (!model.dropped.empty()) page += fmt::format("\nRemoved:\n\n{}", List(model.dropped));
     if (!model.assumption.empty()) {
-      page += fmt::format("\nRight where {}\n", EscapeMarkdown(Sentence(model.assumption)));
+      page += fmt::format("\nAssumption: {}\n", EscapeMarkdown(Sentence(model.assumption)));
     }
     const std::vector<std::string> gone = Gone(whole, model.description);
-    if (!gone.empty()) page += fmt::format("\nBy name:\n\n{}", List(gone));
+    if (!gone.empty()) page += fmt::format("\nNames:\n\n{}", List(gone));
     if (!model.R_WC.isIdentity(0.0)) {
       const auto axis = [&](int i_axis) {
         const Eigen::Vector3d v = model.R_WC.col(i_axis);
         return fmt::format("({:.6g}, {:.6g}, {:.6g})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
       };
-      page += fmt::format("\nIts x, y and z are {}, {} and {} of the whole model.\n", axis(0),
+      page += fmt::format("\nIts x, y and z axes are {}, {} and {} in the full model.\n", axis(0),
                           axis(1), axis(2));
     }
   }
@@ -181,7 +179,7 @@ void MeasureErrors(double horizon, double cpu_s, SceneModels* ladder) {
     if (is_whole) truth = std::move(track);
     if (is_whole || !model.worst.empty()) continue;
     if (!truth.failure.empty()) {
-      model.worst = "the whole model: " + truth.failure;
+      model.worst = "the full model: " + truth.failure;
       continue;
     }
     const ModelError error = Compare(truth, track);
@@ -212,9 +210,9 @@ std::vector<std::string> Gone(const MechanismDescription& whole,
             "{} on {}", point, now.body == kGround ? "ground" : simplified.bodies[now.body].name));
       }
     }
-    std::string line = fmt::format("body {} is gone", body.name);
+    std::string line = fmt::format("body {} is removed", body.name);
     if (!found.empty()) line += fmt::format("; its points: {}", fmt::join(found, ", "));
-    if (!lost.empty()) line += fmt::format("; points that are gone: {}", fmt::join(lost, ", "));
+    if (!lost.empty()) line += fmt::format("; removed points: {}", fmt::join(lost, ", "));
     lines.push_back(line);
   }
   return lines;
@@ -231,13 +229,13 @@ void WriteModels(const SceneModels& ladder, double horizon, const std::string& t
   const std::string& whole = ladder.models.front().description.name;
   std::map<std::string, std::string> files;
   LadderFile experiment{LadderName(ladder),
-                        fmt::format("Models of {}, from the whole one down (models.md).", whole),
+                        fmt::format("Models of {}, the full model first (models.md).", whole),
                         {},
                         horizon};
   for (const SceneModel& model : ladder.models) {
     const std::string file = model.name + ".json";
     const std::string comment =
-        &model == &ladder.models.front() ? "The whole model." : CommentOf(model, whole);
+        &model == &ladder.models.front() ? "The full model." : CommentOf(model, whole);
     files[file] = MechanismText(model.description, model.observe, comment);
     experiment.mechanisms.push_back(file);
   }
@@ -338,14 +336,14 @@ void WriteRun(const JudgedModel& judged, Record& record) {
 /// Writes the error of the model relative to the full model, and whether it is accepted.
 void WriteVerdict(const MechanismFile& file, const JudgedModel& whole, const JudgedModel& judged,
                   const ModelQuestion& question, Record& record) {
-  if (&judged == &whole) return record.Set("model_verdict", std::string("the whole model"));
+  if (&judged == &whole) return record.Set("model_verdict", std::string("full model"));
   record.Set("model_accepts", question.accept);
   const auto conclude = [&](const std::string& verdict) { record.Set("model_verdict", verdict); };
   if (!judged.fault.empty()) return conclude("refused: " + judged.fault);
   const CausedError caused = ErrorOfModel(file.description, whole.certain.reference, judged.model,
                                           judged.certain.reference, {});
   record.Set("model_points", std::int64_t{caused.points});
-  if (caused.points == 0) return conclude("refused: it has no point of the whole one");
+  if (caused.points == 0) return conclude("refused: it has no point of the full model");
   const double certified =
       whole.certain.reference.Certified().position + judged.certain.reference.Certified().position;
   record.Set("model_error", caused.largest);

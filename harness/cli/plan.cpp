@@ -306,7 +306,7 @@ void AddPlan(Commands& commands) {
   app->add_option("--timings-from", command.from,
                   "Earlier results whose times are used, not a pilot's");
   AddFilter(app, &conditions);
-  app->add_flag("--no-timing", no_timing, "Leave the timings out");
+  app->add_flag("--no-timing", no_timing, "Skip timings");
   AddSettings(app, &settings);
   AddWide(app);
   AddJson(app, &command.json);

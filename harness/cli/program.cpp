@@ -25,31 +25,19 @@ namespace harness {
 namespace {
 
 // {}: the names of formulations and levels
-constexpr const char* kFooter = R"(
-Examples: (paths from the root of the repository)
-  loopbench list configs/experiments/paper/paper.json
-  loopbench estimate configs/experiments/paper/paper.json --set /limits/cpu_s=5
-  loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
+constexpr const char* kFooter = R"(Examples (from the root of the repository):
   loopbench view configs/mechanisms/double-wishbone.json
-  loopbench import arm.urdf --loops arm-loops.json --out arm.json
-  loopbench count configs/mechanisms/four-bar.json
-  loopbench generate configs/mechanisms/four-bar.json --out four-bar-c
-  loopbench simplify configs/experiments/models/hall.json --verify 2
-  loopbench run big.json --shard 1/2 --out part1   (and 2/2 elsewhere)
-  loopbench merge part1 part2 --out whole
+  loopbench run configs/experiments/paper/paper.json --jobs 2 --filter mechanism=four-bar
   loopbench table results/runs/paper --where mechanism=four-bar,dead-centre --where rtol=1e-8
-  loopbench plot results/runs/paper --out results/runs/paper/figures
-  loopbench run configs/experiments/precision.json --precision-only --jobs 2
-  loopbench work-precision results/runs/work-precision --figures
-  loopbench report results/runs/work-precision
-  loopbench check-claims results/runs/paper --claims configs/experiments/paper/claims.json
-  loopbench robustness results/runs/extremes --rules configs/experiments/extremes/map.json
+  loopbench advise configs/mechanisms/four-bar.json --max-error 1e-6
 
-Conditions are key=value, key=value,value, key!=value, or of numbers 'key<value' (<=, >, >=), quoted
-for the shell; keys are the columns of drift.csv, and before a run those that name cases.
+`loopbench COMMAND --help` shows options and examples of a command.
+
+Conditions are key=value, key=value,value, key!=value, or for numbers 'key<value' (<=, >, >=). Keys are
+the columns of drift.csv; before a run, only keys that identify cases.
 Formulations: {}.
 Levels of enforcement: {}.
-Exit codes: 0 done, 1 a gate failed, 2 could not measure or bad input, 130 run was interrupted.)";
+Exit status: 0 success; 1 a check failed; 2 invalid input, or nothing could be measured; 130 interrupted.)";
 
 /// Makes an option take only the next word, because file names may follow. Only experiments of a
 /// baseline are given as the shell expands them.
@@ -109,15 +97,17 @@ int RunCommandLine(int argc, char** argv) {
       fmt::format(kFooter, fmt::join(FormulationNames(), ", "), fmt::join(LevelNames(), ", ")));
   app.set_version_flag("--version", VersionText);
   app.require_subcommand(1);
+  app.formatter(HelpLayout());
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    return EscapeTerminalLines(CLI::FailureMessage::simple(failed, error) + WhatWasMeant(*failed));
+    return EscapeTerminalLines(ParseFailure(*failed, error));
   });
   Commands commands(&app);
   for (const auto add :
-       {AddRun,        AddList,       AddCheck,    AddPlan,    AddExplain, AddSimplify, AddSchema,
-        AddMigrate,    AddAdvise,     AddView,     AddMerge,   AddTable,   AddPlot,     AddTradeoff,
-        AddTrajectory, AddVerdict,    AddMap,      AddReport,  AddImport,  AddConvert,  AddGenerate,
-        AddCount,      AddComparison, AddBaseline, AddCluster, AddHistory, AddShell}) {
+       {AddRun,     AddList,    AddPlan,       AddAdvise,   AddMerge,      AddCheck,
+        AddExplain, AddView,    AddSimplify,   AddImport,   AddConvert,    AddGenerate,
+        AddCount,   AddTable,   AddPlot,       AddReport,   AddTrajectory, AddTradeoff,
+        AddMap,     AddVerdict, AddComparison, AddBaseline, AddHistory,    AddCluster,
+        AddSchema,  AddMigrate, AddShell}) {
     add(commands);
   }
   TakeOneWordEach(&app);

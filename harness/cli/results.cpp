@@ -249,54 +249,6 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   return 0;
 }
 
-constexpr const char* kTableFooter = R"(
-Examples:
-  loopbench table out --where rtol=1e-8 --group mechanism
-  loopbench table out --where 'wall_s<0.02' --where 'drift_position_max<=1e-9'
-  loopbench table out --columns mechanism,formulation,drift_position_max --format latex
-  loopbench table out --kind timing --sort rhs_ns_median --format csv --out timing.csv
-
-"ok?" is a run that finished with warnings: the lines below the table say why, column warnings has codes
-(docs/reference/outcomes-and-warnings.md), --fail-on warnings exits with status 1.
-Any key of the records may be a column; a wrong one is answered with the list of all.
-Every table ends with the command, machine, compiler, libraries and commit.)";
-
-constexpr const char* kPlotFooter = R"(
-Examples:
-  loopbench plot out --out out/figures
-  loopbench plot out --out work.svg --x rhs_evaluations --y drift_position_max --group formulation,coordinates
-  loopbench plot out --out cost.pdf --where kind=timing --x bodies --y ns_per_body --group formulation
-
-Without --x and --y: angles and displacements of the most accurate run (finished, level projection,
-finest tolerance); drift with its fitted exponents; error and drift against tolerance in several
-floating-point types. Crosses are failed runs, hollow marks flagged ones. A figure that cannot be
-drawn is reported with its reason. The exit status is then 2, after all others are drawn.)";
-
-constexpr const char* kMapFooter = R"(
-Examples: (paths from the root of the repository)
-  loopbench robustness results/runs/extremes --rules configs/experiments/extremes/map.json
-  loopbench robustness out --rules map.json --out out --format pdf
-  loopbench robustness out --rules map.json --fail-on required        (1 if a cell that must hold does not)
-
-Rules name methods (columns), extremes (rows) and what decides about a row:
-  {"title": "Extremes",
-   "methods": [{"label": "O-DCA projection",
-                "select": {"formulation": "odca", "enforcement": "projection"}}],
-   "groups": [{"label": "singular configurations", "rows": [
-     {"label": "parallelogram, 1e-8", "select": {"mechanism": "parallelogram", "rtol": 1e-8},
-      "criteria": [{"measure": "branch_error_max", "limit": 500, "relative_to": "rtol", "unit": "rad"}],
-      "rationale": "...", "required": "all"}]}]}
-"limit", "at_least" or "equal" compare a key of the record with a number, or with that many times
-another key ("relative_to"). "expected_outcome": ["locked"] says how a run should end if not as finished.
-Of several records that match a cell the worst decides. A cell
-  holds         ended as it should, all measures within their limits
-  singular, ... stopped early with that reason; time-limit, ...: did not end by itself
-  inaccurate    finished, with a measure beyond its limit or not finite
-  crashed, ...  no result
-  ?             not measured: no record, too few ("cases"), or one without the measure
-  -             not applicable, with the rules' reason
-docs/robustness-map.md explains cells and lists all keys of the rules.)";
-
 }  // namespace
 
 void AddTable(Commands& commands) {
@@ -308,21 +260,21 @@ void AddTable(Commands& commands) {
   });
   app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
   app->add_option("--kind", command.view.kind,
-                  "What the rows are (default: drift, or what the store has)")
+                  "Kind of table (default: drift, or the first kind in the store)")
       ->check(CLI::IsMember(
           {"drift", "precision", "timing", "factorial", "models", "references", "all"}));
-  AddChoice(app, "--format", &command.format, "How they are written",
+  AddChoice(app, "--format", &command.format, "Output format",
             {"text", "csv", "markdown", "json", "latex"});
   AddWhere(app, &conditions);
   app->add_option("--columns", command.view.columns, "Keys of records, in this order: a,b,c")
       ->delimiter(',');
   app->add_option("--group", command.view.group, "One table per value of this key");
-  app->add_option("--sort", command.view.sort, "Order by this key first");
-  app->add_flag("--descending", command.view.descending, "Largest first")->needs("--sort");
-  app->add_option("-o,--out", command.out, "File (default: the terminal)");
+  app->add_option("--sort", command.view.sort, "Key to sort by");
+  app->add_flag("--descending", command.view.descending, "Sort in descending order")
+      ->needs("--sort");
+  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
   AddGate(app, &command.gate);
   AddWide(app);
-  app->footer(kTableFooter);
 }
 
 void AddPlot(Commands& commands) {
@@ -337,7 +289,7 @@ void AddPlot(Commands& commands) {
   app->add_option("-o,--out", command.out,
                   "Folder for the figures; with --x and --y also a file's name")
       ->required();
-  app->add_option("--format", command.format, "svg (default) or pdf")
+  app->add_option("--format", command.format, "Figure format (default: svg)")
       ->check(CLI::IsMember({"svg", "pdf"}));
   AddSize(app, &command.size);
   AddWhere(app, &conditions);
@@ -350,7 +302,6 @@ void AddPlot(Commands& commands) {
   app->add_option_function<std::string>(
       "--title", [&command](const std::string& title) { command.free.title = title; },
       "Title, \"\" for none (default: values that all records share)");
-  app->footer(kPlotFooter);
 }
 
 void AddVerdict(Commands& commands) {
@@ -359,8 +310,8 @@ void AddVerdict(Commands& commands) {
       commands.Add("check-claims", "Compare claims with stored records",
                    [&](const Typed& typed) { return PrintVerdicts(command, typed.line); });
   app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
-  app->add_option("--claims", command.claims, "Rules (JSON)")->required();
-  app->add_option("-o,--out", command.out, "Markdown file with all numbers");
+  app->add_option("--claims", command.claims, "Claims file (JSON)")->required();
+  app->add_option("-o,--out", command.out, "Markdown report with all numbers");
 
   AddWide(app);
 }
@@ -372,16 +323,15 @@ void AddMap(Commands& commands) {
   app->add_option("store", command.store,
                   "Folder of a run, a .jsonl file, or robustness-map.csv to draw it again")
       ->required();
-  app->add_option("--rules", command.rules, "Rows, methods and limits (JSON)")->required();
-  app->add_option("-o,--out", command.out, "Folder for robustness-map.csv, .md and the picture");
+  app->add_option("--rules", command.rules, "Rules file (JSON): rows, methods, limits")->required();
+  app->add_option("-o,--out", command.out, "Folder for robustness-map.csv, .md and the figure");
   AddChoice(app, "--format", &command.format, "Figure format", {"svg", "pdf"});
   AddSize(app, &command.size);
   app->add_option_function<std::string>(
          "--fail-on", [&command](const std::string&) { command.gate = true; },
-         "required: exit with 1 if a required cell fails")
+         "Exit with status 1 if a required cell fails")
       ->check(CLI::IsMember({"required"}));
   AddWide(app);
-  app->footer(kMapFooter);
 }
 
 // report: HTML page of a run.
@@ -434,19 +384,9 @@ void AddReport(Commands& commands) {
                    [&](const Typed& typed) { return WriteReport(command, typed.line); });
   app->add_option("store", command.store, "Folder with results.jsonl, or a .jsonl file")
       ->required();
-  app->add_option("-o,--out", command.out, "File (default: report.html in the store)");
-  app->add_option("--rules", command.rules, "Rules of a robustness map, which the page then has");
-  app->add_option("--claims", command.claims, "Claims, whose verdicts the page then has");
-  app->footer(
-      "Verdicts and warnings, all cases as tables to sort and filter, drift and errors against "
-      "time\n"
-      "beside the mechanism in motion, work and precision with the Pareto front, the robustness "
-      "map, "
-      "and\n"
-      "where each number comes from. Motions are those that the run has kept: with \"output\" or\n"
-      "\"reference\" in the experiment. Nothing is computed again.\n"
-      "  loopbench report out\n"
-      "  loopbench report results/runs/extremes --rules configs/experiments/extremes/map.json");
+  app->add_option("-o,--out", command.out, "Output file (default: report.html in the store)");
+  app->add_option("--rules", command.rules, "Rules of a robustness map to include");
+  app->add_option("--claims", command.claims, "Claims to include with their verdicts");
 }
 
 }  // namespace loopbench::harness

@@ -89,7 +89,7 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
       return interrupted.exit_code();
     }
     PrintError(
-        "{} run now{}{}, {} were done before\n", count.run,
+        "ran {}{}{}, {} reused\n", WithCount(count.run, "case"),
         count.failed > 0 ? fmt::format(" ({} not finished)", count.failed) : "",
         count.processes < count.pieces ? fmt::format(" in {} processes", count.processes) : "",
         count.skipped);
@@ -186,7 +186,8 @@ void AddRun(Commands& commands) {
   app->add_option("-o,--out", command.out,
                   "Folder for results.jsonl, drift.csv and timing.csv "
                   "(default: results/runs/NAME)");
-  app->add_option("-j,--jobs", command.suite.jobs, "Accuracy cases in parallel; timings alone")
+  app->add_option("-j,--jobs", command.suite.jobs,
+                  "Accuracy cases to run in parallel; timings run alone")
       ->check(NumberFrom(1, 1024))
       ->capture_default_str();
   app->add_option("--threads", command.threads,
@@ -195,28 +196,20 @@ void AddRun(Commands& commands) {
   AddFilter(app, &options.conditions);
   AddSettings(app, &options.settings);
   AddWide(app);
-  app->add_option("--shard", options.shard, "k/n: the k-th of n parts, joined by merge")
+  app->add_option("--shard", options.shard, "Run part K of N; merge joins the parts")
       ->capture_default_str();
   app->add_flag("--isolate", command.suite.isolate,
-                "Every case in a process of its own; else short ones share processes");
+                "Run each case in its own process; otherwise short cases share processes");
   app->add_flag("--wait", command.wait,
-                "Wait while another process writes to the store, then go on with it");
-  AddChoice(app, "--rerun", &options.rerun, "Cases to run although the store has them",
-            {"none", "failed", "all"});
+                "Wait while another process writes to the store, then continue");
+  AddChoice(app, "--rerun", &options.rerun, "Stored cases to run again", {"none", "failed", "all"});
   CLI::Option* gate = AddGate(app, &command.gate);
-  app->footer(
-      "The same command resumes an interrupted run. A failed case is a record with its outcome.\n"
-      "Exit status: 0; 1 if --fail-on finds warnings or failed runs; 2 for wrong files or "
-      "options.\n"
-      "Examples:\n"
-      "  loopbench run my-drift.json --jobs 2 --out out          two cases at a time\n"
-      "  loopbench run my-drift.json --filter formulation=odca --set /limits/cpu_s=60\n"
-      "  loopbench run my-drift.json --shard 1/4 --out part-1    then loopbench merge");
-  CLI::Option* no = app->add_flag("--no-timing", options.no_timing, "Leave the timings out");
+  CLI::Option* no = app->add_flag("--no-timing", options.no_timing, "Skip timings");
   CLI::Option* timings =
-      app->add_flag("--timing-only", options.timing_only, "Only the timings")->excludes(no);
+      app->add_flag("--timing-only", options.timing_only, "Run timings only")->excludes(no);
   timings->excludes(gate);  // the gate judges accuracy runs
-  app->add_flag("--precision-only", options.precision_only, "Only the runs in several scalars")
+  app->add_flag("--precision-only", options.precision_only,
+                "Run only precision studies (several floating-point types)")
       ->excludes(no)
       ->excludes(timings)
       ->excludes(gate);

@@ -2,14 +2,21 @@
 // completion, a manual page.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
 #include <vector>
 
 #include "harness/cli/command_line.h"
 #include "harness/record/provenance.h"
+#include "harness/text/files.h"
 #include "harness/text/terminal.h"
 #include "harness/text/words.h"
 
 namespace loopbench::harness {
+
+extern const std::string_view kCommandReference;  // docs/reference/commands.md
+
 namespace {
 
 /// Returns the options that may follow the subcommand: "--jobs", "--help".
@@ -35,11 +42,11 @@ std::string Joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, " "));
 }
 
-/// Returns "unknown: --fromat (did you mean --format?)".
+/// Returns "unknown option '--fromat'; did you mean '--format'?".
 std::string Unknown(const std::string& word, const std::vector<std::string>& known) {
   const std::string nearest = NearestSpelling(word, known);
-  return fmt::format("unknown: {}{}\n", word,
-                     nearest.empty() ? "" : fmt::format(" (did you mean {}?)", nearest));
+  return fmt::format("unknown {} '{}'{}", word.starts_with('-') ? "option" : "command", word,
+                     nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
 }
 
 /// Returns the accepted words of an option with a list: CLI11 shows it as "TEXT:{a,b}".
@@ -51,6 +58,59 @@ std::vector<std::string> ValuesOf(const CLI::Option& option) {
 }
 
 bool TakesValue(const CLI::Option& option) { return option.get_items_expected_max() > 0; }
+
+struct Metavariables {
+  std::string_view name, options;  ///< options between slashes
+};
+constexpr Metavariables kMetavariables[] = {
+    {"PATH", "/out/"},
+    {"FILE",
+     "/loops/rules/claims/mechanism/compare-with/figure/fmu/markdown/junit/counts/count-program/"
+     "experiments/"},
+    {"DIR", "/timings-from/store/history/dir/keep-output/"},
+    {"CONDITION", "/filter/where/"},
+    {"POINTER=VALUE", "/set/"},
+    {"KEY", "/sort/x/y/error-key/cost-key/"},
+    {"KEYS", "/columns/group/match/per/"},
+    {"SECONDS", "/cpu-limit/horizon/trial-duration/verify/step/budget/"},
+    {"MIB", "/memory-limit/"},
+    {"METRES", "/max-error/max-model-error/"},
+    {"ERRORS", "/error-levels/"},
+    {"RATIO", "/error-ratio/"},
+    {"BODIES", "/min-size/"},
+    {"K/N", "/shard/"},
+    {"X,Y,Z", "/gravity/"},
+    {"POINT", "/points/"},
+    {"NAME", "/only/case/measure/partition/"},
+    {"NAME=VALUE", "/threshold/"},
+    {"COMMIT", "/commit/"},
+    {"DATE", "/date/"},
+    {"BRANCH", "/branch/"},
+    {"TIME", "/time/"},
+    {"OPTION", "/sbatch/"},
+    {"N", "/jobs/threads/tasks/every/sizes/"}};
+
+/// Returns the placeholder of an option's value: "{svg,pdf}", "SECONDS" or "TEXT".
+std::string Metavariable(const CLI::Option& option) {
+  const std::vector<std::string> values = ValuesOf(option);
+  if (!values.empty()) return fmt::format("{{{}}}", fmt::join(values, ","));
+  if (option.get_lnames().empty()) return "";
+  const std::string word = "/" + option.get_lnames().front() + "/";
+  for (const auto& [name, options] : kMetavariables) {
+    if (options.find(word) != options.npos) return std::string(name);
+  }
+  return "TEXT";
+}
+
+/// Returns the description of an option with its default value.
+std::string DescriptionOf(const CLI::Option& option) {
+  std::string text = option.get_description();
+  std::string value = option.get_default_str();
+  if (value.starts_with('[')) value = value.substr(1, value.size() - 2);
+  if (!value.empty() && text.find("default") == text.npos) text += " (default: " + value + ")";
+  if (option.get_required() && !option.get_positional()) text += " (required)";
+  return text;
+}
 
 std::string Quoted(const std::string& text) {  // for fish and zsh, between single quotes
   std::string quoted = "'";
@@ -178,60 +238,120 @@ std::string Block(std::string_view text) {
 }
 
 std::string OptionEntry(const CLI::Option& option) {
-  const bool takes = option.get_items_expected_max() > 0;
-  std::string value = takes ? option.get_type_name() : "";
-  if (!option.get_default_str().empty()) value += " = " + option.get_default_str();
+  std::string value = TakesValue(option) ? Metavariable(option) : "";
   const std::string name =
       option.get_positional() ? option.get_name(true) : option.get_name(false, true);
   return fmt::format(".TP\n\\fB{}\\fR{}{}\n{}\n", Roff(name), value.empty() ? "" : " ", Roff(value),
-                     Roff(option.get_description()));
+                     Roff(DescriptionOf(option)));
 }
 
-std::string CommandSection(const CLI::App& command) {
-  std::string usage = "loopbench " + command.get_name();
-  std::string entries;
+/// Returns the sections of a command and its subcommands. `name` is "loopbench history add".
+std::string CommandSection(const CLI::App& command, const std::string& name) {
+  std::string usage = name, entries, others;
   for (const CLI::Option* option : command.get_options()) {
     if (option->get_positional()) {
       usage += " " + option->get_name(true) + (option->get_items_expected_max() > 1 ? " ..." : "");
     }
     entries += OptionEntry(*option);
   }
-  return fmt::format(".SS {} [options]\n{}.\n{}{}", Roff(usage), Roff(command.get_description()),
-                     entries, Block(command.get_footer()));
+  for (const CLI::App* each : Subcommands(command)) {
+    others += CommandSection(*each, name + " " + each->get_name());
+  }
+  const bool is_nested = command.get_parent()->get_parent() != nullptr;
+  return fmt::format(".SS {} [options]\n{}.\n{}{}{}", Roff(usage), Roff(command.get_description()),
+                     entries, is_nested ? "" : Block(command.get_footer()), others);
 }
 
-/// Returns loopbench.1, in the macros of man(7).
-std::string ManualPage(const CLI::App& app) {
+/// Returns the page of all commands, or of `command`, in the macros of man(7).
+std::string ManualPage(const CLI::App& app, const CLI::App* command) {
   const std::string version = VersionText();
-  std::string page = fmt::format(
-      ".TH LOOPBENCH 1 \"\" \"{}\" \"\"\n.SH NAME\nloopbench \\- {}\n"
-      ".SH SYNOPSIS\n.B loopbench\n\\fIcommand\\fR [\\fIoptions\\fR]\n.SH DESCRIPTION\n{}\n",
-      Roff(version.substr(0, version.find('\n'))), Roff(app.get_description()),
-      Block(app.get_footer()));
-  page += ".SH COMMANDS\n";
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    page += CommandSection(*command);
+  const CLI::App& subject = command == nullptr ? app : *command;
+  std::string page = fmt::format(".TH LOOPBENCH 1 \"\" \"{}\" \"\"\n.SH NAME\nloopbench{} \\- {}\n",
+                                 Roff(version.substr(0, version.find('\n'))),
+                                 command == nullptr ? "" : "\\-" + Roff(command->get_name()),
+                                 Roff(subject.get_description()));
+  if (command != nullptr) {
+    return page + ".SH DESCRIPTION\n" +
+           CommandSection(*command, "loopbench " + command->get_name());
+  }
+  page += ".SH SYNOPSIS\n.B loopbench\n\\fIcommand\\fR [\\fIoptions\\fR]\n.SH DESCRIPTION\n" +
+          Block(app.get_footer()) + "\n.SH COMMANDS\n";
+  for (const CLI::App* each : Subcommands(app)) {
+    page += CommandSection(*each, "loopbench " + each->get_name());
   }
   return page;
 }
 
+/// Writes the page of all commands and a page per command to a folder.
+void WriteManual(const CLI::App& app, const std::filesystem::path& folder) {
+  WriteFileAtomically(folder / "loopbench.1", ManualPage(app, nullptr));
+  for (const CLI::App* each : Subcommands(app)) {
+    WriteFileAtomically(folder / ("loopbench-" + each->get_name() + ".1"), ManualPage(app, each));
+  }
+}
+
 }  // namespace
 
-std::string WhatWasMeant(const CLI::App& app) {
-  const std::vector<CLI::App*> parsed = app.get_subcommands();
-  if (parsed.empty()) {
-    // words after an unknown subcommand may be valid
-    const std::vector<std::string> words = app.remaining();
-    if (words.empty()) return "";
-    const bool is_option = words.front().starts_with('-');
-    return Unknown(words.front(), is_option ? OptionNames(app) : CommandNames(app));
+std::string ParseFailure(const CLI::App& app, const CLI::Error& error) {
+  const CLI::App* failed = &app;
+  std::string command = app.get_name();
+  while (!failed->get_subcommands().empty()) {
+    failed = failed->get_subcommands().front();
+    command += " " + failed->get_name();
   }
+  for (const std::string& word : failed->remaining()) {
+    const bool is_option = word.starts_with('-');
+    if (!is_option && Subcommands(*failed).empty()) continue;
+    return fmt::format("{}: {}\n", command,
+                       Unknown(word.substr(0, word.find('=')),
+                               is_option ? OptionNames(*failed) : CommandNames(*failed)));
+  }
+  const bool is_missing = std::string_view(error.what()) == "A subcommand is required";
+  return fmt::format("{0}: {1} (see {0} --help)\n", command,
+                     is_missing ? "expected a command" : error.what());
+}
+
+std::string HelpSection(const std::string& command) {
+  const std::string heading = "\n## " + command + "\n\n";
+  const std::size_t at = kCommandReference.find(heading);
+  if (at == std::string_view::npos) throw std::logic_error("commands.md lacks " + command);
+  std::string_view section = kCommandReference.substr(at + heading.size());
+  section = section.substr(0, section.find("\n## "));
   std::string text;
-  for (const std::string& word : parsed.front()->remaining()) {
-    if (!word.starts_with('-')) continue;
-    text += Unknown(word.substr(0, word.find('=')), OptionNames(*parsed.front()));
+  bool is_code = false;
+  while (!section.empty()) {
+    const std::size_t end = std::min(section.find('\n'), section.size());
+    const std::string_view line = section.substr(0, end);
+    section.remove_prefix(std::min(end + 1, section.size()));
+    const bool is_fence = line.starts_with("```");
+    is_code = is_code != is_fence;
+    if (is_fence) {
+      // a blank line of Markdown between a heading and its examples
+      if (is_code && text.ends_with(":\n\n")) text.pop_back();
+    } else {
+      text.append(is_code && !line.empty() ? "  " : "").append(line) += '\n';
+    }
   }
+  while (text.ends_with('\n')) text.pop_back();
   return text;
+}
+
+std::shared_ptr<CLI::FormatterBase> HelpLayout() {
+  class Layout final : public CLI::Formatter {
+    std::string make_option_opts(const CLI::Option* option) const override {
+      if (!TakesValue(*option)) return "";
+      const bool repeats = option->get_items_expected_max() > 1;
+      return (option->get_positional() ? "" : " " + Metavariable(*option)) +
+             (repeats ? " ..." : "");
+    }
+    std::string make_option_desc(const CLI::Option* option) const override {
+      return DescriptionOf(*option);
+    }
+  };
+  auto layout = std::make_shared<Layout>();
+  layout->label("Positionals", "Arguments");
+  layout->column_width(30);
+  return layout;
 }
 
 void AddShell(Commands& commands) {
@@ -247,11 +367,19 @@ void AddShell(Commands& commands) {
   completion->add_option("shell", shell, "Shell to generate for")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
-  completion->footer("  eval \"$(loopbench completion bash)\"      # for this shell");
-  commands
-      .Add("manual", "Print the manual page of all commands",
-           [=](const Typed&) { return print(ManualPage(*all)); })
-      ->footer("  loopbench manual | man -l -");
+  auto& subject = commands.Keep<std::string>();
+  auto& folder = commands.Keep<std::filesystem::path>();
+  CLI::App* manual =
+      commands.Add("manual", "Print manual pages", [=, &subject, &folder](const Typed&) {
+        if (!folder.empty()) {
+          WriteManual(*all, folder);
+          return 0;
+        }
+        return print(ManualPage(*all, subject.empty() ? nullptr : all->get_subcommand(subject)));
+      });
+  manual->add_option("command", subject, "Command (default: all)")
+      ->check(CLI::IsMember(CommandNames(*all)));
+  manual->add_option("-o,--out", folder, "Folder for the pages of all commands");
 }
 
 }  // namespace loopbench::harness

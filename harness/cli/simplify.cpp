@@ -124,9 +124,9 @@ void PrintIdea(const Idea& idea, const Simplified& simplified, const SimplifyOpt
           options.*idea.limit);
   }
   if (!simplified.applies()) Print("  Does not apply: {}.\n", simplified.why_not);
-  for (const std::string& lost : simplified.dropped) Print("  No longer there: {}.\n", lost);
+  for (const std::string& lost : simplified.dropped) Print("  Removed: {}.\n", lost);
   if (simplified.applies() && !idea.assumption.empty()) {
-    Print("  Right where {}.\n", idea.assumption);
+    Print("  Assumption: {}.\n", idea.assumption);
   }
 }
 
@@ -147,7 +147,7 @@ void PrintModels(const SceneModels& ladder, const ExplainView& view) {
                    {"error", "model error [m]", Format::kText, {}},
                    {"worst", "at", Format::kText, {}},
                    {"evaluations", "evaluations", Format::kInteger, {}},
-                   {"gone", "gone", Format::kText, {}}};
+                   {"removed", "removed", Format::kText, {}}};
   const MechanismDescription& whole = ladder.models.front().description;
   for (const SceneModel& model : ladder.models) {
     Record& row = table.rows.emplace_back();
@@ -168,14 +168,14 @@ void PrintModels(const SceneModels& ladder, const ExplainView& view) {
                                            &BodyDescription::name) != bodies.end();
       if (!stays) gone.push_back(name);
     }
-    row.Set("gone", fmt::format("{}", fmt::join(gone, ", ")));
+    row.Set("removed", fmt::format("{}", fmt::join(gone, ", ")));
   }
   PrintSection("Models", table, view);
-  Print("  speeds: in joint coordinates, before loops take theirs. gone: bodies by these names.\n");
+  Print(
+      "  speeds: joint coordinates without loop constraints. removed: bodies of the full model.\n");
   if (ladder.models.front().rhs_evaluations >= 0) {
     Print(
-        "  model error: the largest distance of a point of one name from where the whole model has "
-        "it.\n");
+        "  model error: the largest distance of a named point from its place in the full model.\n");
   }
 }
 
@@ -206,9 +206,9 @@ ShortRun LookAt(const MechanismDescription& whole, const std::vector<const Idea*
   });
   if (!looks || !(command.short_run > 0.0)) return {};
   const ShortRun run = MakeShortRun(whole, command.short_run, PartOfTime(command, 0.5));
-  Print("  Short run: {:.3g} s; the fastest that turns or moves has {:.3g} rad/s.\n", run.duration,
+  Print("  Trial run: {:.3g} s; the largest rate of motion is {:.3g} rad/s.\n", run.duration,
         run.rate);
-  if (!run.message.empty()) Print("  Short run: {}.\n", run.message);
+  if (!run.message.empty()) Print("  Trial run: {}.\n", run.message);
   return run;
 }
 
@@ -238,7 +238,7 @@ void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
   for (const Record& record : records) store.Append(record);
   Table table = MakeTable(records, {.kind = "models", .compact = true});
   table.title.clear();
-  PrintSection("Against the whole one's certified motion", table, view);
+  PrintSection("Compared with the certified motion of the full model", table, view);
   Print("  {} records in {}\n", records.size(), store.file().string());
 }
 
@@ -303,25 +303,14 @@ int Simplify(const SimplifyCommand& command, bool all, const std::string& typed)
                         [&] { return SimplifyFile(command, view, typed); });
 }
 
-std::string SimplifyFooter() {
-  std::string ideas;
-  for (const Idea& idea : Ideas()) {
-    ideas += fmt::format("  {:16} {}\n", idea.name, idea.sentence);
-    if (idea.limit != nullptr) {
-      ideas += fmt::format("  {:16} by {}\n", "", idea.number);
-    }
+/// Returns a table of the rules with their thresholds.
+std::string RuleList() {
+  std::string rules = "Rules; only those with a threshold change the motion:\n";
+  for (const Idea& rule : Ideas()) {
+    rules += fmt::format("  {:16} {}\n", rule.name, rule.sentence);
+    if (rule.limit != nullptr) rules += fmt::format("  {:16} threshold: {}\n", "", rule.number);
   }
-  return fmt::format(
-      "\nIdeas; those with a number change the motion, the others do not:\n{}\n"
-      "Examples:\n"
-      "  loopbench simplify configs/experiments/models/light-rod-compressor.json\n"
-      "  loopbench simplify my.json --threshold light-links=0.05 --only welds,light-links --out "
-      "ladder\n"
-      "  loopbench run ladder/NAME-ladder.json\n\n"
-      "Bodies, joints and points keep their names; points of a body that another one took over\n"
-      "are called BODY.POINT there. models.md says what was done, what is gone, and when it is "
-      "right.",
-      ideas);
+  return rules;
 }
 
 }  // namespace
@@ -339,30 +328,30 @@ void AddSimplify(Commands& commands) {
                      return Simplify(command, all, typed.line);
                    });
   app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
-  CLI::Option* list =
-      app->add_flag("--list", only_list, "Only list what could be simplified (the default)");
-  app->add_option("--only", command.only, "Only these ideas: NAME[,NAME]")->delimiter(',');
+  CLI::Option* list = app->add_flag("--list", only_list, "List possible simplifications (default)");
+  app->add_option("--only", command.only, "Rules to apply: NAME[,NAME]")->delimiter(',');
   app->add_option("--threshold", command.thresholds,
-                  "NAME=VALUE: an idea's limit, unless said " + LimitsText());
-  app->add_option("--lump-mass", lumping, "Where the mass of a light link goes")
+                  "Threshold of a rule, NAME=VALUE; defaults: " + LimitsText());
+  app->add_option("--lump-mass", lumping, "New place of a light link's mass")
       ->check(CLI::IsMember(LumpingNames()))
       ->capture_default_str();
   app->add_option("--trial-duration", command.short_run,
-                  "Length of the short run that shows what hardly moves [s], 0: none")
+                  "Duration of the trial run that finds nearly rigid parts [s]; 0: none")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();
   app->add_option("--verify", command.errors,
-                  "Run all models for so long [s] and say how far their points are off, 0: no")
+                  "Run all models for this time [s] and report errors of their points; 0: no")
       ->check(NumberFrom(0.0, 1e6))
       ->capture_default_str();
   CLI::Option* accept =
       app->add_option("--max-model-error", command.accept,
-                      "Largest error that a model may cause [m]: its verdict in the store")
+                      "Largest acceptable error of a model [m], for its verdict in the store")
           ->check(NumberFrom(1e-15, 1e6));
   accept->needs("--verify");
-  app->add_option("--store", command.store,
-                  "Add a record for each model to this store: error against the certified motion "
-                  "of the whole one, times, verdict (loopbench table STORE --kind models)")
+  app->add_option(
+         "--store", command.store,
+         "Store that receives a record per model: error against the full model, times, verdict "
+         "(loopbench table STORE --kind models)")
       ->needs(accept);
   app->add_option("--horizon", command.horizon, "Simulated time of the written experiment [s]")
       ->check(NumberFrom(1e-9, 1e9))
@@ -372,12 +361,12 @@ void AddSimplify(Commands& commands) {
                   "New folder for the models, an experiment that runs them, and models.md")
       ->excludes(list);
   app->add_flag("--assembled", command.assembled,
-                "Begin from a whole model that says all of its assembled start");
+                "Write the full model with all coordinates of its assembled start");
   app->add_flag("--force", command.force, "Overwrite files of an existing folder");
   command.limits = kFileLimits;
   AddLimits(app, &command.limits);
-  app->add_flag("--all", all, "Every row of long tables");
-  app->footer(SimplifyFooter());
+  app->add_flag("--all", all, "Print all rows of long tables");
+  app->footer(RuleList() + "\n" + app->get_footer());
 }
 
 }  // namespace loopbench::harness

@@ -85,20 +85,6 @@ int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
                  FigureSizes().at(command.size));
 }
 
-constexpr const char* kTradeoffFooter = R"(
-Examples:
-  loopbench run mine.json --out out               ("timing": {"cases": true} in mine.json)
-  loopbench work-precision out --figures
-  loopbench work-precision out --where 'rtol>1e-11' --cost-key rhs_equivalents --error-levels 1e-2,1e-5
-  loopbench work-precision out --error-key closed_form_error_max --per mechanism,horizon,mass --out fronts
-
-Each accuracy run beside the timing of the same case, problem by problem (--per). Runs that failed
-or have warnings are compared with nobody, and listed with the reason. A '*' stands on the Pareto
-front. The overview has, per problem and class of errors, what the cheapest method of each formulation
-costs, and how many times the cheapest of all. Below stands, from the records, what was equal among the
-compared rows and what was not. All rows are in work-precision.csv and work-precision.md, the cheapest methods in
-work-precision-overview.csv, figures (error over cost, over tolerance, over time) in figures/.)";
-
 }  // namespace
 
 void AddTradeoff(Commands& commands) {
@@ -115,8 +101,7 @@ void AddTradeoff(Commands& commands) {
   app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
   TradeoffOptions& options = command.options;
   app->add_option("--error-key", options.error,
-                  "Key that is the error (default: error_position_max, or what the store "
-                  "has)");
+                  "Key of the error (default: error_position_max, or an error in the store)");
   app->add_option("--cost-key", options.cost,
                   "Key that is the cost: wall_s (default: the timed median), "
                   "rhs_equivalents, steps, ...");
@@ -129,9 +114,9 @@ void AddTradeoff(Commands& commands) {
       ->capture_default_str();
   AddWhere(app, &conditions);
   app->add_option("-o,--out", command.out, "Folder (default: that of the store)");
-  AddChoice(app, "--format", &command.format, "How it is printed",
+  AddChoice(app, "--format", &command.format, "Output format",
             {"text", "csv", "markdown", "json", "latex"});
-  app->add_flag("--all", command.all, "Print every row");
+  app->add_flag("--all", command.all, "Print all rows, not only Pareto fronts");
   AddWide(app);
   CLI::Option* figures = app->add_flag("--figures", draws, "Draw figures too");
   app->add_option("--figure-format", drawn_as, "svg or pdf")
@@ -139,7 +124,6 @@ void AddTradeoff(Commands& commands) {
       ->needs(figures)
       ->capture_default_str();
   AddSize(app, &command.size);
-  app->footer(kTradeoffFooter);
 }
 
 }  // namespace loopbench::harness

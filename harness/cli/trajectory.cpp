@@ -283,7 +283,7 @@ int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed)
   if (command.source.extension() != ".csv") {
     if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed);
     throw ConfigError(
-        fmt::format("{}: found a store beside --mechanism or --ours, expected a "
+        fmt::format("{}: found a store beside --mechanism or --compare-with, expected a "
                     "trajectory (.csv)",
                     command.source.string()));
   }
@@ -301,19 +301,6 @@ int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed)
   return 0;
 }
 
-constexpr const char* kTrajectoryFooter = R"(
-Examples:
-  loopbench trajectory out                                    ("output": {"step": 0.01} in the experiment)
-  loopbench trajectory out --where formulation=odca --out csv
-  loopbench trajectory out --out lines --format jsonl --columns joint:,energy: --every 10
-  loopbench trajectory theirs.csv --mechanism my.json         (constraints, energy, speeds)
-  loopbench trajectory theirs.csv --ours ours.csv --figure beside.svg --columns joint:
-
-A store's trajectories are files of rows over time, in its folder trajectories/; without --out they
-are listed. A trajectory of any program is CSV with a column "t [s]" and others that are called as
-ours are, however few; `loopbench trajectory FILE.csv` prints those of a file. Held against a mechanism are the
-poses of all bodies, or the coordinates of joints that lead to them.)";
-
 }  // namespace
 
 void AddTrajectory(Commands& commands) {
@@ -327,18 +314,18 @@ void AddTrajectory(Commands& commands) {
                    });
   app->add_option("source", command.source, "Folder of a run, or a trajectory (.csv)")->required();
   AddWhere(app, &conditions);
-  app->add_option("-o,--out", command.out, "Folder to write to; of a .csv a file");
+  app->add_option("-o,--out", command.out, "Output folder; for a CSV source, output file");
   AddChoice(app, "--format", &command.format, "Output format", {"csv", "jsonl"});
-  app->add_option("--columns", command.columns, "Only columns that begin so, and t: a,b")
+  app->add_option("--columns", command.columns, "Only t and columns with these prefixes: a,b")
       ->delimiter(',');
-  app->add_option("--every", command.every, "Only each so many-th row")
+  app->add_option("--every", command.every, "Only every N-th row")
       ->check(NumberFrom(1, 1'000'000'000));
   app->add_option("--mechanism", command.mechanism,
-                  "Mechanism (JSON) that a trajectory is held against");
-  app->add_option("--ours", command.ours, "Trajectory that another is laid beside");
-  app->add_option("--figure", command.figure, "Picture of both and their difference: .svg, .pdf")
-      ->needs("--ours");
-  app->footer(kTrajectoryFooter);
+                  "Mechanism (JSON) to check a CSV trajectory against");
+  app->add_option("--compare-with", command.ours, "Trajectory to compare a CSV trajectory with");
+  app->add_option("--figure", command.figure,
+                  "Figure of both trajectories and their difference: .svg, .pdf")
+      ->needs("--compare-with");
 }
 
 }  // namespace loopbench::harness

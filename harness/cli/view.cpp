@@ -87,27 +87,17 @@ void AddView(Commands& commands) {
                                [&](const Typed&) { return View(command); });
   app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
   app->add_option("--format", command.format,
-                  "html: a page for browsers, without network; svg; text: tables of places "
-                  "(default: by the ending of --out, else html)")
+                  "Output format (default: by the ending of --out, else html)")
       ->check(CLI::IsMember({"html", "svg", "text"}));
   app->add_option("-o,--out", command.out,
-                  "File (default: the mechanism file's name with .html or .svg, here; text on "
-                  "the terminal)");
+                  "Output file (default: NAME.html or NAME.svg here; text goes to the terminal)");
   app->add_option("--view", command.svg.view, "Viewing direction of a spatial mechanism (SVG)")
       ->check(CLI::IsMember(ViewNames()))
       ->capture_default_str();
   app->add_flag("--no-annotations", command.svg.plain,
-                "svg: only the mechanism, without what the file said before the assembly and "
-                "without lines of text");
-  app->add_flag("--all", command.all, "text: every row of long tables");
+                "SVG of the mechanism alone, without text and unassembled start");
+  app->add_flag("--all", command.all, "Print all rows of long tables (text)");
   AddLimits(app, &command.limits);
-  app->footer(
-      "The page shows each degree of freedom as a motion, redundant constraints, and what a run\n"
-      "leaves out. A mechanism whose loops do not close is drawn as the file says it, with the "
-      "gaps;\n"
-      "the exit code is then 2.\n"
-      "  loopbench view my.json\n"
-      "  loopbench view my.json --out my.svg --view side --no-annotations");
 }
 
 }  // namespace loopbench::harness

@@ -27,22 +27,26 @@ FormulationRow PeerRow(std::string name, std::string sentence, Enforcement like,
 /// Returns built-in formulations, peers last. Colours by P. Tol (high contrast and others) also
 /// differ in lightness.
 std::deque<FormulationRow> BuiltIn() {
-  return {Row<odca::Odca>("odca",
-                          "orthogonal complement divide and conquer. Bodies are joined pair by "
-                          "pair; the loops' forces are found on the way.",
-                          "#004488"),
-          Row<lagrange::Lagrange>("lagrange", "one multiplier per constraint, all solved at once.",
-                                  "#BB5566"),
-          Row<reduction::Reduction>(
-              "reduction", "independent speeds only; the others follow from the loops.", "#DDAA33"),
-          PeerRow("peer/simbody",
-                  "the library Simbody with its own integrator; after each step it projects "
-                  "positions and speeds, to a tenth of the tolerance.",
-                  Enforcement::kPosition, "simbody-merson", "#117733"),
-          PeerRow("peer/mujoco",
-                  "the library MuJoCo with steps of one length, made from the tolerance; its "
-                  "closing constraints are springs and dampers.",
-                  Enforcement::kBaumgarte, "mujoco-rk4", "#88CCEE", true)};
+  return {
+      Row<odca::Odca>("odca",
+                      "orthogonal-complement divide and conquer: bodies are assembled pairwise, "
+                      "loop forces result from the assembly.",
+                      "#004488"),
+      Row<lagrange::Lagrange>("lagrange",
+                              "Lagrange multipliers: one per constraint, from one linear system.",
+                              "#BB5566"),
+      Row<reduction::Reduction>(
+          "reduction",
+          "coordinate reduction: independent speeds; the others follow from the constraints.",
+          "#DDAA33"),
+      PeerRow("peer/simbody",
+              "the library Simbody with its own integrator; it projects positions and speeds "
+              "after each step, to a tenth of the tolerance.",
+              Enforcement::kPosition, "simbody-merson", "#117733"),
+      PeerRow("peer/mujoco",
+              "the library MuJoCo with a fixed step that follows from the tolerance; its loop "
+              "constraints are springs and dampers.",
+              Enforcement::kBaumgarte, "mujoco-rk4", "#88CCEE", true)};
 }
 
 /// Colours for rows without a colour, in turn.

@@ -70,11 +70,6 @@ std::vector<Record> Participants(std::span<const Record> records, const FreeFigu
   return rows;
 }
 
-std::string AxisLabel(const std::string& key, std::span<const Record> rows) {
-  const std::string unit = UnitOf(ColumnOf(key, rows));
-  return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
-}
-
 std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
   if (wanted.title) return *wanted.title;
   std::string common;
@@ -284,8 +279,8 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   FreeFigureResult result;
   Figure& figure = result.figure;
   figure.title = TitleOf(rows, wanted);
-  figure.x_label = AxisLabel(wanted.x, rows);
-  figure.y_label = AxisLabel(wanted.y, rows);
+  figure.x_label = ColumnOf(wanted.x, rows).header;
+  figure.y_label = ColumnOf(wanted.y, rows).header;
   if (HaveChannels(group_keys) && groups.size() > kLegendRows) {
     std::vector<Record> shown;
     for (const auto& [label, members] : groups) {

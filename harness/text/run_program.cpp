@@ -1,8 +1,8 @@
 #include "harness/text/run_program.h"
 
 #include <fmt/format.h>
-#include <spawn.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -52,24 +53,30 @@ ProgramResult RunProgram(std::vector<std::string> words, const std::string& inpu
   const MemoryFile in("input"), out("output"), messages("messages");
   WriteAll(in.descriptor(), input, "input of " + words.front());
   ::lseek(in.descriptor(), 0, SEEK_SET);
-  posix_spawn_file_actions_t streams;
-  ::posix_spawn_file_actions_init(&streams);
-  ::posix_spawn_file_actions_adddup2(&streams, in.descriptor(), STDIN_FILENO);
-  ::posix_spawn_file_actions_adddup2(&streams, out.descriptor(), STDOUT_FILENO);
-  ::posix_spawn_file_actions_adddup2(&streams, messages.descriptor(), STDERR_FILENO);
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
-  pid_t child = 0;
+  const MemoryFile fault("errno of exec");
   ProgramResult result;
-  result.error = ::posix_spawnp(&child, arguments[0], &streams, nullptr, arguments.data(), environ);
-  ::posix_spawn_file_actions_destroy(&streams);
-  if (result.error != 0) return result;
+  const pid_t parent = ::getpid(), child = ::fork();
+  if (child == 0) {
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // the parent died before the line above
+    ::dup2(in.descriptor(), STDIN_FILENO);
+    ::dup2(out.descriptor(), STDOUT_FILENO);
+    ::dup2(messages.descriptor(), STDERR_FILENO);
+    ::execvp(arguments[0], arguments.data());
+    const int number = errno;
+    ::_exit(::write(fault.descriptor(), &number, sizeof number) < 0 ? 126 : 127);
+  }
+  if (child < 0) result.error = errno;
+  if (child < 0) return result;
   under_way = child;
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   under_way = 0;
+  if (::pread(fault.descriptor(), &result.error, sizeof result.error, 0) > 0) return result;
   result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   result.output = out.Text();
   result.messages = messages.Text();

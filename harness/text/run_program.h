@@ -40,7 +40,8 @@ struct ProgramResult {
 };
 
 /// Runs `words`, the program (searched in PATH) and its arguments, with `input` on its standard
-/// input, and waits for it. Throws std::runtime_error only if no memory file can be made.
+/// input, and waits for it. The program receives SIGTERM if this process ends before. Throws
+/// std::runtime_error only if no memory file can be made.
 ProgramResult RunProgram(std::vector<std::string> words, const std::string& input = "");
 
 /// Ends the program for which RunProgram() waits, if there is one. Async-signal-safe.

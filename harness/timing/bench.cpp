@@ -46,7 +46,7 @@ Examples:
 Names are MEASURE/MECHANISM[/SIZE]/FORMULATION/LEVEL/COORDINATES/SOLVER[/N-threads]. Times are of the
 processor, with several threads by the clock. A benchmark that cannot be measured is an error with
 its reason, without counters.
-Exit codes: 0 done, 2 bad input, or nothing could be measured.
+Exit status: 0 success; 2 invalid input, or nothing could be measured.
 )";
 
 /// Omits values that JSON cannot represent, such as the spread of a counter that is always zero.

@@ -42,7 +42,7 @@ Examples:
     --dump-after=CountedEvaluations loopbench_count configs/benchmarks/counts.json
   loopbench_count configs/benchmarks/counts.json --callgrind cg --out counts.jsonl
 
-Only right-hand sides ("measure": "rhs") are counted. Exit codes: 0 done, 2 could not measure.)";
+Only right-hand sides ("measure": "rhs") are counted. Exit status: 0 success; 2 could not measure.)";
 
 struct Options {
   std::filesystem::path file, callgrind, out;

@@ -13,18 +13,18 @@ namespace {
 std::deque<LevelTraits>& Rows() {
   static std::deque<LevelTraits> rows = {
       {"acceleration",
-       "the loops' accelerations are imposed. Speeds and positions follow by integration, and "
-       "errors in them stay.",
+       "constraints of accelerations are imposed (index 1); errors of positions and speeds "
+       "accumulate.",
        DriftGrowth::kSquare, "acc", true},
-      {"velocity", "the speeds satisfy the loops too; positions follow by integration.",
+      {"velocity", "speeds satisfy the constraints, too; positions follow by integration.",
        DriftGrowth::kLinear, "vel", true},
       {"projection",
-       "as acceleration, and after each accepted step positions and speeds are moved back to where "
-       "the loops hold.",
+       "as acceleration; after each accepted step, positions and speeds are projected onto the "
+       "constraints.",
        DriftGrowth::kNone, "proj", true},
       {"baumgarte",
-       "as acceleration, with feedback: a mismatch e obeys e'' + 2 alpha e' + beta^2 e = 0, alpha "
-       "= beta = 0.05 over the longest step unless given.",
+       "as acceleration, with feedback: a violation e obeys e'' + 2 alpha e' + beta^2 e = 0; by "
+       "default alpha = beta = 0.05 / longest step.",
        DriftGrowth::kForgotten, "baumgarte", true}};
   return rows;
 }

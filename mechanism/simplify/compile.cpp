@@ -137,7 +137,7 @@ class Compiler {
       image.joint = joint_place[image.joint];
     }
     result_.report.push_back(std::to_string(islands.size()) +
-                             " parts that have nothing to do with each other: one system each");
+                             " parts without a connection: one system each");
   }
 
   void Flatten(int part) {
@@ -183,7 +183,7 @@ class Compiler {
       for (const int direction : out.directions) {
         result_.report.push_back("joint \"" + description.joints[out.joint].name +
                                  "\": " + NameOfDirection(description, out, direction) +
-                                 " is released: the other constraints hold it " + where);
+                                 " is redundant " + where);
       }
     }
     if (redundancy.released.empty()) return;

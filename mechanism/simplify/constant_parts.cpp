@@ -152,7 +152,7 @@ Simplified FreezeConstantParts(const MechanismDescription& description, const Sh
   Simplified result;
   result.parts = {description};
   if (run.travels.empty()) {
-    result.why_not = "there was no short run";
+    result.why_not = "there was no trial run";
     if (!run.message.empty()) result.why_not += ": " + run.message;
     return result;
   }
@@ -166,7 +166,7 @@ Simplified FreezeConstantParts(const MechanismDescription& description, const Sh
     const bool is_driven = !joint.motions.empty();
     result.candidates.push_back({CandidateName(joint), number,
                                  !is_driven && number <= options.constant_parts,
-                                 is_driven ? "it follows a given motion" : ""});
+                                 is_driven ? "its motion is prescribed" : ""});
   }
   Freezing freezing(description, starts, &result);
   if (result.why_not = freezing.Run(); !result.applies()) {
@@ -180,7 +180,7 @@ Simplified FreezeConstantParts(const MechanismDescription& description, const Sh
     const int carrier = attachments[b].carrier;
     result.done.push_back("body \"" + description.bodies[b].name + "\" is fixed to \"" +
                           (carrier == kGround ? "ground" : description.bodies[carrier].name) +
-                          "\" as it stands at the start");
+                          "\" in its initial pose");
   }
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     if (freezing.renumbering().joints[j] >= 0) continue;

@@ -56,7 +56,7 @@ Simplified Apart(const MechanismDescription& description, const ShortRun&, const
     if (!why.empty()) result.dropped.push_back(why);
     return !why.empty();
   });
-  if (result.parts.empty()) result.why_not = "none of its parts moves by itself";
+  if (result.parts.empty()) result.why_not = "no part of it moves by itself";
   return result;
 }
 
@@ -69,8 +69,8 @@ Simplified Redundant(const MechanismDescription& description, const ShortRun&,
   result.done.clear();
   for (Candidate& candidate : result.candidates) candidate.taken = false;
   result.why_not =
-      "no file can say which directions of a joint are imposed: runs release these themselves "
-      "(\"compile\", \"redundancy\")";
+      "a mechanism file cannot contain single constraints of a joint: runs remove them themselves "
+      "(\"preprocess\", \"redundancy\")";
   return result;
 }
 
@@ -95,7 +95,7 @@ const std::vector<Idea>& Ideas() {
   static const std::vector<Idea> ideas = {
       {.name = "welds",
        .is_exact = true,
-       .sentence = "bodies joined by welds become one",
+       .sentence = "bodies joined by welds become one body",
        .apply = Exact<&CompileOptions::welds>},
       {.name = "immovable",
        .is_exact = true,
@@ -103,40 +103,40 @@ const std::vector<Idea>& Ideas() {
        .apply = Exact<&CompileOptions::immovable>},
       {.name = "redundancy",
        .is_exact = true,
-       .sentence = "constraints that others imply at every position are left out",
+       .sentence = "constraints that others imply at every position are removed",
        .apply = Redundant},
       {.name = "planar",
        .is_exact = true,
        .sentence = "a spatial mechanism that moves in parallel planes becomes planar",
        .apply = Flat},
       {.name = "constant-parts",
-       .sentence = "bodies that hardly move against each other become one, where they start",
-       .assumption = "their joints go on standing still when the short run is over",
-       .number = "travel in the short run [rad, or lengths of the mechanism]",
+       .sentence = "bodies that hardly move relative to each other become one body",
+       .assumption = "their joints stay at rest after the trial run",
+       .number = "relative motion in the trial run [rad, or mechanism lengths]",
        .limit = &SimplifyOptions::constant_parts,
        .apply = FreezeConstantParts},
       {.name = "stiff-springs",
-       .sentence = "springs much faster than the motion become rods, or hold their joint",
-       .assumption = "nothing excites them: they stay where they are free",
-       .number = "frequency over the rate of the motion",
+       .sentence = "springs much faster than the motion become rods or locked joints",
+       .assumption = "nothing excites them: they stay at their rest position",
+       .number = "frequency divided by the rate of the motion",
        .limit = &SimplifyOptions::stiff_springs,
        .is_least = true,
        .apply = HoldStiffSprings},
       {.name = "light-links",
-       .sentence = "links of small mass become massless rods, their mass goes to their ends",
-       .assumption = "the rotation of the link itself takes no energy worth counting",
-       .number = "largest share in the kinetic energy of any motion at the start",
+       .sentence = "links of small mass become massless rods; their mass moves to their ends",
+       .assumption = "the rotational energy of the link is negligible",
+       .number = "largest share of the kinetic energy in any motion at the start",
        .limit = &SimplifyOptions::light_links,
        .apply = LightenLinks},
       {.name = "nearly-planar",
-       .sentence = "what nearly moves in parallel planes becomes planar, seen along their normal",
-       .assumption = "axes stay as near to the normal as they are at the start",
-       .number = "tilt at the start (sine)",
+       .sentence = "a mechanism that nearly moves in parallel planes becomes planar",
+       .assumption = "the tilt of the axes stays as small as at the start",
+       .number = "tilt of the axes at the start (sine)",
        .limit = &SimplifyOptions::nearly_planar,
        .apply = FlattenNearly},
       {.name = "islands",
        .is_exact = true,
-       .sentence = "parts that have nothing to do with each other become models of their own",
+       .sentence = "parts without a connection become separate models",
        .apply = Apart},
   };
   return ideas;
@@ -154,7 +154,7 @@ Simplified Combine(const MechanismDescription& description, const std::vector<co
   for (const Idea* idea : ideas) {
     if (idea->is_exact && !model.ideas.empty()) Append(*idea, run, options, &model);
   }
-  if (model.ideas.empty()) model.why_not = "none of them applies";
+  if (model.ideas.empty()) model.why_not = "no rule applies";
   return model;
 }
 

@@ -118,7 +118,7 @@ class Flattening {
       flat->why = "the plane has no " + std::string(ToString(joint.type)) + " joint for it";
     }
     if (!joint.motions.empty() && NumValues(joint.type, SpaceKind::kSpatial, true) > 1) {
-      flat->why = "it follows a given motion in one of several coordinates";
+      flat->why = "its motion is prescribed in one of several coordinates";
     }
   }
 
@@ -271,12 +271,13 @@ Simplified FlattenNearly(const MechanismDescription& description, const ShortRun
       result.parts = {std::move(planar)};
       result.R_WC = flattening.R_WC();
       const Vector3 n = result.R_WC.col(2);
-      result.done.push_back("all that moves is seen along (" + NumberText(n.x(), 4) + ", " +
+      result.done.push_back("the motion is projected along (" + NumberText(n.x(), 4) + ", " +
                             NumberText(n.y(), 4) + ", " + NumberText(n.z(), 4) + ")");
       const double along = n.dot(description.gravity);
       if (along != 0.0)
         result.dropped.push_back("gravity along it, " + NumberText(along, 4) + " m/s^2");
-      result.dropped.push_back("motions out of the plane, and turns of bodies about axes in it");
+      result.dropped.push_back(
+          "motions out of the plane, and rotations of bodies about axes in it");
     }
   }
   if (!result.applies()) {

@@ -151,9 +151,10 @@ void Say(const MechanismDescription& description, const Spring& spring, double o
     result->done.push_back(name + " holds it at " +
                            NumberText(FreeCoordinate(std::get<JointSpring>(force)), 4));
   }
-  result->dropped.push_back("the swing of the " + name + " at " + NumberText(spring.frequency, 2) +
-                            " rad/s, where the motion has " + NumberText(spring.rate, 2) +
-                            "; it starts off by " + NumberText(off, 4));
+  result->dropped.push_back("the oscillation of the " + name + " at " +
+                            NumberText(spring.frequency, 2) + " rad/s, where the motion has " +
+                            NumberText(spring.rate, 2) + "; it starts off by " +
+                            NumberText(off, 4));
 }
 
 }  // namespace
@@ -169,7 +170,7 @@ Simplified HoldStiffSprings(const MechanismDescription& description, const Short
   if (springs.empty()) result.why_not = kNothingOfTheKind;
   const double rate = std::max(freedom.rate, run.rate);
   if (result.applies() && !(rate > 0.0)) {
-    result.why_not = "nothing tells the rate of the motion: it starts at rest, without gravity";
+    result.why_not = "the rate of the motion is unknown: it starts at rest, without gravity";
   }
   if (!result.applies()) return result;
   SetRates(rate, options.stiff_springs, &springs);

@@ -71,7 +71,7 @@ constexpr Budget kBudgets[] = {
     {"harness/exchange",        { 7350,  30,  10},  5000},
     {"harness/report",          { 1100,   4,  10},  1100},
     {"harness/history",         { 1970,  10,   7},  1500},
-    {"harness/cli",             { 8470,  32,  29},  3600},
+    {"harness/cli",             { 8300,  32,  29},  3600},
     {"peers",                   {  709,  12,   5},   650},
     {"",                        {86500, 509, 238}, 62000}
 };

@@ -33,12 +33,12 @@ TEST_F(CaseIdentity, GoingBackShowsTheNumbersOfWhatWasAskedFor) {
        {std::pair<std::string, std::string>{kMass5, kMass1},
         {" --set '/limits={\"steps\":3}'", " --set '/limits={\"steps\":30000}'"}}) {
     fs::remove_all(folder_ / "out");
-    ExpectEnding(Call("run tiny.json --out out" + there), 0, {"2 run now"});
+    ExpectEnding(Call("run tiny.json --out out" + there), 0, {"ran 2 cases"});
     const std::string first = Rows("out/drift.csv");
-    ExpectEnding(Call("run tiny.json --out out" + back), 0, {"2 run now"});
+    ExpectEnding(Call("run tiny.json --out out" + back), 0, {"ran 2 cases"});
     EXPECT_NE(Rows("out/drift.csv"), first) << "other numbers, or nothing is shown";
     const Ending third = Call("run tiny.json --out out" + there);
-    ExpectEnding(third, 0, {"0 run now, 2 were done before"});
+    ExpectEnding(third, 0, {"ran 0 cases, 2 reused"});
     EXPECT_EQ(Rows("out/drift.csv"), first);
     EXPECT_EQ(first.find("config_hash"), std::string::npos) << "one content needs no name";
   }
@@ -85,7 +85,7 @@ TEST_F(CaseIdentity, FilesOfEqualNamesAreDifferentCases) {
   for (const char* out : {"a", "b", "c"}) {
     const std::string call =
         std::string("run tiny.json other/tiny.json tiny.json --jobs 3 --out ") + out;
-    ExpectEnding(Call(call), 0, {"4 run now", "config_hash"});
+    ExpectEnding(Call(call), 0, {"ran 4 cases", "config_hash"});
     const std::string rows = Rows(std::string(out) + "/drift.csv");
     EXPECT_EQ(std::ranges::count(rows, '\n'), 4);
     if (first.empty()) first = rows;
@@ -95,10 +95,10 @@ TEST_F(CaseIdentity, FilesOfEqualNamesAreDifferentCases) {
 
 TEST_F(CaseIdentity, TimesAreThoseOfTheirContentToo) {
   const std::string run = "run tiny.json --timing-only --set /timing/repeats=1 --out out";
-  ExpectEnding(Call(run + kMass5), 0, {"2 run now"});
+  ExpectEnding(Call(run + kMass5), 0, {"ran 2 cases"});
   const std::string first = Rows("out/timing.csv");
-  ExpectEnding(Call(run + kMass1), 0, {"2 run now"});
-  ExpectEnding(Call(run + kMass5), 0, {"0 run now"});
+  ExpectEnding(Call(run + kMass1), 0, {"ran 2 cases"});
+  ExpectEnding(Call(run + kMass5), 0, {"ran 0 cases"});
   EXPECT_EQ(Rows("out/timing.csv"), first);
 }
 
@@ -111,7 +111,7 @@ TEST_F(CaseIdentity, GoingBackToAProgramShowsItsNumbers) {
   other.Set("steps", std::int64_t{123456});
   ResultStore(folder_ / "out").Append(other);
   const std::string run = "run tiny.json --out out --filter formulation=odca";
-  ExpectEnding(Call(run), 0, {"0 run now, 1 were done before"});
+  ExpectEnding(Call(run), 0, {"ran 0 cases, 1 reused"});
   const std::string table = Call("table out --format csv --columns formulation,steps").text;
   EXPECT_NE(table.find("odca," + steps), std::string::npos) << table;
   EXPECT_EQ(table.find("123456"), std::string::npos) << table;

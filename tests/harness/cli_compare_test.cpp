@@ -51,7 +51,7 @@ TEST_F(ComparisonCommands, RefuseWhatIsNotThere) {
   Expect("compare b.json c.json --only speed", 2, {"--only"});
   Expect("fit-scaling b.json", 2, {"no family of right-hand sides"});
   Expect("export-metrics b.json", 2, {"nothing to export"});
-  Expect("compare --help", 0, {"Examples:", "Exit codes:"});
+  Expect("compare --help", 0, {"Examples:", "Exit status:"});
 }
 
 TEST_F(ComparisonCommands, APathIsNotComparedWithItself) {
@@ -219,7 +219,7 @@ TEST_F(ComparisonCommands, FilesMayStandBehindAnyOption) {
   Expect("compare --where formulation=odca --only counts now again", 0, {"NO CHANGE"});
   Expect("table --where formulation=odca --columns formulation,steps now", 0, {"odca"});
   Expect("list --filter formulation=odca tiny.json", 0, {"odca"});
-  Expect("run --filter formulation=odca tiny.json --out some", 0, {"1 run now"});
+  Expect("run --filter formulation=odca tiny.json --out some", 0, {"ran 1 case"});
   Expect("baseline renew --experiments tiny.json tiny.json --dir kept", 0, {"renewed"});
 }
 

@@ -85,12 +85,15 @@ TEST_F(CliDocumentsTest, CompareSaysInADocumentWhatItsExitCodeMeans) {
 }
 
 TEST_F(CliDocumentsTest, WrongWordsAreAnsweredWithTheNearest) {
-  ExpectEnding(Call("tabel out"), 2, {"unknown: tabel (did you mean table?)"});
-  ExpectEnding(Call("table out --fromat csv"), 2, {"unknown: --fromat (did you mean --format?)"});
-  ExpectEnding(Call("run tiny.json --out=o --job=2"), 2, {"unknown: --job (did you mean --jobs?)"});
-  ExpectEnding(Call("--versoin"), 2, {"unknown: --versoin (did you mean --version?)"});
+  ExpectEnding(Call("tabel out"), 2, {"loopbench: unknown command 'tabel'; did you mean 'table'?"});
+  ExpectEnding(Call("table out --fromat csv"), 2,
+               {"loopbench table: unknown option '--fromat'; did you mean '--format'?"});
+  ExpectEnding(Call("run tiny.json --out=o --job=2"), 2,
+               {"loopbench run: unknown option '--job'; did you mean '--jobs'?"});
+  ExpectEnding(Call("--versoin"), 2,
+               {"loopbench: unknown option '--versoin'; did you mean '--version'?"});
   const Ending far = Call("xyzzy");
-  ExpectEnding(far, 2, {"unknown: xyzzy\n"});
+  ExpectEnding(far, 2, {"unknown command 'xyzzy'\n"});
   const Ending hostile = Call("$(printf 'run\\033[31m')");
   EXPECT_EQ(hostile.code, 2);
   EXPECT_EQ(hostile.text.find('\033'), std::string::npos);

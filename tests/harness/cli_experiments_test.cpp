@@ -84,7 +84,7 @@ TEST_F(CommandLineTest, SetChangesAFieldForEveryCommandThatReads) {
   ExpectEnding(Call("list tiny.json" + set), 0, {"mine", "4 cases"});
   ExpectEnding(Call("check" + set + " tiny.json"), 0, {"4 cases"});
   ExpectEnding(Call("estimate tiny.json" + set), 0, {"4 cases, 4 runs"});
-  ExpectEnding(Call("explain tiny.json" + set), 0, {"mine is a planar mechanism"});
+  ExpectEnding(Call("explain tiny.json" + set), 0, {"mine", "planar"});
   ExpectEnding(Call("run tiny.json --out out" + set), 0, {"results in out"});
   EXPECT_EQ(ReadRecords(folder_ / "out").size(), 4u);
   ExpectEnding(Call("run tiny.json --set /tolerance=1e-3"), 2, {"did you mean \"tolerances\""});
@@ -120,11 +120,8 @@ TEST_F(CommandLineTest, ExplainSaysWhatRunsAndWhatWordsMean) {
   Write("sweep.json", Swept());
   const Ending ending = Call("explain sweep.json");
   ExpectEnding(ending, 0,
-               {"3 cases", "mass: 1, 2", "formulation=lagrange",
-                "four-bar is a planar mechanism of 3 "
-                "bodies and 4 joints",
-                "odca: orthogonal complement", "lagrange: one multiplier",
-                "rank-revealing:", "2048 MiB", "There are no timings"});
+               {"3 cases", "mass: 1, 2", "formulation=lagrange", "odca: orthogonal-complement",
+                "lagrange: Lagrange multipliers", "rank-revealing:", "2048 MiB", "no timings"});
   // words that the experiment does not use stay out
   EXPECT_EQ(ending.text.find("absolute:"), std::string::npos) << ending.text;
   EXPECT_EQ(ending.text.find("  reduction: "), std::string::npos) << ending.text;

@@ -22,11 +22,10 @@ constexpr const char* kLadder =
 TEST_F(CommandLineTest, LaddersAreInRecordsTablesAndFigures) {
   Write("tiny.json", WithPrecision(kLadder));
   ExpectEnding(Call("list tiny.json"), 0, {"2 cases and 0 timings, 10 runs in several scalars"});
-  ExpectEnding(Call("explain tiny.json"), 0, {"10 runs in several scalars"});
+  ExpectEnding(Call("explain tiny.json"), 0, {"10 runs in several floating-point types"});
   ExpectEnding(Call("run tiny.json --precision-only --out out"), 0,
-               {"10 run now (2 not finished), 0 were done before", "Precision", "small step"});
-  ExpectEnding(Call("run tiny.json --precision-only --out out"), 0,
-               {"0 run now, 10 were done before"});
+               {"ran 10 cases (2 not finished), 0 reused", "Precision", "small step"});
+  ExpectEnding(Call("run tiny.json --precision-only --out out"), 0, {"ran 0 cases, 10 reused"});
   std::size_t references = 0, ruled = 0;
   for (const Record& record : ReadRecords(folder_ / "out")) {
     EXPECT_EQ(record.Text("kind"), "precision");
@@ -60,7 +59,7 @@ TEST_F(CommandLineTest, LaddersAreInRecordsTablesAndFigures) {
 TEST_F(CommandLineTest, FiltersAndSwitchesChooseLadders) {
   Write("tiny.json", WithPrecision(kLadder));
   ExpectEnding(Call("run tiny.json --filter formulation=odca --out odca"), 0,
-               {"6 run now (1 not finished)"});
+               {"ran 6 cases (1 not finished)"});
   EXPECT_EQ(ReadRecords(folder_ / "odca").size(), 6u);  // one case, one ladder of five
   ExpectEnding(Call("run tiny.json --timing-only --precision-only"), 2, {"excludes"});
 }

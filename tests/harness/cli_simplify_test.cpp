@@ -46,7 +46,7 @@ TEST_F(SimplifyTest, ListsCandidatesWithTheNumberThatDecidedAndWritesNothing) {
   const std::vector<std::string> before = FilesIn(".");
   const Ending listed = Call("simplify light-rod-compressor.json");
   ExpectEnding(listed, 0,
-               {"Short run: 1 s", "light-links: links of small mass become massless rods",
+               {"Trial run: 1 s", "light-links: links of small mass become massless rods",
                 "link \"rod\" between \"crank\" and \"piston\"  0.00138  yes",
                 "link \"crank\" between \"ground\" and \"rod\"  0.98     no", "taken up to 0.01",
                 "two lumps have 0.0001125", "There is nothing for: welds, immovable", "Models",
@@ -82,11 +82,11 @@ TEST_F(SimplifyTest, WritesModelsAnExperimentAndAPageThatWork) {
   ExpectEnding(Call("check ladder/full.json ladder/combined.json ladder/hall-models.json"), 0, {});
   ExpectEnding(Call("run ladder/hall-models.json --no-timing --filter formulation=odca --out out "
                     "--fail-on warnings"),
-               0, {"14 run now", "hall-combined"});
+               0, {"ran 14 cases", "hall-combined"});
   const std::string page = ReadFile(folder_ / "ladder/models.md");
   for (const char* words :
        {"loopbench simplify hall.json --out ladder --horizon 0.2", "| islands-2.json | the same |",
-        "- body hook is gone; its points: root on load, tip on load",
+        "- body hook is removed; its points: root on load, tip on load",
         "- body \"left\": cannot move, fixed to \"ground\""}) {
     EXPECT_NE(page.find(words), page.npos) << words << "\n" << page;
   }
@@ -198,7 +198,7 @@ TEST_F(SimplifyTest, WhatCannotBeWrittenLeavesNothing) {
 
 TEST_F(SimplifyTest, WithoutAShortRunNothingIsKnownToStandStill) {
   ExpectEnding(Call("simplify hall.json --trial-duration 0 --only constant-parts"), 0,
-               {"Does not apply: there was no short run"});
+               {"Does not apply: there was no trial run"});
 }
 
 TEST_F(SimplifyTest, HelpNamesTheIdeasAndTheirLimits) {
@@ -287,7 +287,7 @@ TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
   const std::string judge =
       "simplify light-rod-compressor.json --verify 0.5 --store s --max-model-error ";
   ExpectEnding(Call(judge + "1e-3"), 0,
-               {"Against the whole one's certified motion", "the whole model",
+               {"Compared with the certified motion of the full model", "full model",
                 "accepted at 0.001 m", "2 records in s/results.jsonl"});
   ExpectEnding(Call(judge + "1e-9"), 0, {"refused at 1e-09 m"});
   const std::vector<Record> records = ReadRecords(folder_ / "s");

@@ -40,7 +40,7 @@ TEST_F(Streams, ClosedOnesKeepMessagesOutOfTheStore) {
       Shell("( exec >&- 2>&-; \"$L\" run tiny.json --out out ); code=$?; exit $code");
   EXPECT_EQ(run.code, 2) << run.text;  // the tables could not be printed
   ASSERT_EQ(ReadRecords(folder_ / "out").size(), 2u);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"0 run now, 2 were done before"});
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"ran 0 cases, 2 reused"});
   ExpectEnding(Shell("\"$L\" list tiny.json 2>&1 <&- >&-"), 2, {"cannot write to standard output"});
 }
 

@@ -157,7 +157,7 @@ TEST_F(CliTerminalTest, CtrlCKeepsWhatIsDoneAndSaysHowToGoOn) {
   const std::string command = seen.text.substr(begin, seen.text.find('\n', begin) - begin);
   const TerminalEnding again = OnTerminal("cd '" + folder_.string() + "' && " + command, 100);
   EXPECT_EQ(again.code, 0) << command << "\n" << again.text;
-  EXPECT_NE(again.text.find("1 run now (1 not finished), 3 were done before"), std::string::npos)
+  EXPECT_NE(again.text.find("ran 1 case (1 not finished), 3 reused"), std::string::npos)
       << again.text;
   EXPECT_EQ(ReadRecords(store).size(), 4u);
 }

@@ -52,7 +52,7 @@ constexpr const char* kSix = R"({
 
 TEST_F(Cluster, PartsAreMergedToWhatOneRunGives) {
   Write("six.json", kSix);
-  ExpectEnding(Call("run six.json --no-timing --out whole"), 0, {"6 run now"});
+  ExpectEnding(Call("run six.json --no-timing --out whole"), 0, {"ran 6 cases"});
   ExpectEnding(Call("submit six.json --tasks 4 --no-timing --no-queue --out parts"), 0,
                {"6 cases in 4 parts", "part.sh K"});
   ExpectEnding(Call("status parts"), 0, {"six in 4 parts", "4 waiting"});
@@ -61,7 +61,7 @@ TEST_F(Cluster, PartsAreMergedToWhatOneRunGives) {
   ExpectEnding(Call("collect parts"), 1, {"1 of 4 parts are not done: 3; nothing was merged"});
   EXPECT_FALSE(fs::exists(folder_ / "parts/whole"));
   EXPECT_EQ(Part("3").code, 0);
-  ExpectEnding(Part("3"), 0, {"0 run now"});  // a second time: nothing is left
+  ExpectEnding(Part("3"), 0, {"ran 0 cases"});  // a second time: nothing is left
   ExpectEnding(Call("collect parts"), 0, {"6 records of 4 stores are 6 cases"});
   // a run writes cases as they end, long ones first; a merge in the order of the experiment
   std::vector<std::string> merged = Lines("parts/whole"), whole = Lines("whole");
@@ -140,7 +140,7 @@ TEST_F(Cluster, APathMayHoldWhatSlurmAndShellsRead) {
       {"each part: sh " + quoted + "/part.sh' K; then: loopbench collect " + quoted + "'\n"});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out 'a b%j #'"), 2,
                {"to go on with it: loopbench submit --resubmit --out " + quoted + "'\n"});
-  ExpectEnding(Call("", "sh 'a b%j #/part.sh' 1 2>&1; exit $?;"), 0, {"3 run now"});
+  ExpectEnding(Call("", "sh 'a b%j #/part.sh' 1 2>&1; exit $?;"), 0, {"ran 3 cases"});
   const std::string text = ReadFile(folder_ / "a b%j #/collect.sh");
   EXPECT_NE(text.find("#SBATCH --output=\"" + folder_.string() + "/a b%%j #/logs/collect.log\"\n"),
             std::string::npos)

@@ -160,7 +160,7 @@ TEST_F(ExplainTest, SaysTheAssembledStartAndItsEnergy) {
     "joints": [{"name": "O", "type": "revolute", "from": {"body": "ground", "at": [0, 0.25]}, "to": {"body": "b"}}],
     "initial": {"coordinates": {"O": 0}, "speeds": {"O": 3}, "fixed": ["O"]}})");
   // 0.5 (0.5 + 2 0.25) 9 and 2 10 0.25
-  ExpectSqueezed(Call("explain bar.json"), {"O angle 0 rad angle 3 rad/s held, speed",
+  ExpectSqueezed(Call("explain bar.json"), {"O angle 0 rad angle 3 rad/s fixed, speed",
                                             "Energy: kinetic 4.5 J + potential 5 J = 9.5 J"});
 }
 

@@ -128,7 +128,7 @@ TEST_F(CommandLineTest, FormulationsTooDenseForTheirLimitsSaySo) {
                      "asks for 1.28 GB", "more than 200 MiB"};
   Write("large.json", OnFamily(R"({"family": "ladder", "windows": 2000})",
                                R"({"cpu_s": 10, "memory_mb": 200})", "plain"));
-  ExpectEnding(Call("run large.json --out out"), 0, {"1 run now (1 not finished)"});
+  ExpectEnding(Call("run large.json --out out"), 0, {"ran 1 case (1 not finished)"});
   const std::vector<Record> records = ReadRecords(folder_ / "out");
   ASSERT_EQ(records.size(), 1u);
   EXPECT_EQ(records[0].Text("outcome"), "memory-limit");
@@ -148,7 +148,7 @@ TEST_F(CommandLineTest, LargeStartsAndMultipliersAreSparse) {
   if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
   Write("large.json", OnFamily(R"({"family": "ladder", "windows": 2000})",
                                R"({"cpu_s": 10, "memory_mb": 200})", "rank-revealing"));
-  ExpectEnding(Call("run large.json --out out"), 0, {"1 run now"});
+  ExpectEnding(Call("run large.json --out out"), 0, {"ran 1 case"});
   const std::vector<Record> records = ReadRecords(folder_ / "out");
   ASSERT_EQ(records.size(), 1u);
   EXPECT_EQ(records[0].Text("outcome"), "finished") << records[0].Text("message");

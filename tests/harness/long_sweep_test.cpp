@@ -79,21 +79,21 @@ TEST_F(LongSweeps, AreCountedWithoutBeingRead) {
 TEST_F(LongSweeps, RunInGroupsGoOnAndAreSharded) {
   const std::string all = std::to_string(kAll);
   ExpectEnding(Call("run long.json --out whole --jobs 2"), 0,
-               {all + " run now in", "No tables were written"});
+               {"ran " + all + " cases in", "No tables were written"});
   const auto whole = HashesOf("whole");
   EXPECT_EQ(whole.size(), kAll);
-  ExpectEnding(Call("run long.json --out whole"), 0, {"0 run now, " + all + " were done before"});
+  ExpectEnding(Call("run long.json --out whole"), 0, {"ran 0 cases, " + all + " reused"});
   EXPECT_TRUE(fs::exists(folder_ / "whole/results.groups"));
   // without marks, and with marks of a store that is another one by now
   fs::remove(folder_ / "whole/results.groups");
-  ExpectEnding(Call("run long.json --out whole"), 0, {"0 run now, " + all + " were done before"});
+  ExpectEnding(Call("run long.json --out whole"), 0, {"ran 0 cases, " + all + " reused"});
   std::string text = ReadFile(folder_ / "whole/results.jsonl");
   const std::size_t lines = 100;
   std::size_t end = 0;
   for (std::size_t i = 0; i < lines; ++i) end = text.find('\n', end) + 1;
   Write("whole/results.jsonl", text.substr(0, end));
   ExpectEnding(Call("run long.json --out whole"), 0,
-               {std::to_string(kAll - lines) + " run now", "100 were done before"});
+               {"ran " + std::to_string(kAll - lines) + " cases", "100 reused"});
   EXPECT_EQ(HashesOf("whole"), whole);
 
   std::string parts;
@@ -107,9 +107,9 @@ TEST_F(LongSweeps, RunInGroupsGoOnAndAreSharded) {
 
 TEST_F(LongSweeps, GiveTheSameBitsInProcessesOfTheirOwn) {
   const std::string some = " long.json --filter 'mass<1.1' --out ";
-  ExpectEnding(Call("run" + some + "shared"), 0, {" run now in "});
+  ExpectEnding(Call("run" + some + "shared"), 0, {" cases in "});
   const Ending alone = Call("run --isolate" + some + "alone");
-  ExpectEnding(alone, 0, {" run now, 0 were"});
+  ExpectEnding(alone, 0, {" cases, 0 reused"});
   EXPECT_EQ(HashesOf("shared"), HashesOf("alone"));
 }
 
@@ -126,7 +126,7 @@ TEST_F(LongSweeps, AFaultIsOneCasesOutcome) {
   }
   EXPECT_EQ(crashed, 44u);
   ExpectEnding(Call("run long.json --filter formulation=odca --out faulty --rerun failed"), 0,
-               {"44 run now"});
+               {"ran 44 cases"});
 }
 
 TEST_F(LongSweeps, AValueThatCannotBeIsRefusedBeforeAnythingRuns) {

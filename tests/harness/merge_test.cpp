@@ -48,7 +48,7 @@ class MergeCommandTest : public CommandLineTest {
 
 TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
   Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
-  ExpectEnding(Call("run two.json --out whole"), 0, {"2 run now"});
+  ExpectEnding(Call("run two.json --out whole"), 0, {"ran 2 cases"});
   CopyStore("whole", "cut",
             [](Record* record) { record->Set("outcome", std::string("time-limit")); });
   for (const fs::path& file : Files("cut/trajectories")) WriteFileAtomically(file, "t [s]\n0\n");

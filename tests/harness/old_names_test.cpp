@@ -1,5 +1,6 @@
 // Texts for users do not contain these earlier names, most of which `loopbench migrate` replaces.
 #include <array>
+#include <regex>
 #include <string_view>
 
 #include "tests/harness/cli_fixture.h"
@@ -62,6 +63,36 @@ TEST_F(OldNamesOfCommands, StandInNoHelpText) {
   EXPECT_EQ(manual.code, 0);
   EXPECT_GT(manual.text.size(), 10000u);
   ExpectNone(manual.text, "manual");
+}
+
+TEST_F(OldNamesOfCommands, OptionsInDocumentsExist) {
+  std::string known = std::regex_replace(Call("manual").text, std::regex(R"(\\f[BR])"), " ");
+  std::erase(known, '\\');  // of roff
+  known += " --requeue ";   // of sbatch
+  for (const char* file :
+       {"reproduce", "check", "harness/timing/bench.cpp", "harness/cli/cluster.cpp"}) {
+    known += ReadFile(kRoot / file);
+  }
+  for (const auto& tool : fs::directory_iterator(kRoot / "tools")) known += ReadFile(tool.path());
+  const std::regex typed("`(--[a-z][a-z-]+)|loopbench [a-z][^`\n]*"), option(" (--[a-z][a-z-]+)");
+  int options = 0;
+  const auto expect = [&](const std::string& name, const fs::path& file) {
+    ++options;
+    EXPECT_TRUE(std::regex_search(known, std::regex(name + "(?![a-z-])"))) << file << ": " << name;
+  };
+  for (const auto& entry : fs::recursive_directory_iterator(kRoot / "docs")) {
+    if (entry.path().extension() != ".md") continue;
+    const std::string text = ReadFile(entry.path());
+    for (std::sregex_iterator it(text.begin(), text.end(), typed), end; it != end; ++it) {
+      if ((*it)[1].matched) expect((*it)[1], entry.path());
+      std::string line = it->str();
+      line.resize(std::min(line.find_first_of("|#&"), line.size()));  // other commands, comments
+      for (std::sregex_iterator at(line.begin(), line.end(), option); at != end; ++at) {
+        expect((*at)[1], entry.path());
+      }
+    }
+  }
+  EXPECT_GT(options, 200);
 }
 
 }  // namespace old_names_test

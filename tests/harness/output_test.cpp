@@ -10,6 +10,7 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <functional>
 #include <set>
 #include <string>
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include "harness/text/files.h"
+#include "harness/text/run_program.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -214,6 +216,24 @@ int EndedBy(int signal, const std::function<void()>& work) {
   return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
 }
 
+TEST_F(OutputFiles, ProgramsEndWithTheProcessThatRunsThem) {
+  const fs::path file = At("pid");
+  const auto work = [&file] {
+    const std::string script = "echo $$ > '" + file.string() + "'; exec sleep 60";
+    std::thread([script] { RunProgram({"sh", "-c", script}); }).detach();
+    while (!fs::exists(file) || fs::file_size(file) == 0) ::usleep(1000);
+  };
+  EXPECT_EQ(EndedBy(SIGKILL, work), SIGKILL);
+  const std::string stat = "/proc/" + std::to_string(std::stoi(ReadFile(file))) + "/stat";
+  const auto runs = [&stat] {  // a zombie, which nobody may collect, does not
+    std::ifstream stream(stat);
+    std::string text;
+    return std::getline(stream, text) && text.find(") Z") == text.npos;
+  };
+  for (int i = 0; i < 1000 && runs(); ++i) ::usleep(10'000);
+  EXPECT_FALSE(runs());
+}
+
 std::size_t Count(const fs::path& folder) {
   return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
 }
@@ -272,13 +292,13 @@ TEST_F(OutputFiles, OfKilledProcessesAreRemovedByTheNextRun) {
   Write("out/references/" + far.filename().string(), "far");
   const int lock = ::open(far.c_str(), O_RDONLY | O_CLOEXEC);
   ASSERT_EQ(::flock(lock, LOCK_EX), 0);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 run now"});
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"ran 2 cases"});
   EXPECT_EQ(Count(tmp.parent_path()), kept.size() + 1);
   for (const std::string& name : kept) EXPECT_TRUE(fs::exists(tmp.parent_path() / name)) << name;
   EXPECT_TRUE(fs::exists(far));
   living.Finish();
   ::close(lock);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 were done before"});
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 reused"});
   EXPECT_FALSE(fs::exists(far));
   for (const auto& entry : fs::directory_iterator(At("out"))) {
     EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();

@@ -182,11 +182,11 @@ TEST_F(PublishedSeriesCommands, AreRunAndShownWhateverTheirNames) {
       Call("table out --kind all --where kind=reference --columns mechanism,reference_valid_until"),
       0, {});
   // another accuracy is another case
-  ExpectEnding(Call("run held.json --no-timing --out out"), 0, {"0 run now"});
+  ExpectEnding(Call("run held.json --no-timing --out out"), 0, {"ran 0 cases"});
   WriteFileAtomically(folder_ / "s.json", R"({"name": "s", "source": "x", "times": [0],
     "quantities": [{"joint": "OA", "values": [0], "uncertainty": 1e2}]})");
   const Ending again = Call("run held.json --no-timing --out out");
-  EXPECT_EQ(again.text.find("0 run now"), std::string::npos) << again.text;
+  EXPECT_EQ(again.text.find("ran 0 cases"), std::string::npos) << again.text;
 }
 
 }  // namespace published_series_test

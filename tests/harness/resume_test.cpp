@@ -63,7 +63,7 @@ class Interruption : public CommandLineTest {
 TEST_F(Interruption, OfAThousandCasesTwentyTimesChangesNoDigit) {
   Write("sweep.json", Sweep(250));
   const auto begin = std::chrono::steady_clock::now();
-  ExpectEnding(Call("run sweep.json --out whole --jobs 2"), 0, {"1000 run now"});
+  ExpectEnding(Call("run sweep.json --out whole --jobs 2"), 0, {"ran 1000 cases"});
   const double whole_s = Seconds(std::chrono::steady_clock::now() - begin).count();
   std::mt19937 random(1);
   std::uniform_real_distribution<double> moment(0.0, whole_s / 15);
@@ -78,7 +78,7 @@ TEST_F(Interruption, OfAThousandCasesTwentyTimesChangesNoDigit) {
   }
   EXPECT_GE(killed, 15) << "most runs must be cut short, or nothing is shown";
   const Ending last = Call("run sweep.json --out parts --jobs 2");
-  ExpectEnding(last, 0, {"were done before"});
+  ExpectEnding(last, 0, {"reused"});
   EXPECT_EQ(ReadRecords(folder_ / "parts").size(), 1000u) << "each case once";
   const auto whole = TableOf(folder_ / "whole"), parts = TableOf(folder_ / "parts");
   EXPECT_EQ(whole.size(), 1001u);
@@ -139,7 +139,7 @@ TEST_F(Interruption, SecondRunOnAStoreIsRefusedAndNamesTheFirst) {
                {"out/results.jsonl' is in use by process " + std::to_string(pid)});
   ::kill(pid, SIGKILL);
   ::waitpid(pid, nullptr, 0);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 run now"});
+  ExpectEnding(Call("run tiny.json --out out"), 0, {"ran 2 cases"});
 }
 
 /// State hashes by case.
@@ -168,14 +168,14 @@ TEST_F(Interruption, FaultsOfOneCaseAreItsOutcomeAndHarmNoOther) {
     const std::string out = "run-" + fault;
     ExpectEnding(
         Call("run tiny.json --out " + out, "LOOPBENCH_FAULT=" + fault + ":formulation=odca"), 0,
-        {"2 run now (1 not finished)", outcome});
+        {"ran 2 cases (1 not finished)", outcome});
     auto clean = Hashes(folder_ / "clean");
     int differ = 0;
     for (const auto& [id, hash] : Hashes(folder_ / out)) differ += hash != clean.at(id);
     EXPECT_EQ(differ, 1) << fault;
-    ExpectEnding(Call("run tiny.json --out " + out), 0, {"0 run now, 2 were done before"});
+    ExpectEnding(Call("run tiny.json --out " + out), 0, {"ran 0 cases, 2 reused"});
     ExpectEnding(Call("run tiny.json --out " + out + " --rerun failed"), 0,
-                 {"1 run now, 1 were done before"});
+                 {"ran 1 case, 1 reused"});
     EXPECT_EQ(Hashes(folder_ / out), clean) << "the last record of a case counts";
     EXPECT_EQ(TableOf(folder_ / out), TableOf(folder_ / "clean"));
   }
@@ -197,8 +197,7 @@ TEST_F(Interruption, ByAFullDiskLeavesCompleteRecordsAndIsSaid) {
   EXPECT_FALSE(fs::exists(disk / "out/drift.csv")) << "no table of part of the cases";
   // the same store goes on where there is room
   fs::copy(disk / "out", folder_ / "moved", fs::copy_options::recursive);
-  ExpectEnding(Call("run sweep.json --out moved --jobs 2"), 0,
-               {std::to_string(kept) + " were done before"});
+  ExpectEnding(Call("run sweep.json --out moved --jobs 2"), 0, {std::to_string(kept) + " reused"});
   ::umount(disk.c_str());
 }
 
@@ -214,7 +213,7 @@ TEST_F(Interruption, AFaultOfTheMachineIsTheOutcomeOfNoCase) {
     ExpectEnding(Call(run, "ulimit -f 200;"), 2, {"cannot write", ".csv", "File too large"});
     EXPECT_EQ(ReadFile(folder_ / "out/results.jsonl"), "");
     EXPECT_TRUE(fs::is_empty(folder_ / "out/trajectories")) << "no part of a trajectory is left";
-    ExpectEnding(Call(run), 0, {"2 run now, 0 were done before"});
+    ExpectEnding(Call(run), 0, {"ran 2 cases, 0 reused"});
   }
 }
 
@@ -248,7 +247,7 @@ class Shards : public CommandLineTest {};
 
 TEST_F(Shards, TogetherAreTheWhole) {
   Write("sweep.json", Sweep(5));
-  ExpectEnding(Call("run sweep.json --out whole"), 0, {"20 run now"});
+  ExpectEnding(Call("run sweep.json --out whole"), 0, {"ran 20 cases"});
   std::string parts;
   std::size_t sum = 0;
   for (const std::string k : {"1", "2", "3"}) {
@@ -259,7 +258,7 @@ TEST_F(Shards, TogetherAreTheWhole) {
   EXPECT_EQ(sum, 20u) << "no case in two shards";
   ExpectEnding(Call("merge" + parts + " part2 --out merged"), 0, {"of 4 stores are 20 cases"});
   EXPECT_EQ(Hashes(folder_ / "merged"), Hashes(folder_ / "whole"));
-  ExpectEnding(Call("run sweep.json --out merged"), 0, {"0 run now, 20 were done before"});
+  ExpectEnding(Call("run sweep.json --out merged"), 0, {"ran 0 cases, 20 reused"});
   EXPECT_EQ(TableOf(folder_ / "merged"), TableOf(folder_ / "whole"));
 }
 

@@ -218,7 +218,7 @@ TEST_F(StoreIntegrity, WhatIsNoStoreStaysAsItIs) {
 }
 
 TEST_F(StoreIntegrity, AFileAsStoreHasItsTablesBesideIt) {
-  ExpectEnding(Call("run tiny.json --out new/mine.jsonl"), 0, {"2 run now"});
+  ExpectEnding(Call("run tiny.json --out new/mine.jsonl"), 0, {"ran 2 cases"});
   EXPECT_EQ(ReadRecords(folder_ / "new/mine.jsonl").size(), 2u);
   EXPECT_TRUE(fs::exists(folder_ / "new/mine.drift.csv"));
   EXPECT_FALSE(fs::exists(folder_ / "new/drift.csv")) << "which may be somebody's";

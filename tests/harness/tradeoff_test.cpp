@@ -216,7 +216,7 @@ TEST_F(TradeoffProgram, PrintsAndWritesWhatAccuracyCosts) {
     "integrator": ["ode45", "verner"], "problems": [{"mechanism": "pendulum.json", "horizon": 0.5}],
     "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
     "timing": {"repeats": 2, "cases": true}})");
-  ExpectEnding(Call("run e.json --out out"), 0, {"32 run now"});
+  ExpectEnding(Call("run e.json --out out"), 0, {"ran 32 cases"});
   ExpectEnding(Call("work-precision out --figures"), 0,
                {"closed_form_error_max against wall_s_median", "problem = pendulum, horizon 0.5",
                 "no record has error_position_max", "equal in all compared rows",

@@ -228,9 +228,10 @@ TEST_F(Command, HostileNamesStayNames) {
   EXPECT_TRUE(FindPose(rows.columns, "a,b\"c\":\\d"));
   EXPECT_TRUE(rows.Find("joint", "line\nend $(touch pwned) `touch pwned`", "angle"));
   EXPECT_TRUE(rows.Find("reaction", "# <b>'=1|x [m]", "fx"));
-  ExpectEnding(Call("trajectory '" + files[0].string() + "' --mechanism hostile.json --ours '" +
-                    files[0].string() + "' --figure own.svg"),
-               0, {"by body poses", "wrote own.svg"});
+  ExpectEnding(
+      Call("trajectory '" + files[0].string() + "' --mechanism hostile.json --compare-with '" +
+           files[0].string() + "' --figure own.svg"),
+      0, {"by body poses", "wrote own.svg"});
   EXPECT_FALSE(fs::exists(folder_ / "pwned"));
 }
 
@@ -378,7 +379,7 @@ TEST_F(Command, WhatIsMissingIsNamed) {
                {"found neither the poses of all bodies nor the coordinates", "\"body:bar1:y [m]\"",
                 "\"joint:AB:angle [rad]\""});
   Write("theirs.csv", "t [s],x [m]\n0,0\n");
-  ExpectEnding(Call("trajectory theirs.csv --ours theirs.csv"), 2,
+  ExpectEnding(Call("trajectory theirs.csv --compare-with theirs.csv"), 2,
                {"found no column that both have"});
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   ExpectEnding(Call("trajectory out"), 2, {"found no trajectory"});
@@ -406,7 +407,7 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   };
   ASSERT_EQ(ours.time, 0u);
   for (const char* command : {"trajectory theirs.csv --mechanism four-bar.json",
-                              "trajectory theirs.csv --ours ours.csv"}) {
+                              "trajectory theirs.csv --compare-with ours.csv"}) {
     write(5, "");
     ExpectEnding(Call(command), 0, {});
     for (const char* cell : {"nan", "inf", "-inf", ""}) {
@@ -422,7 +423,8 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   write(1, "1e300");
   ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not known"});
   Write("early.csv", "t [s],joint:OA:angle [rad]\n-1,0\n0,0\n");
-  ExpectEnding(Call("trajectory early.csv --ours ours.csv"), 0, {"1 of 2 rows are not compared"});
+  ExpectEnding(Call("trajectory early.csv --compare-with ours.csv"), 0,
+               {"1 of 2 rows are not compared"});
 }
 
 TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
@@ -434,7 +436,7 @@ TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
   ExpectEnding(Call("trajectory whole"), 0, {"dense output"});
   // what a killed run leaves goes with the next one
   Write("whole/trajectories/0123.csv.part", "t [s]\n0");
-  ExpectEnding(Call("run two.json --out whole"), 0, {"0 run now"});
+  ExpectEnding(Call("run two.json --out whole"), 0, {"ran 0 cases"});
   EXPECT_EQ(Files("whole/trajectories").size(), 2u);
   // a process that crashes takes its part along
   ExpectEnding(Call("run two.json --out crashed", "LOOPBENCH_FAULT=crash:formulation=odca"), 0,

@@ -271,7 +271,7 @@ TEST(StiffSpringsTest, WhatWouldLockIsNotHeld) {
 
 TEST(ConstantPartsTest, ARunMustHaveShownThem) {
   const MechanismDescription d = DoublePendulum(1.0);
-  EXPECT_EQ(FreezeConstantParts(d, {}, {}).why_not, "there was no short run");
+  EXPECT_EQ(FreezeConstantParts(d, {}, {}).why_not, "there was no trial run");
   ShortRun run;
   run.travels = {{"O", {1.0, 0.0}}, {"A", {5e-4, 0.0}}};
   const Simplified simplified = FreezeConstantParts(d, run, {});

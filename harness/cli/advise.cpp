@@ -179,10 +179,9 @@ void RequireMotion(const std::string& name, const MechanismDescription& user,
 }
 
 std::string WhatWasTried(const Advice& advice) {
-  std::string text =
-      fmt::format("{} ways of running it in {:.3g} s", advice.trials, advice.pilot_s);
+  std::string text = fmt::format("{} methods in {:.3g} s", advice.trials, advice.pilot_s);
   if (advice.untried > 0) {
-    text += fmt::format(", {} not tried: the time was over (--cpu-limit)", advice.untried);
+    text += fmt::format(", {} not tried: time limit reached (--cpu-limit)", advice.untried);
   }
   return text;
 }
@@ -192,13 +191,15 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
   const Trial& best = advice.finalists.front();
   Print("{} over {} s: {}\n\n", command.mechanism.stem().string(), horizon, WhatIsAsked(command));
   if (advice.reached) {
-    Print("Take {}:\n  error {:.1e} m, {:.3g} s of wall time ({:.3g} simulated seconds a second)\n",
+    Print("Recommended: {}\n  error {:.1e} m, {:.3g} s of wall time ({:.3g} times real time)\n",
           ToString(best.choice), best.error, best.wall_s, horizon / best.wall_s);
   } else {
-    Print("None reached it{}. The nearest is {}:\n  error {:.1e} m, {:.3g} s of wall time\n",
-          command.budget > 0.0 ? ""
-                               : fmt::format(" with a margin of {:.0f} %", 100 * (1 - kErrorShare)),
-          ToString(best.choice), best.error, best.wall_s);
+    Print(
+        "No method meets the bound{}. The nearest is {}:\n  error {:.1e} m, {:.3g} s of wall "
+        "time\n",
+        command.budget > 0.0 ? ""
+                             : fmt::format(" with a margin of {:.0f} %", 100 * (1 - kErrorShare)),
+        ToString(best.choice), best.error, best.wall_s);
   }
   if (!best.doubts.empty()) Print("  flagged: {}\n", best.doubts);
   Print("Dominant error: {}.\n", WhatLimits(best, reference.Certified().position));

@@ -204,16 +204,17 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   }
   PrintText(ToScreen(table) + "\n");
   for (const std::string& one : estimate.cut_off()) {
-    Print("A pilot was cut off: {}. Its cases are counted with the CPU time it had taken.\n", one);
+    Print("Pilot run stopped: {}. Its cases are estimated by its CPU time.\n", one);
   }
-  Print("{} cases, {} runs (an ensemble comes on top of the unperturbed run), {} timings\n",
+  Print("{} cases, {} runs (ensembles in addition to the unperturbed run), {} timings\n",
         plan.cases, plan.runs, plan.timings);
   Print("estimated time: accuracy {} with one job", Duration(plan.seconds));
   if (plan.references > 0) {
     Print(", {} references {}", plan.references, Duration(plan.reference_seconds));
   }
   if (plan.rungs > 0) {
-    Print(", {} runs in several scalars {}", plan.rungs, Duration(plan.ladder_seconds));
+    Print(", {} runs in several floating-point types {}", plan.rungs,
+          Duration(plan.ladder_seconds));
   }
   if (plan.timings > 0) Print(", timings {}", Duration(plan.timing_seconds));
   Print("\n");
@@ -224,14 +225,14 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   if (estimate.pilots() > 0) {
     source += fmt::format(
         "{}{} pilots over the first part of the longest horizon, at the loosest and the finest "
-        "tolerance that is asked for{}",
+        "tolerance{}",
         source.empty() ? "" : ", the rest from ", estimate.pilots(),
         first.fixed_steps.empty() ? "" : ", or the longest fixed step");
   }
   if (overview.is_sample) {
     source += fmt::format("; {} combinations stand for all", overview.experiments.size());
   }
-  Print("An estimate, from {}. Each run ends at {:g} s of CPU time at the latest.\n", source,
+  Print("Estimated from {}. The limit of a run is {:g} s of CPU time.\n", source,
         first.limits.cpu_s);
 }
 

@@ -335,7 +335,7 @@ std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& n
 }
 namespace {
 
-constexpr const char* kNobody = "none reached it";
+constexpr const char* kNobody = "none";
 
 /// Returns green on the front, yellow for warnings, red for failed runs.
 std::string FrontColour(const Record& row, const TableColumn& column) {
@@ -478,10 +478,9 @@ Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view) {
   }
   table.notes = tradeoff.remarks;
   table.notes.push_back(
-      "* on the Pareto front: no compared row is better in one and as good in the other");
+      "* = Pareto front: no compared row is better in one value and as good in the other");
   if (hidden > 0) {
-    table.notes.push_back(fmt::format("{} more row{} compared and beaten (--all shows them)",
-                                      hidden, hidden == 1 ? " was" : "s were"));
+    table.notes.push_back(fmt::format("not shown: {} dominated rows (--all)", hidden));
   }
   return table;
 }

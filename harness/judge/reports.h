@@ -55,7 +55,7 @@ struct TradeoffView {
 Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view);
 
 /// Returns one row per problem and error limit, one column per formulation: the cost of its
-/// cheapest method, the ratio to the cheapest of all, or "none reached it".
+/// cheapest method, the ratio to the cheapest of all, or "none".
 Table OverviewTable(const Tradeoff& tradeoff);
 
 /// Returns one row per problem, error limit and formulation with the method, error and cost:

@@ -402,7 +402,7 @@ std::string ErrorLine(const Tradeoff& tradeoff) {
 
 std::string CostLine(const Tradeoff& tradeoff) {
   if (tradeoff.cost == "wall_s_median") {
-    return "cost: wall_s_median [s], simulations timed alone and unobserved, each case as it is";
+    return "cost: wall_s_median [s], simulations timed one at a time, without observers";
   }
   const std::string unit = UnitOf(ColumnOf(tradeoff.cost, {}));
   std::string line =

@@ -24,36 +24,36 @@ struct Reason {
 
 const Reason kReasons[] = {
     {kEnergyDoubt,
-     "error of the energy balance above 1 % of the energy that moves, or more than steps and "
+     "error of the energy balance above 1 % of the exchanged energy, or larger than steps and "
      "tolerance explain",
      [](const Record& row) {
        return fmt::format("{:.2g} %, at most {:.2g} % expected", 100 * EnergyErrorShare(row),
                           100 * ExpectedEnergyShare(row));
      }},
     {kSingularDoubt,
-     "passes singular positions, where this level has nothing to keep the branch by",
+     "crosses singular configurations, where this level does not determine the branch",
      [](const Record& row) {
        return fmt::format("distance {:.1g} at {:.4g} s", row.Number("singularity_distance_min"),
                           row.Number("singularity_distance_min_t"));
      }},
-    {kSoftenedDoubt, "constraints were regularized away from singular positions",
+    {kSoftenedDoubt, "constraints were regularized away from singular configurations",
      [](const Record& row) {
        return fmt::format("{} of {} evaluations, distance {:.1g}",
                           row.Text("regularized_evaluations"), row.Text("rhs_evaluations"),
                           row.Number("singularity_distance_min"));
      }},
-    {kDriftDoubt, "more drift than steps and tolerance explain at this level",
+    {kDriftDoubt, "drift is larger than steps and tolerance explain at this level",
      [](const Record& row) {
        return fmt::format("{:.1e} of a link or rad, at most {:.1e} expected", DriftShare(row),
                           PromisedDriftShare(row));
      }},
     {kErrorDoubt,
-     "further from the reference than 1000 tolerances, or with fixed steps than 1 % of a link",
+     "distance from the reference above 1000 tolerances, or with fixed steps above 1 % of a link",
      [](const Record& row) {
        const bool only_points = row.Text("reference") != kPublished;
        return fmt::format("{:.1e} of a link{}", TrueErrorShare(row), only_points ? "" : " or rad");
      }},
-    {kRefinementDoubt, "finer tolerances do not bring it nearer to one end",
+    {kRefinementDoubt, "finer tolerances do not converge to one final state",
      [](const Record& row) {
        if (row.Find("refinement_difference") != nullptr) {
          return fmt::format("{:.1e} of a link or rad from the run at a tenth of its tolerance",
@@ -61,9 +61,9 @@ const Reason kReasons[] = {
        }
        return fmt::format("{} steps, state {}", row.Text("steps"), row.Text("state_hash"));
      }},
-    {kDriveDoubt, "steps so long that the fastest drive is seen less than twice a period",
+    {kDriveDoubt, "steps longer than half a period of the fastest drive",
      [](const Record& row) { return fmt::format("{:.2g} periods a step", PeriodsPerStep(row)); }},
-    {kStepsDoubt, "step control at its floor, or failing more often than not",
+    {kStepsDoubt, "step control at its shortest step, or more than half of the steps rejected",
      [](const Record& row) {
        return fmt::format("{} rejected of {}, shortest {:.1e} s", row.Text("rejected"),
                           row.Number("steps") + row.Number("rejected"),
@@ -73,7 +73,7 @@ const Reason kReasons[] = {
      [](const Record& row) {
        return row.Text("ensemble_failed") + " of " + row.Text("ensemble_size");
      }},
-    {kExponentDoubt, "the ensemble does not resolve the exponent it was asked for",
+    {kExponentDoubt, "the ensemble does not resolve the requested exponent",
      [](const Record& row) {
        return fmt::format("{:.2f} +- {:.2g}", row.Number("growth_exponent"),
                           row.Number("growth_spread"));
@@ -136,18 +136,18 @@ std::string NoteOfScene(const std::vector<Record>& runs, std::span<const Record>
     const bool cleared = !HasDoubt(members.front(), kDisagreementDoubt);
     if (members.size() > 1) {
       text += fmt::format("; {} agree{}", fmt::join(names, ", "),
-                          cleared ? ", with " + deciding + " too" : "");
+                          cleared ? ", also with " + deciding : "");
     } else {
-      alone += (alone.empty() ? "; each by itself: " : ", ") + names.front() +
+      alone += (alone.empty() ? "; no agreement: " : ", ") + names.front() +
                (cleared ? " (agrees with " + deciding + ")" : "");
     }
   }
   text += alone;
   const std::string scene = NameOfScene(runs.front(), records);
-  if (clusters.size() == 1) return scene + " does not end as with " + deciding + text;
+  if (clusters.size() == 1) return scene + ": another final state than with " + deciding + text;
   const PoseDifference worst = LargestDifference(runs);
   return fmt::format(
-      "{} ends {:.2g} links or rad apart ({}), {:.0f} tolerances are expected at most{}", scene,
+      "{}: final states differ by {:.2g} links or rad ({}), more than {:.0f} tolerances{}", scene,
       worst.largest, worst.body, kMostTolerances, text);
 }
 
@@ -182,13 +182,14 @@ std::string NameOfRow(const Record& row, const std::vector<std::string>& keys) {
 std::vector<std::pair<std::string, std::string>> MeaningsOfDoubts() {
   std::vector<std::pair<std::string, std::string>> meanings;
   for (const Reason& reason : kReasons) meanings.emplace_back(reason.code, reason.sentence);
-  meanings.emplace_back(kDisagreementDoubt, "other runs of the problem end elsewhere");
+  meanings.emplace_back(kDisagreementDoubt, "other runs of the problem have other final states");
   return meanings;
 }
 
 std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records) {
   if (std::ranges::none_of(rows, [](const Record& row) { return HasDoubt(row); })) return {};
-  std::vector<std::string> notes = {"flagged runs finished, but (column warnings):"};
+  std::vector<std::string> notes = {
+      "warnings of flagged runs (docs/reference/outcomes-and-warnings.md):"};
   const std::vector<std::string> keys = TellingKeys(rows);
   for (const Reason& reason : kReasons) {
     if (const std::string note = NoteOf(reason, rows, keys); !note.empty()) notes.push_back(note);
@@ -210,10 +211,11 @@ std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<cons
     }
     const auto alone =
         std::ranges::find_if(rows, [&](const Record& row) { return SceneOf(row) == scenes[i]; });
-    notes.push_back(NameOfScene(*alone, records) + " does not end as with finer tolerances");
+    notes.push_back(NameOfScene(*alone, records) +
+                    ": another final state than with finer tolerances");
   }
   if (scenes.size() > kScenesNamed) {
-    notes.push_back(fmt::format("{}: {} problems more; column agreement has the sets that agree",
+    notes.push_back(fmt::format("{}: {} problems more; column agreement numbers the agreeing sets",
                                 kDisagreementDoubt, scenes.size() - kScenesNamed));
   }
   return notes;

@@ -344,9 +344,9 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
   });
   if (unresolved) {
     notes.push_back(
-        "exponents p are slopes in log-log axes; ? marks what is not resolved (single runs, "
-        "windows that "
-        "disagree), in CSV and JSON columns growth_resolved and growth_hypothesis_resolved do");
+        "p is the exponent of growth; ? = not resolved (a single run, or windows disagree), as in "
+        "the "
+        "columns growth_resolved and growth_hypothesis_resolved");
   }
   return notes;
 }
@@ -458,18 +458,18 @@ std::vector<std::string> NoiseWarnings(std::span<const Record> rows) {
   }
   if (noisy == 0) return {};
   std::string line = fmt::format(
-      "warning: noisy machine in {} of {} timings (column noise says why): load up to {:.1f} on {} "
+      "warning: noisy machine in {} of {} timings (see column noise): load up to {:.1f} on {} "
       "processors",
       noisy, timed, load, processors);
   if (spread > 0) {
-    line += fmt::format(", the same column timed twice differed by up to {:.1f} % ({})",
+    line += fmt::format(", the same method timed twice differed by up to {:.1f} % ({})",
                         100 * spread, where_spread);
   }
   if (!governor.empty()) line += ", CPU governor " + governor;
   // the largest value of a quiet machine is not credible on a noisy one
   const double least = std::fmax(spread, NoiseThresholds{}.aa_spread);
   return {line,
-          fmt::format("warning: differences between columns below {:.0f} % mean nothing here; "
+          fmt::format("warning: differences between methods below {:.0f} % are not significant; "
                       "repeat on a quiet machine",
                       std::ceil(100 * least))};
 }

@@ -179,7 +179,8 @@ TEST(AdviceByLaw, KeepsAMarginInARunWithAllObserversToo) {
 TEST_F(CommandLineTest, AdviceIsPrintedAndWritten) {
   const Ending ending = Call("advise four-bar.json --max-error 1e-5 --horizon 1 --out best.json");
   EXPECT_EQ(ending.code, 0) << ending.text;
-  for (const char* words : {"Take ", "Runner-up", "Dominant error", "reference: long-double"}) {
+  for (const char* words :
+       {"Recommended: ", "Runner-up", "Dominant error", "reference: long-double"}) {
     EXPECT_NE(ending.text.find(words), std::string::npos) << words << "\n" << ending.text;
   }
   EXPECT_EQ(Call("check best.json").code, 0);
@@ -265,7 +266,7 @@ TEST_F(CommandLineTest, ThereIsNoAdviceForWhatDoesNotMove) {
   ExpectEnding(Call("advise disc.json --max-error 1e-5 --horizon 1 --points disc"), 2,
                {"none of the measured points moves", "--points"});
   ExpectEnding(Call("advise disc.json --max-error 1e-5 --horizon 1 --points disc.rim"), 0,
-               {"Take"});
+               {"Recommended"});
 }
 
 TEST_F(CommandLineTest, AdviceTimesGeneratedCode) {

@@ -101,7 +101,7 @@ TEST_F(CommandLineTest, PlanCountsCasesRunsAndTimings) {
   // 3 cases, two of them with 3 more runs; the excluded column of the second mass is not timed
   ExpectEnding(Call("estimate sweep.json"), 0,
                {"axis mass: 2 values", "2 combinations", "3 cases, 9 runs", "3 timings", "pilot",
-                "An estimate"});
+                "Estimated from"});
   ExpectEnding(Call("estimate sweep.json --filter formulation=lagrange"), 0,
                {"1 cases, 1 runs", "1 timings"});
   const Ending untimed = Call("estimate sweep.json --no-timing");

@@ -138,7 +138,7 @@ TEST_F(CommandLineTest, FormulationsTooDenseForTheirLimitsSaySo) {
   }
   ExpectEnding(Call("estimate large.json"), 0,
                With(With(why,
-                         "A pilot was cut off: ladder-2000 "
+                         "Pilot run stopped: ladder-2000 "
                          "lagrange/acceleration/joint/plain: memory-limit"),
                     "1 cases, 1 runs"));
   ExpectEnding(Call("check large.json"), 0, {"1 cases"});
@@ -178,9 +178,9 @@ TEST_F(CommandLineTest, PilotsAreCutOffByTheLimitOfTheirCase) {
   // a step of so many bodies takes longer than all of the limit
   Write("large.json", OnFamily(R"({"family": "chain", "bars": 100000})",
                                R"({"cpu_s": 0.01, "memory_mb": 6000})", "rank-revealing"));
-  ExpectEnding(Call("estimate large.json"), 0,
-               {"A pilot was cut off: chain-100000", "process-time-limit", "of CPU time",
-                "1 cases, 1 runs"});
+  ExpectEnding(
+      Call("estimate large.json"), 0,
+      {"Pilot run stopped: chain-100000", "process-time-limit", "of CPU time", "1 cases, 1 runs"});
 }
 
 TEST_F(CommandLineTest, CheckAssemblesStarts) {

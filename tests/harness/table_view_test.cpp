@@ -255,10 +255,10 @@ TEST(TableView, NoisyTimingsWarnWithTheWorstNumbersAndQuietOnesDoNot) {
                 {.kind = "timing"});
   ASSERT_EQ(table.notes.size(), 2u);
   EXPECT_EQ(table.notes[0],
-            "warning: noisy machine in 2 of 3 timings (column noise says why): load up to 3.0 on 2 "
-            "processors, the same column timed twice differed by up to 5.1 % (b)");
+            "warning: noisy machine in 2 of 3 timings (see column noise): load up to 3.0 on 2 "
+            "processors, the same method timed twice differed by up to 5.1 % (b)");
   EXPECT_EQ(table.notes[1],
-            "warning: differences between columns below 6 % mean nothing here; repeat on a quiet "
+            "warning: differences between methods below 6 % are not significant; repeat on a quiet "
             "machine");
   // a loaded machine may time two equal columns alike by luck
   const std::vector<std::string> loaded =

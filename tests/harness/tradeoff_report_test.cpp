@@ -19,9 +19,9 @@ TEST(TradeoffReport, SaysNoneReachedIt) {
   const std::vector<Record> records = Store({1e-4, 1e-7}, {0.1, 0.3});
   const Tradeoff tradeoff = MakeTradeoff(records, {});
   const std::string overview = ToText(OverviewTable(tradeoff));
-  EXPECT_NE(overview.find("none reached it"), std::string::npos) << overview;
+  EXPECT_NE(overview.find("none"), std::string::npos) << overview;
   EXPECT_NE(overview.find("0.3 (3.00)"), std::string::npos) << overview;
-  EXPECT_NE(ToCsv(CheapestTable(tradeoff)).find("none reached it"), std::string::npos);
+  EXPECT_NE(ToCsv(CheapestTable(tradeoff)).find("none"), std::string::npos);
 }
 
 TEST(TradeoffReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
@@ -32,7 +32,7 @@ TEST(TradeoffReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
   ASSERT_EQ(brief.rows.size(), 2u);
   EXPECT_EQ(brief.rows[0].Text("front"), "*");
   EXPECT_EQ(brief.rows[1].Text("reason"), "warnings: energy");
-  EXPECT_NE(ToText(brief).find("1 more row was compared and beaten"), std::string::npos);
+  EXPECT_NE(ToText(brief).find("not shown: 1 dominated rows"), std::string::npos);
   EXPECT_EQ(TradeoffTable(tradeoff, {.compact = true, .all = true}).rows.size(), 3u);
   const std::string csv = ToCsv(TradeoffTable(tradeoff, {.compact = false, .all = true}));
   EXPECT_NE(csv.find("problem,formulation,enforcement,coordinates,solver,integrator,rtol,error,"),

@@ -113,6 +113,11 @@ std::string UniqueNames::Take(const std::string& wanted) {
   } while (!Add(free));
   return free;
 }
+
+std::string ShownKind(const Joint& joint) {
+  return fmt::format("joint \"{}\": {}", joint.name, joint.kind);
+}
+
 namespace {
 
 using Eigen::Matrix3d;

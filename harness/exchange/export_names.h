@@ -56,6 +56,14 @@ class UniqueNames {
   std::map<std::string, int> next_;  ///< next suffix of a repeated name
 };
 
+/// Returns, for a message: joint "elbow": revolute.
+std::string ShownKind(const Joint& joint);
+
+/// Note on planar mechanisms.
+inline constexpr const char* kPlaneNote =
+    "The plane is z = 0 of space. Moments of inertia about x and y, of which the motion says "
+    "nothing, are those about z.";
+
 // Inertia properties for other programs: principal moments and axes.
 
 struct PrincipalInertia {

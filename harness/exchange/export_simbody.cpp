@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
-#include <cmath>
+#include <map>
+#include <optional>
 
 #include "harness/exchange/export_names.h"
 #include "harness/record/record.h"
@@ -28,139 +29,80 @@ constexpr const char* kTail =
 #include "harness/exchange/export_simbody_end.inc"
     ;
 
-}  // namespace
-
-std::string SimbodyHead(const std::string& name, const std::vector<Note>& notes) {
-  return CommentLines("// ",
-                      "\"" + name +
-                          "\", a mechanism of Loopbench at its assembled start, as a program "
-                          "for Simbody 3.7. SI units, angles in rad.") +
-         kHead + CommentOfNotes("// ", notes) + kDeclarations;
-}
-
-std::string SimbodyTail() { return kTail; }
-namespace {
-
 using Type = SimbodyConstraintType;
 
 /// Returns the class of a tree joint; "" if unsupported.
 std::string MobilizerOf(const Joint& joint) {
-  const std::string& kind = joint.kind;
-  if (kind == "revolute") return "Pin";
-  if (kind == "prismatic") return "Slider";
-  if (kind == "weld") return "Weld";
-  if (kind == "cylindrical") return "Cylinder";
-  if (kind == "spherical") return "Ball";
-  if (kind == "universal") return "Universal";
-  if (kind == "planar" || (kind == "free" && joint.coordinates.size() == 3)) return "Planar";
-  if (kind == "free") return "Free";
-  if (kind == "helical") return "Screw";
-  return kind == "pin-in-slot" ? "BendStretch" : "";
+  static const std::map<std::string, std::string> kMobilizers = {
+      {"revolute", "Pin"},           {"prismatic", "Slider"}, {"weld", "Weld"},
+      {"cylindrical", "Cylinder"},   {"spherical", "Ball"},   {"universal", "Universal"},
+      {"planar", "Planar"},          {"free", "Free"},        {"helical", "Screw"},
+      {"pin-in-slot", "BendStretch"}};
+  if (joint.kind == "free" && joint.coordinates.size() == 3) return "Planar";
+  const auto found = kMobilizers.find(joint.kind);
+  return found == kMobilizers.end() ? "" : found->second;
 }
 
-/// Adds the constraints of one cut joint.
-class Closure {
- public:
-  Closure(std::size_t joint, std::vector<SimbodyConstraint>* made) : joint_(joint), made_(made) {}
+constexpr int kX = 0, kY = 1, kZ = 2;
 
-  void Add(Type type, int axis_on_F = 0, int axis_on_M = 0) {
-    made_->push_back({type, joint_, axis_on_F, axis_on_M});
-  }
-  void Perpendicular(int axis_on_F, int axis_on_M) {
-    Add(Type::kConstantAngle, axis_on_F, axis_on_M);
-  }
-  /// Keeps z of F and z of M parallel.
-  void ParallelZ() {
-    Perpendicular(kZ, kX);
-    Perpendicular(kZ, kY);
-  }
-  /// Closes a planar joint; the tree keeps z = 0, so that points stay free along z.
-  bool InPlane(const std::string& kind);
-  bool InSpace(const std::string& kind);
-  /// Constrains rotations about x and y of F by z of M, independent of a free rotation about z;
-  /// about z if there is none.
-  void Along(const std::vector<int>& components);
+/// Constraint with axes on F and M.
+struct Row {
+  Type type;
+  int axis_on_F = 0, axis_on_M = 0;
+};
+using Rows = std::vector<Row>;
 
- private:
-  static constexpr int kX = 0, kY = 1, kZ = 2;
-  std::size_t joint_;
-  std::vector<SimbodyConstraint>* made_;
+/// Closures of joints, in the plane and in space. In the plane the tree keeps z = 0, so that points
+/// stay free along z.
+struct Closure {
+  Rows in_plane, in_space;
 };
 
-bool Closure::InPlane(const std::string& kind) {
-  if (kind == "revolute") {
-    Add(Type::kPointOnLine, kZ);
-  } else if (kind == "pin-in-slot") {
-    Add(Type::kPointInPlane, kY);
-  } else if (kind == "prismatic") {
-    Add(Type::kPointInPlane, kY);
-    Perpendicular(kX, kY);
-  } else if (kind == "weld") {
-    Add(Type::kPointOnLine, kZ);
-    Perpendicular(kX, kY);
-  } else {
-    return false;
-  }
-  return true;
+const std::map<std::string, Closure>& Closures() {
+  const Row ball = {Type::kBall}, on_x = {Type::kPointOnLine, kX}, on_z = {Type::kPointOnLine, kZ};
+  const Row across_y = {Type::kPointInPlane, kY}, across_z = {Type::kPointInPlane, kZ};
+  const Row angle = {Type::kConstantAngle, kX, kY};
+  // keep z of F and z of M parallel
+  const Row x = {Type::kConstantAngle, kZ, kX}, y = {Type::kConstantAngle, kZ, kY};
+  static const std::map<std::string, Closure> kClosures = {
+      {"revolute", {{on_z}, {ball, x, y}}},
+      {"prismatic", {{across_y, angle}, {on_x, {Type::kConstantOrientation}}}},
+      {"weld", {{on_z, angle}, {{Type::kWeld}}}},
+      {"pin-in-slot", {{across_y}, {on_x, x, y}}},
+      {"cylindrical", {{}, {on_z, x, y}}},
+      {"spherical", {{}, {ball}}},
+      {"planar", {{}, {across_z, x, y}}},
+      {"universal", {{}, {ball, angle}}}};
+  return kClosures;
 }
 
-bool Closure::InSpace(const std::string& kind) {
-  if (kind == "revolute") {
-    Add(Type::kBall);
-    ParallelZ();
-  } else if (kind == "prismatic") {
-    Add(Type::kPointOnLine, kX);
-    Add(Type::kConstantOrientation);
-  } else if (kind == "weld") {
-    Add(Type::kWeld);
-  } else if (kind == "pin-in-slot") {
-    Add(Type::kPointOnLine, kX);
-    ParallelZ();
-  } else if (kind == "cylindrical") {
-    Add(Type::kPointOnLine, kZ);
-    ParallelZ();
-  } else if (kind == "spherical") {
-    Add(Type::kBall);
-  } else if (kind == "planar") {
-    Add(Type::kPointInPlane, kZ);
-    ParallelZ();
-  } else if (kind == "universal") {
-    Add(Type::kBall);
-    Perpendicular(kX, kY);
-  } else {
-    return false;
+/// Returns constraints of one cut joint; nothing for a joint that Simbody does not support there.
+std::optional<Rows> ClosureOf(const Joint& joint, bool planar) {
+  if (joint.kind == "free") return Rows();
+  if (joint.kind == "rod") return Rows{{Type::kRod}};
+  if (!planar && !joint.imposed.empty()) {
+    // Rotations about x and y of F by z of M, independent of a free rotation about z; about z if
+    // there is none.
+    constexpr Row kRotations[] = {{Type::kConstantAngle, kY, kZ},
+                                  {Type::kConstantAngle, kX, kZ},
+                                  {Type::kConstantAngle, kX, kY}};
+    Rows rows;
+    for (const int component : joint.imposed) {
+      rows.push_back(component < 3 ? kRotations[component]
+                                   : Row{Type::kPointInPlane, component - 3});
+    }
+    return rows;
   }
-  return true;
-}
-
-void Closure::Along(const std::vector<int>& components) {
-  for (const int component : components) {
-    if (component == 0) Perpendicular(kY, kZ);
-    if (component == 1) Perpendicular(kX, kZ);
-    if (component == 2) Perpendicular(kX, kY);
-    if (component >= 3) Add(Type::kPointInPlane, component - 3);
-  }
-}
-
-/// Returns false for a joint that Simbody does not support there.
-bool AddConstraints(const Model& model, std::size_t index, SimbodyParts* parts) {
-  const Joint& joint = model.cut[index];
-  Closure closure(index, &parts->constraints);
-  if (joint.kind == "free") return true;
-  if (joint.kind == "rod") {
-    closure.Add(Type::kRod);
-    return true;
-  }
-  if (model.planar) return closure.InPlane(joint.kind);
-  if (joint.imposed.empty()) return closure.InSpace(joint.kind);
-  closure.Along(joint.imposed);
-  return true;
+  const auto found = Closures().find(joint.kind);
+  if (found == Closures().end()) return std::nullopt;
+  const Rows& rows = planar ? found->second.in_plane : found->second.in_space;
+  return rows.empty() ? std::nullopt : std::optional(rows);
 }
 
 /// Makes a mobilizer. If P is the child of Q, MobilizedBody::Reverse keeps the Model's coordinates.
 SimbodyMobilizer MakeMobilizer(const Model& model, std::size_t index) {
   const Joint& joint = model.tree[index];
-  const Body& body = model.bodies[static_cast<std::size_t>(joint.child())];
+  const Body& body = model.bodies[joint.child()];
   SimbodyMobilizer made;
   made.type = MobilizerOf(joint);
   made.joint = index;
@@ -188,7 +130,7 @@ SimbodyMobilizer MakeMobilizer(const Model& model, std::size_t index) {
 void AddForces(const Model& model, std::vector<SimbodyForce>* forces) {
   using Force = SimbodyForceType;
   for (const JointForce& force : model.joint_forces) {
-    const int body = model.tree[static_cast<std::size_t>(force.joint)].child();
+    const int body = model.tree[force.joint].child();
     const auto add = [&](Force type, double first, double second) {
       if (first != 0.0) forces->push_back({type, body, 0, {}, {}, {first, second}});
     };
@@ -218,18 +160,19 @@ SimbodyParts MakeSimbodyParts(const Model& model) {
   std::vector<std::string> missing = model.missing;
   SimbodyParts parts;
   for (std::size_t i = 0; i < model.tree.size(); ++i) {
-    const Joint& joint = model.tree[i];
     const SimbodyMobilizer& made = parts.mobilizers.emplace_back(MakeMobilizer(model, i));
-    if (made.type.empty()) missing.push_back("joint \"" + joint.name + "\": " + joint.kind);
+    if (made.type.empty()) missing.push_back(ShownKind(model.tree[i]));
   }
   for (std::size_t i = 0; i < model.cut.size(); ++i) {
-    if (AddConstraints(model, i, &parts)) continue;
-    const Joint& joint = model.cut[i];
-    missing.push_back("joint \"" + joint.name + "\": " + joint.kind + ", which closes a loop");
+    const auto closure = ClosureOf(model.cut[i], model.planar);
+    if (!closure) missing.push_back(ShownKind(model.cut[i]) + ", which closes a loop");
+    for (const Row& row : closure.value_or(Rows())) {
+      parts.constraints.push_back({row.type, i, row.axis_on_F, row.axis_on_M});
+    }
   }
   for (const PointForce& force : model.point_forces) {
     if (!force.in_body_axes) continue;
-    const Body& body = model.bodies[static_cast<std::size_t>(force.point.body)];
+    const Body& body = model.bodies[force.point.body];
     missing.push_back("point_force on body \"" + body.name + "\", in its axes");
   }
   for (std::size_t i = 1; i < model.bodies.size(); ++i) {
@@ -243,8 +186,6 @@ SimbodyParts MakeSimbodyParts(const Model& model) {
 namespace {
 
 using fmt::format;
-
-std::size_t At(int index) { return static_cast<std::size_t>(index); }
 
 template <class Range>
 std::string Numbers(const Range& values) {
@@ -261,8 +202,7 @@ std::string FrameText(const Frame& frame) {
 }
 
 std::string Axis(const Frame& frame, int axis) {
-  const auto a = At(axis);
-  return format("UnitVec3({})", Numbers(Vec{frame.R[a], frame.R[3 + a], frame.R[6 + a]}));
+  return format("UnitVec3({})", Numbers(Vec{frame.R[axis], frame.R[3 + axis], frame.R[6 + axis]}));
 }
 
 /// Returns a name as the member "name" of a JSON object.
@@ -271,13 +211,13 @@ std::string Member(const std::string& key, const std::string& name) {
   return QuoteCpp(object.substr(1, object.size() - 2));
 }
 
-/// Writes the statements of the program. Bodies are numbered as in Simbody, in tree order.
+/// Writes the program. Bodies are numbered as in Simbody, in tree order.
 class Writer {
  public:
   explicit Writer(const Model& model) : model_(model), parts_(MakeSimbodyParts(model)) {
     number_.assign(model.bodies.size(), 0);
     for (std::size_t i = 0; i < parts_.mobilizers.size(); ++i) {
-      number_[At(parts_.mobilizers[i].child)] = i + 1;
+      number_[parts_.mobilizers[i].child] = i + 1;
     }
   }
 
@@ -287,18 +227,21 @@ class Writer {
     for (const SimbodyConstraint& one : parts_.constraints) closures += Text(one);
     for (const SimbodyForce& one : parts_.forces) forces += Text(one);
     AddNotes();
-    made_.program = SimbodyHead(model_.name, made_.notes) +
-                    "Mechanism::Mechanism() {\n  body.push_back(matter.Ground());\n" + tree +
-                    closures +
-                    format("  Force::Gravity(forces, matter, {});\n", Point(model_.gravity)) +
-                    forces + "}\n\n" + Start() + Names() + SimbodyTail();
+    made_.program =
+        CommentLines("// ", "\"" + model_.name +
+                                "\", a mechanism of Loopbench at its assembled start, as a program "
+                                "for Simbody 3.7. SI units, angles in rad.") +
+        kHead + CommentOfNotes("// ", made_.notes) + kDeclarations +
+        "Mechanism::Mechanism() {\n  body.push_back(matter.Ground());\n" + tree + closures +
+        format("  Force::Gravity(forces, matter, {});\n", Point(model_.gravity)) + forces +
+        "}\n\n" + Start() + Names() + kTail;
     return std::move(made_);
   }
 
  private:
   void Say(const std::string& text) { made_.notes.push_back({false, text}); }
 
-  std::string BodyText(int body) const { return format("body[{}]", number_[At(body)]); }
+  std::string BodyText(int body) const { return format("body[{}]", number_[body]); }
 
   std::string Text(const SimbodyMobilizer& one) const {
     const Joint& joint = model_.tree[one.joint];
@@ -310,74 +253,44 @@ class Writer {
         "  // body {} on joint {}\n"
         "  body.push_back(MobilizedBody::{}(\n      {}, {},\n      Rigid({}, {}),\n"
         "      {}{}));\n",
-        QuoteCpp(model_.bodies[At(one.child)].name), QuoteCpp(joint.name), one.type,
+        QuoteCpp(model_.bodies[one.child].name), QuoteCpp(joint.name), one.type,
         BodyText(one.parent), FrameText(one.on_parent), NumberText(one.mass), Numbers(one.inertia),
         FrameText(one.on_child), last);
   }
 
   std::string Text(const SimbodyConstraint& one) const {
+    // by SimbodyConstraintType
+    constexpr const char* kCalls[] = {"Ball({P}, {p}, {Q}, {q})",
+                                      "PointOnLine({P}, {axis}, {p}, {Q}, {q})",
+                                      "PointInPlane({P}, {axis}, dot({axis}, {p}), {Q}, {q})",
+                                      "ConstantAngle({P}, {axis}, {Q}, {other}, Pi / 2)",
+                                      "ConstantOrientation({P}, {F}.R(), {Q}, {M}.R())",
+                                      "Weld({P}, {F}, {Q}, {M})",
+                                      "Rod({P}, {p}, {Q}, {q}, {length})"};
     const Joint& joint = model_.cut[one.joint];
-    const auto &F = joint.F, &M = joint.M;
-    const std::string P = BodyText(joint.from), Q = BodyText(joint.to),
-                      on_F = Axis(F, one.axis_on_F), p = Point(F.p), q = Point(M.p);
-    std::string text;
-    switch (one.type) {
-      case SimbodyConstraintType::kBall:
-        text = format("Ball({}, {}, {}, {})", P, p, Q, q);
-        break;
-      case SimbodyConstraintType::kPointOnLine:
-        text = format("PointOnLine({}, {}, {}, {}, {})", P, on_F, p, Q, q);
-        break;
-      case SimbodyConstraintType::kPointInPlane:
-        text = format("PointInPlane({}, {}, dot({}, {}), {}, {})", P, on_F, on_F, p, Q, q);
-        break;
-      case SimbodyConstraintType::kConstantAngle:
-        text = format("ConstantAngle({}, {}, {}, {}, Pi / 2)", P, on_F, Q, Axis(M, one.axis_on_M));
-        break;
-      case SimbodyConstraintType::kConstantOrientation:
-        text =
-            format("ConstantOrientation({}, {}.R(), {}, {}.R())", P, FrameText(F), Q, FrameText(M));
-        break;
-      case SimbodyConstraintType::kWeld:
-        text = format("Weld({}, {}, {}, {})", P, FrameText(F), Q, FrameText(M));
-        break;
-      case SimbodyConstraintType::kRod:
-        text = format("Rod({}, {}, {}, {}, {})", P, p, Q, q, NumberText(joint.parameter));
-        break;
-    }
+    using fmt::arg;
+    const std::string text = format(
+        fmt::runtime(kCalls[static_cast<int>(one.type)]), arg("P", BodyText(joint.from)),
+        arg("Q", BodyText(joint.to)), arg("p", Point(joint.F.p)), arg("q", Point(joint.M.p)),
+        arg("F", FrameText(joint.F)), arg("M", FrameText(joint.M)),
+        arg("axis", Axis(joint.F, one.axis_on_F)), arg("other", Axis(joint.M, one.axis_on_M)),
+        arg("length", NumberText(joint.parameter)));
     return format("  // joint {} closes a loop\n  Constraint::{};\n", QuoteCpp(joint.name), text);
   }
 
   std::string Text(const SimbodyForce& one) const {
-    const std::string A = BodyText(one.first), B = BodyText(one.second), p = Point(one.at_first),
-                      q = Point(one.at_second), first = NumberText(one.numbers[0]),
-                      second = NumberText(one.numbers[1]);
-    std::string text;
-    switch (one.type) {
-      case SimbodyForceType::kMobilityConstantForce:
-        text = format("MobilityConstantForce(forces, {}, 0, {})", A, first);
-        break;
-      case SimbodyForceType::kMobilityLinearSpring:
-        text = format("MobilityLinearSpring(forces, {}, 0, {}, {})", A, first, second);
-        break;
-      case SimbodyForceType::kMobilityLinearDamper:
-        text = format("MobilityLinearDamper(forces, {}, 0, {})", A, first);
-        break;
-      case SimbodyForceType::kConstantForce:
-        text = format("ConstantForce(forces, {}, {}, {})", A, p, q);
-        break;
-      case SimbodyForceType::kTwoPointLinearSpring:
-        text = format("TwoPointLinearSpring(forces, {}, {}, {}, {}, {}, {})", A, p, B, q, first,
-                      second);
-        break;
-      case SimbodyForceType::kTwoPointLinearDamper:
-        text = format("TwoPointLinearDamper(forces, {}, {}, {}, {}, {})", A, p, B, q, first);
-        break;
-      case SimbodyForceType::kTwoPointConstantForce:
-        text = format("TwoPointConstantForce(forces, {}, {}, {}, {}, {})", A, p, B, q, first);
-        break;
-    }
-    return format("  Force::{};\n", text);
+    // by SimbodyForceType: {0} {1} bodies, {2} {3} points or vector, {4} {5} numbers
+    constexpr const char* kCalls[] = {"MobilityConstantForce(forces, {0}, 0, {4})",
+                                      "MobilityLinearSpring(forces, {0}, 0, {4}, {5})",
+                                      "MobilityLinearDamper(forces, {0}, 0, {4})",
+                                      "ConstantForce(forces, {0}, {2}, {3})",
+                                      "TwoPointLinearSpring(forces, {0}, {2}, {1}, {3}, {4}, {5})",
+                                      "TwoPointLinearDamper(forces, {0}, {2}, {1}, {3}, {4})",
+                                      "TwoPointConstantForce(forces, {0}, {2}, {1}, {3}, {4})"};
+    return format("  Force::{};\n",
+                  format(fmt::runtime(kCalls[static_cast<int>(one.type)]), BodyText(one.first),
+                         BodyText(one.second), Point(one.at_first), Point(one.at_second),
+                         NumberText(one.numbers[0]), NumberText(one.numbers[1])));
   }
 
   std::string Start() const {
@@ -386,7 +299,7 @@ class Writer {
       const Joint& joint = model_.tree[one.joint];
       const auto values = [&](const std::vector<double>& all, int first, int count) {
         std::vector<double> own;
-        for (int i = first; i < first + count; ++i) own.push_back(one.sign * all[At(i)]);
+        for (int i = first; i < first + count; ++i) own.push_back(one.sign * all[i]);
         return Numbers(own);
       };
       if (joint.num_u == 0) continue;
@@ -402,7 +315,7 @@ class Writer {
     std::string joints, bodies, points;
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
       const Joint& joint = model_.tree[one.joint];
-      joints += format("    {{{}, {}, {}}},\n", Member("name", joint.name), number_[At(one.child)],
+      joints += format("    {{{}, {}, {}}},\n", Member("name", joint.name), number_[one.child],
                        NumberText(one.sign));
     }
     for (std::size_t b = 0; b < model_.bodies.size(); ++b) {
@@ -426,10 +339,7 @@ class Writer {
   }
 
   void AddNotes() {
-    if (model_.planar) {
-      Say("The plane is z = 0 of space. Moments of inertia about x and y, of which the motion says "
-          "nothing, are those about z.");
-    }
+    if (model_.planar) Say(kPlaneNote);
     Say("Body frames have the user's axes and lie in centres of mass.");
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
       if (one.sign > 0.0) continue;

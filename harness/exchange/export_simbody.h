@@ -9,15 +9,6 @@
 
 namespace loopbench::exchange {
 
-// Text common to all programs for Simbody; internal to export_simbody.cpp.
-
-/// Returns the text from the first comment to the declaration of `Mechanism`, before its
-/// constructor and SetStart().
-std::string SimbodyHead(const std::string& name, const std::vector<Note>& notes);
-
-/// Returns the code that prints, integrates and reads arguments; follows kJoints, kBodies, kPoints.
-std::string SimbodyTail();
-
 // A Model as Simbody's mobilizers, constraints and forces. The peer builds a System from this list,
 // and export_simbody.h writes a program that builds the same System. C++17, as model.h.
 //

@@ -40,7 +40,7 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
     root.Fail("this root element", "<mujoco> (MJCF), <robot> (URDF) or <sdf>");
   }
   const auto index = found - Roots().begin();
-  const std::string& format = ImportFormats()[static_cast<std::size_t>(index)];
+  const std::string& format = ImportFormats()[index];
   if (wanted != ImportFormats().end() && *wanted != format) {
     root.Fail(format, fmt::format("{}, as --input-format says", *wanted));
   }
@@ -104,8 +104,8 @@ class Cluster {
     Consider(root);
     std::vector<int> queue = {root};
     for (std::size_t k = 0; k < queue.size(); ++k) {
-      for (const int weld : welds[static_cast<std::size_t>(queue[k])]) {
-        const JointDescription& joint = d_.joints[static_cast<std::size_t>(weld)];
+      for (const int weld : welds[queue[k]]) {
+        const JointDescription& joint = d_.joints[weld];
         for (const auto& [here, there] :
              {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
           if (here->body != queue[k] || poses_.contains(there->body)) continue;
@@ -131,12 +131,9 @@ class Cluster {
   }
 
  private:
-  bool IsSound(int body) const { return sound_[static_cast<std::size_t>(body)]; }
+  bool IsSound(int body) const { return sound_[body]; }
   void Consider(int body) {
-    const int rank = body == kGround                                        ? 3
-                     : IsSound(body)                                        ? 2
-                     : d_.bodies[static_cast<std::size_t>(body)].mass > 0.0 ? 1
-                                                                            : 0;
+    const int rank = body == kGround ? 3 : IsSound(body) ? 2 : d_.bodies[body].mass > 0.0 ? 1 : 0;
     if (rank <= rank_) return;
     rank_ = rank;
     carrier_ = body;
@@ -155,7 +152,7 @@ std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& descript
     const JointDescription& joint = description.joints[j];
     if (joint.type != JointType::kWeld) continue;
     for (const int body : {joint.from.body, joint.to.body}) {
-      welds[static_cast<std::size_t>(body)].push_back(static_cast<int>(j));
+      welds[body].push_back(static_cast<int>(j));
     }
   }
   return welds;
@@ -208,7 +205,7 @@ void ImportDraft::MergeFixed(bool whole) {
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
     if (renumbering.joints[j] >= 0 || joint.type == JointType::kWeld) continue;
-    Note(elements_[static_cast<std::size_t>(joint.to.body)],
+    Note(elements_[joint.to.body],
          fmt::format("joint \"{}\" dropped: it leads from a body to what is fixed to it",
                      joint.name));
   }
@@ -261,7 +258,7 @@ Imported ImportDraft::Finish(const std::string& format) {
   }
   if (options_.gravity) description.gravity = *options_.gravity;
   for (const auto& [body, share] : lifts_) {
-    const BodyDescription& lifted = description.bodies[static_cast<std::size_t>(body)];
+    const BodyDescription& lifted = description.bodies[body];
     if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
     description.forces.emplace_back(
         PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
@@ -321,7 +318,7 @@ void ReadSecond(const JsonNode& node, LoopPart& loop) {
 
 void ReadPlaceOfLoop(const JsonNode& node, LoopPart& loop) {
   if (loop.from.body < 0) return;
-  const BodyDescription& body = loop.draft->bodies[static_cast<std::size_t>(loop.from.body)];
+  const BodyDescription& body = loop.draft->bodies[loop.from.body];
   loop.from.position = ReadPoint(node, body, loop.draft->space);
 }
 
@@ -351,8 +348,7 @@ const Fields<LoopPart>& LoopFields() {
 /// Computes the other side from the body poses.
 void CloseAtRest(const std::vector<Frame>& at_rest, JointDescription* joint) {
   if (joint->from.body < 0 || joint->to.body < 0) return;
-  const Frame X_QP = at_rest[static_cast<std::size_t>(joint->to.body)].Inverse() *
-                     at_rest[static_cast<std::size_t>(joint->from.body)];
+  const Frame X_QP = at_rest[joint->to.body].Inverse() * at_rest[joint->from.body];
   joint->to.position = X_QP.R * joint->from.position + X_QP.p;
   const Eigen::AngleAxisd turn{Eigen::Quaterniond(X_QP.R)};
   joint->to.rotation = turn.angle() * turn.axis();

@@ -84,7 +84,7 @@ Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaternion
 }
 
 ImportDraft::ImportDraft(const XmlFile& file, const ImportOptions& options)
-    : at_rest(1), file_(file), options_(options), elements_{file.root()}, lines_{0} {
+    : at_rest(1), file_(file), options_(options), elements_{file.root()} {
   description.space = SpaceKind::kSpatial;
   description.bodies[kGround].name = "ground";
 }
@@ -96,8 +96,9 @@ int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
   if (name.empty()) {
     while (bodies_.contains(body.name)) body.name += "_";
   } else if (const auto known = bodies_.find(name); known != bodies_.end()) {
-    element.Fail("a second body of this name",
-                 fmt::format("one that is not in use (line {} has it)", LineOf(known->second)));
+    element.Fail(
+        "a second body of this name",
+        fmt::format("one that is not in use (line {} has it)", elements_[known->second].line()));
   }
   bodies_.emplace(body.name, index);
   if (body.name == description.bodies[kGround].name) {
@@ -109,7 +110,6 @@ int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
   description.bodies.push_back(body);
   at_rest.emplace_back();
   elements_.push_back(element);
-  lines_.push_back(element.line());
   return index;
 }
 
@@ -157,6 +157,18 @@ JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type,
   return description.joints.back();
 }
 
+void ImportDraft::Fix(int parent, const Placement& X, int body, const char* ending) {
+  const std::string name = description.bodies[body].name + ending;
+  AddJoint(NameLater(name), JointType::kWeld, parent, X, body, {});
+}
+
+void ImportDraft::AddSpringAndDamper(double stiffness, double rest, double damping) {
+  if (stiffness > 0.0) {
+    description.forces.emplace_back(JointSpring{last_joint(), stiffness, rest, 0.0});
+  }
+  if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
+}
+
 void ImportDraft::AddLift(int body, double share) { lifts_.emplace_back(body, share); }
 
 void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
@@ -165,38 +177,43 @@ void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
 }
 
 void ImportDraft::Note(const XmlElement& element, std::string reason, bool changes_motion) {
-  notes_.push_back({element.line(), element.Shown(), std::move(reason), changes_motion});
+  Note(element, "", std::move(reason), changes_motion);
 }
 
 void ImportDraft::Note(const XmlElement& element, const std::string& attribute, std::string reason,
                        bool changes_motion) {
-  std::string shown = element.Shown();
-  if (!attribute.empty()) shown += " " + attribute;
-  notes_.push_back({element.line(), std::move(shown), std::move(reason), changes_motion});
+  const std::string shown = element.Shown() + (attribute.empty() ? "" : " ") + attribute;
+  notes_.push_back({element.line(), shown, std::move(reason), changes_motion});
+}
+
+void ImportDraft::Drop(const XmlElement& element, const std::string& attribute,
+                       std::string_view reason) {
+  Note(element, attribute, fmt::format("dropped: {}", reason), true);
+}
+
+void ImportDraft::DropWhole(const XmlElement& element, std::string_view reason,
+                            bool changes_motion) {
+  element.Ignore();
+  Note(element, fmt::format("dropped: {}", reason), changes_motion);
 }
 
 void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
-  file_.Unread([&](const XmlElement& element, const std::string& attribute) {
+  for (const auto& [element, attribute] : file_.Unread()) {
     const auto find = [&](const std::string& what) {
       return std::ranges::find_if(reasons, [&](const DroppedReason& row) { return row.Has(what); });
     };
     if (element.tag().starts_with("xacro:")) {
       element.Fail("an element of xacro", "plain XML, as `xacro FILE` writes it");
     }
-    if (attribute.starts_with("xmlns")) return;
-    auto known = reasons.end();
-    if (attribute.empty()) {
-      known = find(element.tag());
-    } else {
-      known = find(element.tag() + "@" + attribute);
-      if (known == reasons.end()) known = find("@" + attribute);
-    }
+    if (attribute.starts_with("xmlns")) continue;
+    auto known = find(element.tag() + (attribute.empty() ? "" : "@") + attribute);
+    if (known == reasons.end() && !attribute.empty()) known = find("@" + attribute);
     if (known == reasons.end()) {
       Note(element, attribute, "dropped: not known to this reader", true);
     } else if (!known->reason.empty()) {
       Note(element, attribute, fmt::format("dropped: {}", known->reason), known->changes_motion);
     }
-  });
+  }
 }
 
 // --planar: projects an imported mechanism onto its plane, with gravity along -y.
@@ -247,7 +264,7 @@ void ImportDraft::MakeBallsPins(const Vector3d& n) {
     if (joint.type != JointType::kSpherical) continue;
     joint.type = JointType::kRevolute;  // the planar motion of a ball
     for (JointSide* side : {&joint.from, &joint.to}) {
-      const Quaterniond& q = at_rest[static_cast<std::size_t>(side->body)].q;
+      const Quaterniond& q = at_rest[side->body].q;
       side->rotation = RotationVector(q.conjugate() * Quaterniond(AxesWithNormal(n)));
     }
     balls.insert(static_cast<int>(j));
@@ -262,7 +279,7 @@ void ImportDraft::GoToPlane() {
     return TraitsOf(joint.type).flat.turns;
   });
   if (turns != description.joints.end()) {
-    const Vector3d n = at_rest[static_cast<std::size_t>(turns->from.body)].q *
+    const Vector3d n = at_rest[turns->from.body].q *
                        (PoseOf(turns->from).R * AxisAlignment(*turns) * Vector3d::UnitZ());
     MakeBallsPins(n);
     TurnGround(AxesOfPlane(n, description.gravity).conjugate(), &description);

@@ -42,6 +42,10 @@ struct Placement {
   Eigen::Vector3d At(const Eigen::Vector3d& point) const { return p + q * point; }
   Placement Inverse() const { return {q.conjugate(), q.conjugate() * Eigen::Vector3d(-p)}; }
   Frame AsFrame() const { return {q.toRotationMatrix(), p}; }
+  /// Returns the coordinates of a free joint.
+  std::vector<double> AsCoordinates() const {
+    return {q.w(), q.x(), q.y(), q.z(), p.x(), p.y(), p.z()};
+  }
 };
 
 /// Returns the rotation vector of a unit quaternion, at most half a turn [rad].
@@ -63,6 +67,14 @@ Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d&
 /// Returns the symmetric matrix with elements xx, yy, zz, xy, xz, yz.
 Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz, double yz);
 
+/// Returns the inertia from its elements. `get`: returns the element of a name, "ixx" to "iyz", and
+/// of a kind, true for moments.
+template <class Get>
+Eigen::Matrix3d InertiaOf(const Get& get) {
+  return SymmetricMatrix(get("ixx", true), get("iyy", true), get("izz", true), get("ixy", false),
+                         get("ixz", false), get("iyz", false));
+}
+
 // A mechanism during its import in any format: the format readers fill it, and Finish() completes
 // it.
 
@@ -78,6 +90,9 @@ struct DroppedReason {
   }
 };
 
+inline constexpr const char* kDryFriction = "dry friction is no force of mechanism files";
+inline constexpr const char* kNoEnds = "joints turn and slide without ends";
+
 class ImportDraft {
  public:
   ImportDraft(const XmlFile& file, const ImportOptions& options);
@@ -91,7 +106,8 @@ class ImportDraft {
   /// Returns the index of an existing body; `also`: further names of Ground.
   int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
   int BodyNamed(const std::string& name, const XmlElement& user) const;
-  int LineOf(int body) const { return lines_[static_cast<std::size_t>(body)]; }
+  /// Returns the element of a body; the root element for Ground.
+  const XmlElement& element(int body) const { return elements_[body]; }
 
   /// Returns the name of a new joint; rejects a name in use.
   std::string NewJointName(const XmlElement& element, const std::string& name);
@@ -101,6 +117,10 @@ class ImportDraft {
   /// Adds a joint from X_PF on `from` to X_QM on `to`; the reference is valid until the next call.
   JointDescription& AddJoint(const std::string& name, JointType type, int from,
                              const Placement& X_PF, int to, const Placement& X_QM);
+  /// Adds a weld of a body, named after it with this ending.
+  void Fix(int parent, const Placement& X, int body, const char* ending);
+  /// Adds spring and damper of the joint that was added last, where they are not 0.
+  void AddSpringAndDamper(double stiffness, double rest, double damping);
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
   /// Records that the mass is in a file that is not read: `value` is rejected if the body moves.
@@ -120,6 +140,10 @@ class ImportDraft {
   void Note(const XmlElement& element, std::string reason, bool changes_motion = false);
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
             bool changes_motion = false);
+  /// Adds a note of an attribute that is not there, a change of the motion.
+  void Drop(const XmlElement& element, const std::string& attribute, std::string_view reason);
+  /// Ignores an element with all its contents, with a note.
+  void DropWhole(const XmlElement& element, std::string_view reason, bool changes_motion = false);
   /// Adds a note for each unread part.
   void NoteUnread(std::span<const DroppedReason> reasons);
 
@@ -140,8 +164,7 @@ class ImportDraft {
 
   const XmlFile& file_;
   const ImportOptions& options_;
-  std::vector<XmlElement> elements_;  ///< elements of bodies; the root element for Ground
-  std::vector<int> lines_;
+  std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;
   exchange::UniqueNames joints_;
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names

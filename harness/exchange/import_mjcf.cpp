@@ -9,20 +9,22 @@ namespace loopbench::harness {
 
 namespace {
 
+constexpr const char* kNoMedium = "there is no medium";
+
 constexpr DroppedReason kMjcfReasons[] = {
     {"asset", "meshes, textures and materials do not move anything"},
     {"contact", "there is no contact"},
     {"sensor", "there are no sensors"},
     {"extension", "there are no plugins", true},
     {"deformable", "bodies are rigid", true},
-    {"joint@armature", "rotors have no inertia beside that of the bodies", true},
-    {"joint@frictionloss", "dry friction is no force of mechanism files", true},
+    {"joint@armature", kNoRotors, true},
+    {"joint@frictionloss", kDryFriction, true},
     {"joint@springdamper", "stiffness and damping by frequency depend on masses of the start",
      true},
     {"site@fromto", "a site is taken as the point at its `pos`"},
     {"option@timestep", "runs choose their own steps"},
     {"option@integrator", "runs choose their own integrator"},
-    {"option@density option@viscosity option@wind", "there is no medium", true},
+    {"option@density option@viscosity option@wind", kNoMedium, true},
     {"compiler@fusestatic", "bodies without joints stay bodies, welded"},
     // without influence on the motion
     {"visual statistic size custom light camera @group @user @margin @solimplimit @solreflimit "
@@ -46,10 +48,9 @@ constexpr std::size_t kActuatorGroups = 31;  // groups that can be disabled
 void RefuseMacros(const XmlElement& root) {
   const std::vector<std::string_view> macros = {"include", "composite", "flexcomp", "replicate",
                                                 "attach"};
-  std::vector<XmlElement> found = root.ChildrenOf(macros);
-  for (const XmlElement& section :
-       root.ChildrenOf({"compiler", "option", "default", "worldbody", "equality", "tendon",
-                        "actuator", "keyframe"})) {
+  std::vector<XmlElement> found = root.Children(macros);
+  for (const XmlElement& section : root.Children({"compiler", "option", "default", "worldbody",
+                                                  "equality", "tendon", "actuator", "keyframe"})) {
     if (const auto macro = section.Within(macros)) found.push_back(*macro);
   }
   if (found.empty()) return;
@@ -59,18 +60,17 @@ void RefuseMacros(const XmlElement& root) {
 
 void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
   const auto flag = [&](const char* name, bool* value) {
-    if (const auto given = element.Attribute(name)) *value = given->Bool();
+    *value = BoolOr(element.Attribute(name), *value);
   };
   const auto number = [&](const char* name, double* value, const Range& range) {
-    if (const auto given = element.Attribute(name)) *value = given->Number(range);
+    *value = NumberOr(element.Attribute(name), *value, range);
   };
   if (const auto angle = element.Attribute("angle")) {
-    settings->degrees = angle->Choice({"radian", "degree"}) == 1;
+    settings->degrees = angle->Choice<bool>({{"radian", false}, {"degree", true}});
   }
-  if (const auto coordinate = element.Attribute("coordinate")) {
-    if (coordinate->text() != "local") {
-      coordinate->Fail("local: global coordinates left MuJoCo with version 2.3.2");
-    }
+  const auto coordinate = element.Attribute("coordinate");
+  if (coordinate && coordinate->text() != "local") {
+    coordinate->Fail("local: global coordinates left MuJoCo with version 2.3.2");
   }
   if (const auto euler = element.Attribute("eulerseq")) {
     settings->euler = euler->text();
@@ -79,10 +79,9 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
     if (!whole) euler->Fail("three letters of x, y, z, X, Y, Z");
   }
   if (const auto from = element.Attribute("inertiafromgeom")) {
-    const std::size_t choice = from->Choice({"false", "true", "auto"});
-    settings->inertia = choice == 0   ? MjcfSettings::kFromInertial
-                        : choice == 1 ? MjcfSettings::kFromGeoms
-                                      : MjcfSettings::kAuto;
+    settings->inertia = from->Choice<MjcfSettings::Inertia>({{"false", MjcfSettings::kFromInertial},
+                                                             {"true", MjcfSettings::kFromGeoms},
+                                                             {"auto", MjcfSettings::kAuto}});
   }
   if (const auto range = element.Attribute("inertiagrouprange")) {
     const std::vector<double> groups = range->Numbers(2, 2);
@@ -98,18 +97,13 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
 
 void ReadOption(const XmlElement& element, MjcfModel* model) {
   MjcfSettings& settings = model->settings;
-  if (const auto gravity = element.Attribute("gravity")) {
-    model->draft->description.gravity = gravity->Vector();
-  }
-  const auto has_medium = [&](const char* name) {
-    if (!element.HasAttribute(name)) return false;
-    for (const double value : element.Attribute(name)->Numbers(1, 3)) {
-      if (value != 0.0) return true;
-    }
-    return false;
-  };
+  Eigen::Vector3d& gravity = model->draft->description.gravity;
+  if (const auto given = element.Attribute("gravity")) gravity = given->Vector();
   for (const char* name : {"density", "viscosity", "wind"}) {
-    if (has_medium(name)) model->draft->Note(element, name, "dropped: there is no medium", true);
+    const auto given = element.Attribute(name);
+    const std::vector<double> medium = given ? given->Numbers(1, 3) : std::vector<double>();
+    const bool acts = std::ranges::any_of(medium, [](double value) { return value != 0.0; });
+    if (acts) model->draft->Drop(element, name, kNoMedium);
   }
   if (const auto groups = element.Attribute("actuatorgroupdisable")) {
     for (const double group : groups->Numbers(0, kActuatorGroups)) {
@@ -119,37 +113,35 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
       settings.silent_groups.insert(static_cast<int>(group));
     }
   }
-  for (const XmlElement& flag : element.Children("flag")) {
-    const auto on = [&](const char* name, bool* value) {
-      const auto given = flag.Attribute(name);
-      if (given) *value = given->Choice({"disable", "enable"}) == 1;
-    };
-    bool has_gravity = true, has_passive = true;
-    on("gravity", &has_gravity);
-    on("passive", &has_passive);
-    on("spring", &settings.has_springs);
-    on("damper", &settings.has_dampers);
-    bool has_constraints = true;
-    on("equality", &settings.has_equality);
-    on("constraint", &has_constraints);
-    on("actuation", &settings.has_actuation);
-    on("clampctrl", &settings.clamps_controls);
-    on("contact", &settings.has_contact);
-    if (!has_gravity) model->draft->description.gravity.setZero();
+  for (const XmlElement& flags : element.Children("flag")) {
+    bool has_gravity = true, has_passive = true, has_constraints = true;
+    for (const auto& [name, value] : {std::pair{"gravity", &has_gravity},
+                                      {"passive", &has_passive},
+                                      {"spring", &settings.has_springs},
+                                      {"damper", &settings.has_dampers},
+                                      {"equality", &settings.has_equality},
+                                      {"constraint", &has_constraints},
+                                      {"actuation", &settings.has_actuation},
+                                      {"clampctrl", &settings.clamps_controls},
+                                      {"contact", &settings.has_contact}}) {
+      const auto given = flags.Attribute(name);
+      if (given) *value = given->Choice<bool>({{"disable", false}, {"enable", true}});
+    }
+    if (!has_gravity) gravity.setZero();
     if (!has_constraints) settings.has_equality = false;
     if (!has_passive) settings.has_springs = settings.has_dampers = false;
   }
 }
 
 /// Returns tendons whose length an active <equality><tendon> keeps constant.
-std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, MjcfModel* model) {
+std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
   std::map<std::string, XmlElement> held;
   for (const XmlElement& section : root.Children("equality")) {
     for (const XmlElement& element : section.Children("tendon")) {
-      const MjcfElement equality = model->defaults.Peek(element, "", "equality");
+      const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
       const auto active = equality.Attribute("active");
       const auto first = equality.Attribute("tendon1");
-      if (!first || equality.Attribute("tendon2") || (active && !active->Bool())) continue;
+      if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
       held.emplace(first->Name(), element);
     }
   }
@@ -172,22 +164,11 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   if (worlds.empty()) root.Fail("no <worldbody>", "one");
   for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
   AdjustMasses(&model);
-  const auto held = HeldTendons(root, &model);
+  const auto held = HeldTendons(root, model);
   for (const XmlElement& section : root.Children("equality")) ReadMjcfEquality(section, &model);
   ReadMjcfTendons(root, held, &model);
   ReadMjcfKeys(root, &model);
   model.defaults.IgnoreUnused();
-  for (const char* silent : {"visual", "statistic", "size", "custom"}) {
-    for (const XmlElement& element : root.Children(silent)) element.Ignore();
-  }
-  for (const char* whole : {"asset", "contact", "sensor", "extension", "deformable"}) {
-    for (const XmlElement& element : root.Children(whole)) {
-      const auto known = std::ranges::find_if(
-          kMjcfReasons, [&](const DroppedReason& row) { return row.Has(whole); });
-      element.Ignore();
-      draft->Note(element, fmt::format("dropped: {}", known->reason), known->changes_motion);
-    }
-  }
   draft->NoteUnread(kMjcfReasons);
 }
 
@@ -217,9 +198,10 @@ std::optional<XmlValue> MjcfElement::Attribute(const std::string& name) const {
   return found;
 }
 
-double MjcfElement::Number(const std::string& name, double otherwise, const Range& range) const {
-  const auto value = Attribute(name);
-  return value ? value->Number(range) : otherwise;
+XmlValue MjcfElement::Required(const std::string& name, std::string_view expected) const {
+  auto value = Attribute(name);
+  if (!value) own_.Fail(fmt::format("no \"{}\"", name), expected);
+  return *std::move(value);
 }
 
 std::vector<XmlElement> MjcfElement::Layers() const {
@@ -259,9 +241,8 @@ void MjcfDefaults::CheckClass(const XmlValue& value) const {
   if (!classes_.contains(name) && name != kMain) value.Fail("a class described in <default>");
 }
 
-std::vector<XmlElement> MjcfDefaults::Layers(const XmlElement& element,
-                                             const std::string& childclass, const std::string& tag,
-                                             std::set<Use>* used) const {
+MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
+                             const std::string& tag, bool uses) const {
   const std::string wanted = DescribedBy(tag.empty() ? element.tag() : tag);
   std::string name = childclass.empty() ? kMain : childclass;
   if (const auto given = element.Attribute("class")) {
@@ -275,22 +256,12 @@ std::vector<XmlElement> MjcfDefaults::Layers(const XmlElement& element,
     if (defaults == found->second.elements.end()) continue;
     // of several defaults in one class, the last one counts
     layers.insert(layers.end(), defaults->second.rbegin(), defaults->second.rend());
-    if (used != nullptr) used->emplace(found->first, wanted);
+    if (uses) used_.emplace(found->first, wanted);
     if (layers.size() > kMostLayers) {
       element.Fail(fmt::format("more than {} defaults of its kind", kMostLayers), "fewer");
     }
   }
-  return layers;
-}
-
-MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
-                             const std::string& tag) const {
-  return {element, Layers(element, childclass, tag, &used_)};
-}
-
-MjcfElement MjcfDefaults::Peek(const XmlElement& element, const std::string& childclass,
-                               const std::string& tag) const {
-  return {element, Layers(element, childclass, tag, nullptr)};
+  return {element, layers};
 }
 
 void MjcfDefaults::IgnoreUnused() const {
@@ -355,21 +326,25 @@ Placement MjcfModel::PlacementOf(const MjcfElement& element) const {
 
 std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const std::string& flag,
                                               const std::string& range) const {
+  enum Choice { kNever, kAlways, kByRange };
   const auto limited = element.Attribute(flag);
   const auto given = element.Attribute(range);
-  const std::size_t choice = limited ? limited->Choice({"false", "true", "auto"}) : 2;
-  if (choice == 0 || (choice == 2 && !(given && settings.limits_by_range))) return std::nullopt;
+  const Choice choice =
+      limited ? limited->Choice<Choice>({{"false", kNever}, {"true", kAlways}, {"auto", kByRange}})
+              : kByRange;
+  const bool by_range = given && settings.limits_by_range;
+  if (choice == kNever || (choice == kByRange && !by_range)) return std::nullopt;
   if (!given) element.own().Fail(fmt::format("\"{}\" without \"{}\"", flag, range), "both");
   const std::vector<double> ends = given->Numbers(2, 2);
   if (ends[0] < ends[1]) return MjcfLimits{ends[0], ends[1]};
-  if (choice == 1) given->Fail("two numbers, the first below the second");
+  if (choice == kAlways) given->Fail("two numbers, the first below the second");
   return std::nullopt;  // as in MuJoCo, whose default is 0 0
 }
 
 void MjcfModel::NoteLimits(const MjcfElement& element, const char* reason) const {
   const auto flag = element.Attribute("limited"), range = element.Attribute("range");
   if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
-    draft->Note(element.own(), range ? "range" : "limited", reason, true);
+    draft->Drop(element.own(), range ? "range" : "limited", reason);
   }
 }
 

@@ -17,6 +17,8 @@ namespace loopbench::harness {
 /// Reason why springs, dampers and efforts of a joint with several coordinates are dropped.
 inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
 
+inline constexpr const char* kNoRotors = "rotors have no inertia beside that of the bodies";
+
 /// Attributes that limit the efforts of all actuators of a joint.
 inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange = "actuatorfrcrange";
 
@@ -28,7 +30,11 @@ class MjcfElement {
 
   const XmlElement& own() const { return own_; }
   std::optional<XmlValue> Attribute(const std::string& name) const;
-  double Number(const std::string& name, double otherwise, const Range& range = {}) const;
+  double Number(const std::string& name, double otherwise, const Range& range = {}) const {
+    return NumberOr(Attribute(name), otherwise, range);
+  }
+  /// Returns an attribute; if absent, throws with `expected`.
+  XmlValue Required(const std::string& name, std::string_view expected) const;
   /// Returns the element and its classes, nearest first.
   std::vector<XmlElement> Layers() const;
 
@@ -43,12 +49,10 @@ class MjcfDefaults {
  public:
   void Read(const XmlElement& element, const std::string& parent);
   /// Returns the element with its defaults. `childclass`: class of the enclosing bodies; `tag`: tag
-  /// of its defaults, if different from its own.
+  /// of its defaults, if different from its own; `uses`: its classes count as used, which is wrong
+  /// for an element that may still be dropped.
   MjcfElement Of(const XmlElement& element, const std::string& childclass,
-                 const std::string& tag = "") const;
-  /// Returns the same for an element that may still be dropped: its classes do not count as used.
-  MjcfElement Peek(const XmlElement& element, const std::string& childclass,
-                   const std::string& tag = "") const;
+                 const std::string& tag = "", bool uses = true) const;
   /// Rejects an undefined class.
   void CheckClass(const XmlValue& value) const;
   /// Marks unused defaults as read.
@@ -60,23 +64,19 @@ class MjcfDefaults {
     /// Defaults by element type, in file order: actuators of all tags have one default.
     std::map<std::string, std::vector<XmlElement>> elements;
   };
-  using Use = std::pair<std::string, std::string>;  ///< a class and an element type
-
   /// Returns the name under which a class is defined.
   std::string Known(const std::string& name) const;
-  std::vector<XmlElement> Layers(const XmlElement& element, const std::string& childclass,
-                                 const std::string& tag, std::set<Use>* used) const;
 
   std::map<std::string, Class> classes_;
   std::set<std::string> names_of_main_;
-  mutable std::set<Use> used_;
+  mutable std::set<std::pair<std::string, std::string>> used_;  ///< class, element type
 };
 
 /// Relevant attributes of <compiler> and <option>.
 struct MjcfSettings {
   bool degrees = true;
   std::string euler = "xyz";
-  enum { kFromInertial, kFromGeoms, kAuto } inertia = kAuto;
+  enum Inertia { kFromInertial, kFromGeoms, kAuto } inertia = kAuto;
   bool balances_inertia = false, limits_by_range = true;
   double least_mass = 0.0, least_inertia = 0.0, total_mass = -1.0;
   int first_group = 0, last_group = 5;
@@ -109,6 +109,8 @@ struct MjcfJoint {
   bool alone = true;                                   ///< it is the only part of that joint
 
   int num_q() const { return kind == MjcfKind::kFree ? 7 : kind == MjcfKind::kBall ? 4 : 1; }
+  /// True if the Loopbench joint has its coordinate and no other.
+  bool has_coordinate() const { return num_q() == 1 && alone; }
   int num_u() const { return kind == MjcfKind::kFree ? 6 : kind == MjcfKind::kBall ? 3 : 1; }
 };
 
@@ -142,6 +144,10 @@ class MjcfModel {
                                      const std::string& range) const;
   /// Notes that limits of a joint or tendon are dropped, with or without a range.
   void NoteLimits(const MjcfElement& element, const char* reason) const;
+  /// Notes that a nonzero number is dropped.
+  void DropNonzero(const MjcfElement& element, const char* name, const char* reason) const {
+    if (element.Number(name, 0.0) != 0.0) draft->Drop(element.own(), name, reason);
+  }
   /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
   /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
@@ -149,33 +155,19 @@ class MjcfModel {
   MjcfJoint& JointNamed(const XmlValue& value);
 };
 
-/// A geom of a body, its class, and its enclosing frame.
-struct MjcfGeom {
-  MjcfElement element;
-  Placement X;
-};
-
-/// Mass, centre of mass and inertia of geoms in body axes [kg, m, kg m^2].
-struct MassProperties {
-  double mass = 0.0;
-  Eigen::Vector3d com = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-};
-/// Computes mass properties. Rejects meshes, whose files are not read, unless they are ignored.
-MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
-                           bool drops_meshes);
-
 /// Reads <worldbody>.
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
 /// Applies the total mass and the bounds of <compiler> to all bodies.
 void AdjustMasses(MjcfModel* model);
-/// Reads a <joint> or <freejoint>, but not its springs and dampers; X is the enclosing frame in its
-/// body.
-MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element, const Placement& X,
-                        const std::string& childclass);
+/// An element within a body, its enclosing frame in the body, and its default class.
+struct MjcfPlaced {
+  XmlElement element;
+  Placement X;
+  std::string childclass;
+};
 /// Makes one Loopbench joint from the joints of a body; X_PB is the drawn pose of the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
-                  const Placement& X_PB, const std::vector<MjcfJoint>& joints);
+                  const Placement& X_PB, const std::vector<MjcfPlaced>& joints);
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
 /// Reads spatial tendons between two sites; `held` contains tendons of constant length, which
 /// become rods.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "harness/exchange/import_mjcf.h"
 #include "mechanism/algebra/symmetric_eigen.h"
@@ -22,20 +23,14 @@ using Eigen::Vector3d;
 /// digits.
 constexpr double kAligned = 1e-9;
 
-void RefuseOrNote(const MjcfModel& model, const MjcfJoint& joint) {
-  ImportDraft* draft = model.draft;
+void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
   const XmlElement& own = joint.element.own();
-  if (joint.element.Number("armature", 0.0) != 0.0) {
-    draft->Note(own, "armature", "dropped: rotors have no inertia beside that of the bodies", true);
-  }
-  if (joint.element.Number("frictionloss", 0.0) != 0.0) {
-    draft->Note(own, "frictionloss", "dropped: dry friction is no force of mechanism files", true);
-  }
-  model.NoteLimits(joint.element, "dropped: joints turn and slide without ends");
-  const auto by_actuators = joint.element.Attribute("actuatorgravcomp");
-  if (by_actuators && by_actuators->Bool() &&
+  model.DropNonzero(joint.element, "armature", kNoRotors);
+  model.DropNonzero(joint.element, "frictionloss", kDryFriction);
+  model.NoteLimits(joint.element, kNoEnds);
+  if (BoolOr(joint.element.Attribute("actuatorgravcomp")) &&
       (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
-    draft->Note(own, "actuatorgravcomp", "dropped: gravcomp acts whatever actuators may do", true);
+    model.draft->Drop(own, "actuatorgravcomp", "gravcomp acts whatever actuators may do");
   }
 }
 
@@ -89,81 +84,69 @@ struct Composed {
   bool from_is_child = false;
 };
 
-struct Sorted {
-  std::vector<MjcfJoint> hinges, slides, balls;
-};
-
-std::optional<Composed> ComposeTwo(const std::vector<MjcfJoint>& joints, const Sorted& sorted) {
-  if (sorted.hinges.size() == 2) {
-    const Vector3d &a = joints[0].axis, &b = joints[1].axis;
-    const auto point = Perpendicular(a, b) ? MeetingPoint(joints) : std::nullopt;
-    // about x of F, then about y of M
-    if (point) return Composed{JointType::kUniversal, {Axes(a, a.cross(b)), *point}};
-  }
-  if (sorted.hinges.size() != 1 || sorted.slides.size() != 1) return std::nullopt;
-  const MjcfJoint &hinge = sorted.hinges[0], &slide = sorted.slides[0];
-  if (Parallel(hinge.axis, slide.axis)) {
-    const Eigen::Quaterniond q = TurnOfZ(hinge.axis);
-    return Composed{JointType::kCylindrical, {q, hinge.position}};
-  }
-  if (!Perpendicular(hinge.axis, slide.axis)) return std::nullopt;
-  // the slot is on the parent when the slide comes first, else on the child
-  return Composed{JointType::kPinInSlot,
-                  {Axes(slide.axis, hinge.axis), hinge.position},
-                  joints[0].kind == MjcfKind::kHinge};
-}
-
 bool Independent(const std::vector<MjcfJoint>& joints) {
   Eigen::Matrix3d axes;
   axes << joints[0].axis, joints[1].axis, joints[2].axis;
   return std::abs(axes.determinant()) > kAligned;
 }
 
-std::optional<Composed> ComposeMore(const Sorted& sorted) {
-  const std::size_t hinges = sorted.hinges.size(), slides = sorted.slides.size();
-  if (slides == 2 && hinges == 1) {
-    const Vector3d& z = sorted.hinges[0].axis;
-    const Vector3d &a = sorted.slides[0].axis, &b = sorted.slides[1].axis;
-    const bool in_plane = Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b);
-    if (in_plane) {
-      return Composed{JointType::kPlanar, {Axes(a, z), sorted.hinges[0].position}};
+/// Returns the joint that several joints form; `all`: in their order, by kind.
+std::optional<Composed> Together(const std::vector<MjcfJoint>& joints,
+                                 const std::map<MjcfKind, std::vector<MjcfJoint>>& all) {
+  const auto of = [&](MjcfKind kind) {
+    const auto found = all.find(kind);
+    return found == all.end() ? std::vector<MjcfJoint>() : found->second;
+  };
+  const std::vector<MjcfJoint> hinges = of(MjcfKind::kHinge), slides = of(MjcfKind::kSlide),
+                               balls = of(MjcfKind::kBall);
+  if (joints.size() == 2 && hinges.size() == 2) {
+    const Vector3d &a = hinges[0].axis, &b = hinges[1].axis;
+    const auto point = Perpendicular(a, b) ? MeetingPoint(hinges) : std::nullopt;
+    // about x of F, then about y of M
+    if (point) return Composed{JointType::kUniversal, {Axes(a, a.cross(b)), *point}};
+  }
+  if (joints.size() == 2 && hinges.size() == 1 && slides.size() == 1) {
+    const Vector3d &turn = hinges[0].axis, &slide = slides[0].axis, &at = hinges[0].position;
+    if (Parallel(turn, slide)) return Composed{JointType::kCylindrical, {TurnOfZ(turn), at}};
+    // the slot is on the parent when the slide comes first, else on the child
+    const bool from_is_child = joints[0].kind == MjcfKind::kHinge;
+    if (Perpendicular(turn, slide)) {
+      return Composed{JointType::kPinInSlot, {Axes(slide, turn), at}, from_is_child};
+    }
+  }
+  if (slides.size() == 2 && hinges.size() == 1) {
+    const Vector3d &z = hinges[0].axis, &a = slides[0].axis, &b = slides[1].axis;
+    if (Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b)) {
+      return Composed{JointType::kPlanar, {Axes(a, z), hinges[0].position}};
     }
   }
   std::optional<Vector3d> centre;
-  if (sorted.balls.size() == 1 && hinges == 0) centre = sorted.balls[0].position;
-  if (sorted.balls.empty() && hinges == 3 && Independent(sorted.hinges)) {
-    centre = MeetingPoint(sorted.hinges);
-  }
-  if (!centre) return std::nullopt;
-  if (slides == 0) return Composed{JointType::kSpherical, Placement(*centre)};
-  if (slides == 3 && Independent(sorted.slides))
+  if (balls.size() == 1 && hinges.empty()) centre = balls[0].position;
+  if (balls.empty() && hinges.size() == 3 && Independent(hinges)) centre = MeetingPoint(hinges);
+  if (centre && slides.empty()) return Composed{JointType::kSpherical, Placement(*centre)};
+  if (centre && slides.size() == 3 && Independent(slides)) {
     return Composed{JointType::kFree, Placement(*centre)};
+  }
   return std::nullopt;
 }
 
 Composed Compose(const XmlElement& body, const std::vector<MjcfJoint>& joints) {
   if (joints.size() == 1) {
-    const MjcfJoint& joint = joints[0];
-    const JointType type = joint.kind == MjcfKind::kHinge   ? JointType::kRevolute
-                           : joint.kind == MjcfKind::kSlide ? JointType::kPrismatic
-                           : joint.kind == MjcfKind::kBall  ? JointType::kSpherical
-                                                            : JointType::kFree;
-    return {type, Placement(joint.position)};
+    constexpr JointType kTypes[] = {JointType::kRevolute, JointType::kPrismatic,
+                                    JointType::kSpherical, JointType::kFree};
+    return {kTypes[static_cast<int>(joints[0].kind)], Placement(joints[0].position)};
   }
-  Sorted sorted;
+  std::map<MjcfKind, std::vector<MjcfJoint>> all;
   std::vector<std::string> words;
-  bool has_free = false;
   for (const MjcfJoint& joint : joints) {
-    const bool turns = joint.kind == MjcfKind::kHinge;
-    if (turns) sorted.hinges.push_back(joint);
-    if (joint.kind == MjcfKind::kSlide) sorted.slides.push_back(joint);
-    if (joint.kind == MjcfKind::kBall) sorted.balls.push_back(joint);
-    has_free = has_free || joint.kind == MjcfKind::kFree;
-    words.emplace_back(turns ? "hinge" : joint.kind == MjcfKind::kSlide ? "slide" : "ball");
+    constexpr const char* kWords[] = {"hinge", "slide", "ball", "free"};
+    all[joint.kind].push_back(joint);
+    words.emplace_back(kWords[static_cast<int>(joint.kind)]);
   }
-  std::optional<Composed> composed;
-  if (!has_free) composed = joints.size() == 2 ? ComposeTwo(joints, sorted) : ComposeMore(sorted);
-  if (composed) return *composed;
+  const bool has_free = all.contains(MjcfKind::kFree);
+  if (!has_free) {
+    if (const auto composed = Together(joints, all)) return *composed;
+  }
   body.Fail(fmt::format("{} joints on one body ({}) that are none of ours together", joints.size(),
                         has_free ? "one of them free" : fmt::format("{}", fmt::join(words, ", "))),
             "a body with mass between them, or axes of a universal, cylindrical, planar, spherical "
@@ -172,41 +155,65 @@ Composed Compose(const XmlElement& body, const std::vector<MjcfJoint>& joints) {
 
 /// Adds springs and dampers of a joint that is a whole Loopbench joint; drops others.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
-  ImportDraft* draft = model->draft;
   const MjcfElement& element = joint.element;
-  const double k = element.Number("stiffness", 0.0, kNotNegative);
-  const double c = element.Number("damping", 0.0, kNotNegative);
-  const bool has_one = joint.num_q() == 1 && joint.alone;
-  const auto drop = [&](const char* name) {
-    draft->Note(element.own(), name, fmt::format("dropped: {}", kNeedsOneCoordinate), true);
-  };
-  if (k > 0.0 && model->settings.has_springs) {
-    if (has_one) {
-      draft->description.forces.emplace_back(
-          JointSpring{joint.joint, k, joint.spring_reference - joint.reference, 0.0});
-    } else {
-      drop("stiffness");
-    }
+  double k = element.Number("stiffness", 0.0, kNotNegative);
+  double c = element.Number("damping", 0.0, kNotNegative);
+  if (!model->settings.has_springs) k = 0.0;
+  if (!model->settings.has_dampers) c = 0.0;
+  if (joint.has_coordinate()) {
+    model->draft->AddSpringAndDamper(k, joint.spring_reference - joint.reference, c);
+    return;
   }
-  if (c > 0.0 && model->settings.has_dampers) {
-    if (has_one) {
-      draft->description.forces.emplace_back(JointDamper{joint.joint, c});
-    } else {
-      drop("damping");
-    }
-  }
+  if (k > 0.0) model->draft->Drop(element.own(), "stiffness", kNeedsOneCoordinate);
+  if (c > 0.0) model->draft->Drop(element.own(), "damping", kNeedsOneCoordinate);
 }
 
-/// Adds the Loopbench joint and sets its frame on the child.
-void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints,
-                 const Composed& composed, ImportDraft* draft, MjcfChain* chain) {
+/// Reads a <joint> or <freejoint>, but not its springs and dampers.
+MjcfJoint ReadJoint(const MjcfModel& model, const MjcfPlaced& placed) {
+  const auto& [element, X, childclass] = placed;
+  MjcfJoint joint(model.defaults.Of(element, childclass));
+  if (const auto name = element.Attribute("name")) joint.name = name->Name();
+  if (element.tag() == "freejoint") {
+    joint.kind = MjcfKind::kFree;
+    return joint;
+  }
+  if (const auto type = joint.element.Attribute("type")) {
+    joint.kind = type->Choice<MjcfKind>({{"hinge", MjcfKind::kHinge},
+                                         {"slide", MjcfKind::kSlide},
+                                         {"ball", MjcfKind::kBall},
+                                         {"free", MjcfKind::kFree}});
+  }
+  const auto position = joint.element.Attribute("pos");
+  if (joint.kind != MjcfKind::kFree) {
+    joint.position = X.At(position ? position->Vector() : Vector3d::Zero());
+  }
+  if (const auto axis = joint.element.Attribute("axis")) {
+    joint.axis = model.draft->Vector(*axis, "d");
+    const bool matters = joint.kind == MjcfKind::kHinge || joint.kind == MjcfKind::kSlide;
+    if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
+    if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
+  }
+  joint.axis = X.q * joint.axis;
+  const auto angle_or_length = [&](const char* name) {
+    const double value = joint.element.Number(name, 0.0);
+    return joint.kind == MjcfKind::kHinge ? model.settings.Angle(value) : value;
+  };
+  joint.reference = angle_or_length("ref");
+  joint.spring_reference = angle_or_length("springref");
+  DropParts(model, joint);
+  return joint;
+}
+
+/// Adds the Loopbench joint of the joints of a body and sets its frame on the child.
+void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints, ImportDraft* draft,
+                 MjcfChain* chain) {
+  const Composed composed = Compose(body, joints);
   std::vector<std::string> names;
   for (const MjcfJoint& joint : joints) {
     if (!joint.name.empty()) names.push_back(joint.name);
   }
-  const auto child = static_cast<std::size_t>(chain->child);
   const std::string name =
-      names.empty() ? draft->NameLater(draft->description.bodies[child].name)
+      names.empty() ? draft->NameLater(draft->description.bodies[chain->child].name)
                     : draft->NewJointName(body, fmt::format("{}", fmt::join(names, "+")));
   const bool is_free = joints[0].kind == MjcfKind::kFree;
   if (is_free && chain->parent != kGround) {
@@ -216,78 +223,41 @@ void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints,
   chain->X_BJ = composed.X_BJ;
   chain->from_is_child = composed.from_is_child;
   const Placement X_PF = is_free ? Placement() : chain->X_PB * chain->X_BJ;
-  if (chain->from_is_child) {
-    draft->AddJoint(name, composed.type, chain->child, chain->X_BJ, chain->parent, X_PF);
-  } else {
-    draft->AddJoint(name, composed.type, chain->parent, X_PF, chain->child, chain->X_BJ);
-  }
+  JointDescription& made =
+      chain->from_is_child
+          ? draft->AddJoint(name, composed.type, chain->child, chain->X_BJ, chain->parent, X_PF)
+          : draft->AddJoint(name, composed.type, chain->parent, X_PF, chain->child, chain->X_BJ);
   chain->joint = draft->last_joint();
   if (composed.type == JointType::kFree) {
     const Placement X = is_free ? chain->X_PB : Placement();
-    draft->description.initial.coordinates.push_back(
-        {chain->joint, {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
+    draft->description.initial.coordinates.push_back({chain->joint, X.AsCoordinates()});
   }
-}
-
-}  // namespace
-
-MjcfJoint ReadMjcfJoint(const MjcfModel& model, const XmlElement& element, const Placement& X,
-                        const std::string& childclass) {
-  MjcfJoint joint(model.defaults.Of(element, childclass));
-  if (const auto name = element.Attribute("name")) joint.name = name->Name();
-  if (element.tag() == "freejoint") {
-    joint.kind = MjcfKind::kFree;
-    return joint;
-  }
-  if (const auto type = joint.element.Attribute("type")) {
-    constexpr MjcfKind kKinds[] = {MjcfKind::kHinge, MjcfKind::kSlide, MjcfKind::kBall,
-                                   MjcfKind::kFree};
-    joint.kind = kKinds[type->Choice({"hinge", "slide", "ball", "free"})];
-  }
-  const auto position = joint.element.Attribute("pos");
-  if (position && joint.kind != MjcfKind::kFree) joint.position = position->Vector();
-  if (joint.kind != MjcfKind::kFree) joint.position = X.At(joint.position);
-  if (const auto axis = joint.element.Attribute("axis")) {
-    joint.axis = model.draft->Vector(*axis, "d");
-    const bool matters = joint.kind == MjcfKind::kHinge || joint.kind == MjcfKind::kSlide;
-    if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
-    if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
-  }
-  joint.axis = X.q * joint.axis;
-  joint.reference = joint.element.Number("ref", 0.0);
-  joint.spring_reference = joint.element.Number("springref", 0.0);
-  if (joint.kind == MjcfKind::kHinge) {
-    joint.reference = model.settings.Angle(joint.reference);
-    joint.spring_reference = model.settings.Angle(joint.spring_reference);
-  }
-  RefuseOrNote(model, joint);
-  return joint;
-}
-
-void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
-                  const Placement& X_PB, const std::vector<MjcfJoint>& joints) {
-  ImportDraft* draft = model->draft;
-  MjcfChain chain;
-  chain.parent = parent;
-  chain.child = child;
-  chain.X_PB = X_PB;
-  if (joints.empty()) {
-    const std::string& name = draft->description.bodies[static_cast<std::size_t>(child)].name;
-    draft->AddJoint(draft->NameLater(name + " fixed"), JointType::kWeld, parent, X_PB, child, {});
-    model->chains.push_back(std::move(chain));
-    return;
-  }
-  const Composed composed = Compose(body, joints);
-  AddComposed(body, joints, composed, draft, &chain);
   if (joints.size() > 1) {
     draft->Note(body,
                 fmt::format("{} joints are one here: {}", joints.size(), ToString(composed.type)));
   } else if (joints[0].num_q() == 1) {
     const bool turns = joints[0].kind == MjcfKind::kHinge;
     const Vector3d own = turns ? Vector3d::UnitZ() : Vector3d::UnitX();
-    if (joints[0].axis != own) draft->description.joints.back().axis = joints[0].axis;
+    if (joints[0].axis != own) made.axis = joints[0].axis;
   }
-  for (MjcfJoint joint : joints) {
+}
+
+}  // namespace
+
+void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
+                  const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
+  std::vector<MjcfJoint> joints;
+  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(*model, joint));
+  MjcfChain chain;
+  chain.parent = parent;
+  chain.child = child;
+  chain.X_PB = X_PB;
+  if (joints.empty()) {
+    model->draft->Fix(parent, X_PB, child, " fixed");
+  } else {
+    AddComposed(body, joints, model->draft, &chain);
+  }
+  for (MjcfJoint& joint : joints) {
     joint.joint = chain.joint;
     joint.alone = joints.size() == 1;
     const std::size_t index = model->joints.size();
@@ -297,7 +267,7 @@ void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int chil
     }
     chain.parts.push_back(index);
     AddJointForces(model, joint);
-    model->joints.push_back(std::move(joint));
+    model->joints.push_back(joint);
   }
   model->chains.push_back(std::move(chain));
 }
@@ -391,12 +361,11 @@ constexpr const char* kNoMotor = "there are no actuators but motors of joints (<
 /// Reads an actuator on a joint with one coordinate at a constant control; drops others.
 std::optional<Effort> ReadActuator(const XmlElement& element, double control, MjcfModel* model) {
   const auto drop = [&](const char* why, bool changes_motion) {
-    element.Ignore();
-    model->draft->Note(element, fmt::format("dropped: {}", why), changes_motion);
+    model->draft->DropWhole(element, why, changes_motion);
     return std::nullopt;
   };
   const MjcfSettings& settings = model->settings;
-  const MjcfElement peeked = model->defaults.Peek(element, "");
+  const MjcfElement peeked = model->defaults.Of(element, "", "", false);
   const auto group = static_cast<int>(std::clamp(peeked.Number("group", 0.0), -1e6, 1e6));
   if (!settings.has_actuation || settings.silent_groups.contains(group)) {
     return drop("it is switched off (<option>)", false);
@@ -415,7 +384,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   const auto name = element.Attribute("joint");
   if (!name) return drop(kNoMotor, true);
   const MjcfJoint& joint = model->JointNamed(*name);
-  if (joint.num_q() != 1 || !joint.alone) return drop(kNeedsOneCoordinate, true);
+  if (!joint.has_coordinate()) return drop(kNeedsOneCoordinate, true);
   const MjcfElement motor = model->defaults.Of(element, "");
   ReadRest(motor);
   const auto gear = motor.Attribute("gear");
@@ -435,15 +404,14 @@ void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& co
   std::vector<double> ctrl(actuators.size(), 0.0);
   if (controls) ctrl = controls->Numbers(ctrl.size(), ctrl.size());
   std::vector<Effort> efforts;  // summed for each joint, in the order of their first actuators
-  std::map<std::size_t, std::size_t> index_of;
   for (std::size_t i = 0; i < actuators.size(); ++i) {
     const auto effort = ReadActuator(actuators[i], ctrl[i], model);
     if (!effort) continue;
-    const auto [known, is_new] = index_of.emplace(effort->joint, efforts.size());
-    if (is_new) {
+    const auto known = std::ranges::find(efforts, effort->joint, &Effort::joint);
+    if (known == efforts.end()) {
       efforts.push_back(*effort);
     } else {
-      efforts[known->second].value += effort->value;
+      known->value += effort->value;
     }
   }
   for (const Effort& effort : efforts) {

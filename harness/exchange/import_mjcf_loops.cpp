@@ -22,8 +22,7 @@ struct Ends {
 /// Returns the frame on the second body that coincides with `X` on the first at rest.
 Placement AtRestOn(const MjcfModel& model, int first, const Placement& X, int second) {
   const auto& rest = model.draft->at_rest;
-  return rest[static_cast<std::size_t>(second)].Inverse() * rest[static_cast<std::size_t>(first)] *
-         X;
+  return rest[second].Inverse() * rest[first] * X;
 }
 
 std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equality) {
@@ -36,29 +35,35 @@ std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equal
 
 Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
   Ends ends;
-  const auto body1 = equality.Attribute("body1"), body2 = equality.Attribute("body2");
-  if (!body1) equality.own().Fail("no \"body1\"", "the name of a body");
-  ends.first = model.draft->BodyNamed(*body1, {kMjcfWorld});
+  const auto body2 = equality.Attribute("body2");
+  ends.first =
+      model.draft->BodyNamed(equality.Required("body1", "the name of a body"), {kMjcfWorld});
   if (body2) ends.second = model.draft->BodyNamed(*body2, {kMjcfWorld});
   return ends;
+}
+
+void RequireTwoBodies(const MjcfElement& equality, const Ends& ends) {
+  if (ends.first == ends.second) equality.own().Fail("one body twice", "two different bodies");
+}
+
+void AddLoopJoint(const MjcfElement& equality, JointType type, const Ends& ends,
+                  ImportDraft* draft) {
+  const auto name = equality.own().Attribute("name");
+  draft
+      ->AddJoint(draft->NameLater(name ? name->Name() : equality.own().tag()), type, ends.first,
+                 ends.X_first, ends.second, ends.X_second)
+      .cut = true;
 }
 
 void AddConnect(const MjcfElement& equality, MjcfModel* model) {
   auto ends = EndsAtSites(*model, equality);
   if (!ends) {
     ends = EndsOnBodies(*model, equality);
-    const auto anchor = equality.Attribute("anchor");
-    if (!anchor) equality.own().Fail("no \"anchor\"", "3 numbers");
-    ends->X_first.p = anchor->Vector();
+    ends->X_first.p = equality.Required("anchor", "3 numbers").Vector();
     ends->X_second.p = AtRestOn(*model, ends->first, ends->X_first, ends->second).p;
   }
-  if (ends->first == ends->second) equality.own().Fail("one body twice", "two different bodies");
-  const auto name = equality.own().Attribute("name");
-  ImportDraft* draft = model->draft;
-  draft
-      ->AddJoint(draft->NameLater(name ? name->Name() : "connect"), JointType::kSpherical,
-                 ends->first, ends->X_first, ends->second, ends->X_second)
-      .cut = true;
+  RequireTwoBodies(equality, *ends);
+  AddLoopJoint(equality, JointType::kSpherical, *ends, model->draft);
 }
 
 /// Adds a weld. `relpose`: pose of the second body in the first, from the anchor on the second.
@@ -67,60 +72,51 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
     equality.own().Fail("a weld of sites", "a weld of bodies (body1, body2)");
   }
   Ends ends = EndsOnBodies(*model, equality);
-  if (ends.first == ends.second) equality.own().Fail("one body twice", "two different bodies");
-  Placement relative = AtRestOn(*model, ends.second, {}, ends.first);
+  RequireTwoBodies(equality, ends);
+  ends.X_first = AtRestOn(*model, ends.second, {}, ends.first);
   if (const auto pose = equality.Attribute("relpose")) {
     const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
     // a zero quaternion selects the drawn poses
-    if (q.norm() > 0.0) relative = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
+    if (q.norm() > 0.0) ends.X_first = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
   }
   equality.Attribute("anchor");  // point of the weld; irrelevant, since a weld holds everywhere
   equality.Attribute("torquescale");
-  const auto name = equality.own().Attribute("name");
-  ImportDraft* draft = model->draft;
-  draft
-      ->AddJoint(draft->NameLater(name ? name->Name() : "weld"), JointType::kWeld, ends.first,
-                 relative, ends.second, {})
-      .cut = true;
+  AddLoopJoint(equality, JointType::kWeld, ends, model->draft);
+}
+
+/// Returns the constant coefficient of `polycoef`.
+double OffsetOf(const MjcfElement& equality) {
+  const auto coefficients = equality.Attribute("polycoef");
+  return coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
 }
 
 /// Holds a joint of one coordinate at a constant. Returns false for a coupling of two (dropped).
 bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
-  const auto joint1 = equality.Attribute("joint1");
-  if (!joint1) equality.own().Fail("no \"joint1\"", "the name of a joint");
-  const MjcfJoint& joint = model->JointNamed(*joint1);
-  const auto coefficients = equality.Attribute("polycoef");
-  const std::vector<double> a =
-      coefficients ? coefficients->Numbers(1, 5) : std::vector<double>{0.0};
-  if (equality.Attribute("joint2") || joint.num_q() != 1 || !joint.alone) {
+  const MjcfJoint& joint = model->JointNamed(equality.Required("joint1", "the name of a joint"));
+  const double offset = OffsetOf(equality);
+  if (equality.Attribute("joint2") || !joint.has_coordinate()) {
     model->draft->Note(equality.own(),
                        "dropped: no joint follows another: this is a freedom more than in the file",
                        true);
     return false;
   }
   // MuJoCo: q1 - q1_0 = a_0, with q1_0 the coordinate in the drawn position
-  JointDescription& ours = model->draft->description.joints[static_cast<std::size_t>(joint.joint)];
-  ours.motions = {{0, Polynomial{{a[0]}}}};
+  model->draft->description.joints[joint.joint].motions = {{0, Polynomial{{offset}}}};
   return true;
-}
-
-void ReadSolverOptions(const MjcfElement& element) {
-  for (const char* name : {"solref", "solimp"}) element.Attribute(name);
 }
 
 }  // namespace
 
 void ReadMjcfEquality(const XmlElement& section, MjcfModel* model) {
   for (const XmlElement& element : section.Children()) {
-    const auto active = model->defaults.Peek(element, "", "equality").Attribute("active");
-    if (!model->settings.has_equality || (active && !active->Bool())) {
-      element.Ignore();
-      model->draft->Note(element, "dropped: it is not active");
+    const auto active = model->defaults.Of(element, "", "equality", false).Attribute("active");
+    if (!model->settings.has_equality || !BoolOr(active, true)) {
+      model->draft->DropWhole(element, "it is not active");
       continue;
     }
     const MjcfElement equality = model->defaults.Of(element, "", "equality");
-    ReadSolverOptions(equality);
+    for (const char* name : {"solref", "solimp"}) equality.Attribute(name);
     const std::string tag = element.tag();
     bool is_exact = tag == "connect" || tag == "weld";
     if (tag == "connect") AddConnect(equality, model);
@@ -129,8 +125,7 @@ void ReadMjcfEquality(const XmlElement& section, MjcfModel* model) {
     if (is_exact) {
       model->draft->Note(element, "imposed exactly here; MuJoCo lets it give way");
     } else if (tag != "joint" && tag != "tendon") {
-      element.Ignore();
-      model->draft->Note(element, "dropped: there is no constraint of this kind", true);
+      model->draft->DropWhole(element, "there is no constraint of this kind", true);
     }
   }
 }
@@ -147,16 +142,6 @@ std::optional<std::pair<BodyPoint, BodyPoint>> StraightEnds(const XmlElement& el
     return model.SiteNamed(site.Required("site", "the name of a site"));
   };
   return std::pair{end(sites[0]), end(sites[1])};
-}
-
-/// Adds a tendon of constant length as a rod.
-void AddRod(const std::string& name, const std::pair<BodyPoint, BodyPoint>& ends, double length,
-            MjcfModel* model) {
-  const auto& [a, b] = ends;
-  ImportDraft* draft = model->draft;
-  JointDescription& rod = draft->AddJoint(draft->NameLater(name), JointType::kRod, a.body,
-                                          Placement(a.at), b.body, Placement(b.at));
-  rod.parameter = length;
 }
 
 void AddSpring(const MjcfElement& tendon, const std::pair<BodyPoint, BodyPoint>& ends,
@@ -181,9 +166,7 @@ void AddSpring(const MjcfElement& tendon, const std::pair<BodyPoint, BodyPoint>&
 }
 
 double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<Placement>& poses) {
-  const auto place = [&](const BodyPoint& point) {
-    return poses[static_cast<std::size_t>(point.body)].At(point.at);
-  };
+  const auto place = [&](const BodyPoint& point) { return poses[point.body].At(point.at); };
   return (place(ends.first) - place(ends.second)).norm();
 }
 
@@ -192,31 +175,27 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   const auto name = element.Attribute("name");
   const auto ends = element.tag() == "spatial" ? StraightEnds(element, *model) : std::nullopt;
   if (!ends || ends->first.body == ends->second.body) {
-    element.Ignore();
-    model->draft->Note(element,
-                       "dropped: only spatial tendons straight between two sites of two bodies are "
-                       "springs here",
-                       true);
-    return;
+    return model->draft->DropWhole(
+        element, "only spatial tendons straight between two sites of two bodies are springs here",
+        true);
   }
   const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
   AddSpring(tendon, *ends, LengthOf(*ends, free_poses), model);
-  model->NoteLimits(tendon, "dropped: tendons do not end");
-  if (tendon.Number("frictionloss", 0.0) != 0.0) {
-    model->draft->Note(element, "frictionloss", "dropped: there is no dry friction", true);
-  }
-  if (tendon.Number("armature", 0.0) != 0.0) {
-    model->draft->Note(element, "armature", "dropped: tendons have no inertia", true);
-  }
+  model->NoteLimits(tendon, "tendons do not end");
+  model->DropNonzero(tendon, "frictionloss", "there is no dry friction");
+  model->DropNonzero(tendon, "armature", "tendons have no inertia");
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
   equality.own().Attribute("name");  // the rod has the name of the tendon
-  const auto coefficients = equality.Attribute("polycoef");
-  const double offset = coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
-  const double drawn = LengthOf(*ends, model->draft->at_rest);
-  if (!(drawn + offset > 0.0)) element.Fail("a length that is not > 0", "one that is");
-  AddRod(name->Name(), *ends, drawn + offset, model);
-  model->draft->Note(equality.own(), "a rod here, exactly of its length");
+  const double length = LengthOf(*ends, model->draft->at_rest) + OffsetOf(equality);
+  if (!(length > 0.0)) element.Fail("a length that is not > 0", "one that is");
+  ImportDraft* draft = model->draft;
+  const auto& [a, b] = *ends;
+  draft
+      ->AddJoint(draft->NameLater(name->Name()), JointType::kRod, a.body, Placement(a.at), b.body,
+                 Placement(b.at))
+      .parameter = length;
+  draft->Note(equality.own(), "a rod here, exactly of its length");
 }
 
 }  // namespace
@@ -305,31 +284,16 @@ void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type,
   Basis<Spatial, double> basis;
   if (kind.basis != nullptr) kind.basis(pose, basis, 0.0);
   for (int i = 0; i < kind.num_u; ++i) {
-    double& speed = (*speeds)[static_cast<std::size_t>(i)];
+    double& speed = (*speeds)[i];
     if (kind.basis != nullptr) {
-      const auto column = basis[static_cast<std::size_t>(i)];
+      const auto column = basis[i];
       speed = 0.0;
       for (int k = 0; k < 3; ++k) speed += column.angular[k] * w[k] + column.linear[k] * v[k];
     } else {
-      const int axis = kind.axes[static_cast<std::size_t>(i)];
+      const int axis = kind.axes[i];
       speed = axis < 3 ? w[axis] : v[axis - 3];
     }
   }
-}
-
-/// Returns the value at which an <equality> holds the joint, if any.
-std::optional<double> HeldAt(const JointDescription& joint) {
-  if (joint.motions.empty()) return std::nullopt;
-  return std::get<Polynomial>(joint.motions[0].value).coefficients[0];
-}
-
-/// Drops a start that contradicts a held joint.
-void NoteHeld(const XmlElement& key, const std::string& name, double held, double coordinate,
-              double speed, ImportDraft* draft) {
-  const std::string reason =
-      fmt::format("of joint \"{}\" dropped: an <equality> holds it at {:.6g}", name, held);
-  if (coordinate != held) draft->Note(key, "qpos", reason, true);
-  if (speed != 0.0) draft->Note(key, "qvel", reason, true);
 }
 
 void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const double* q) {
@@ -349,8 +313,7 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
   for (const MjcfChain& chain : model->chains) {
     if (chain.parts.empty()) continue;
     const MjcfJoint& first = model->joints[chain.parts[0]];
-    const JointDescription& ours =
-        model->draft->description.joints[static_cast<std::size_t>(chain.joint)];
+    const JointDescription& ours = model->draft->description.joints[chain.joint];
     std::vector<double> coordinates, speeds;
     if (first.alone && first.kind == MjcfKind::kFree) {
       // position in ground axes, angular velocity in body axes
@@ -364,8 +327,13 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
     } else {
       SetComposed(*model, chain, ours.type, q, u, &coordinates, &speeds);
     }
-    if (const auto held = HeldAt(ours)) {
-      NoteHeld(key, ours.name, *held, coordinates[0], speeds[0], model->draft);
+    if (!ours.motions.empty()) {
+      // a start that contradicts an <equality>
+      const double held = std::get<Polynomial>(ours.motions[0].value).coefficients[0];
+      const std::string reason =
+          fmt::format("of joint \"{}\" dropped: an <equality> holds it at {:.6g}", ours.name, held);
+      if (coordinates[0] != held) model->draft->Note(key, "qpos", reason, true);
+      if (speeds[0] != 0.0) model->draft->Note(key, "qvel", reason, true);
     } else {
       initial.coordinates.push_back({chain.joint, coordinates});
       if (has_speeds) initial.speeds.push_back({chain.joint, speeds});
@@ -382,12 +350,12 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
 std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
   std::vector<Placement> poses(draft->at_rest.size());
   for (const MjcfChain& chain : chains) {
-    Placement X = poses[static_cast<std::size_t>(chain.parent)] * chain.X_PB;
+    Placement X = poses[chain.parent] * chain.X_PB;
     for (const std::size_t part : chain.parts) {
       const MjcfJoint& one = joints[part];
       if (one.num_q() == 1) X = X * MotionOf(one, &one.spring_reference);
     }
-    poses[static_cast<std::size_t>(chain.child)] = X;
+    poses[chain.child] = X;
   }
   return poses;
 }
@@ -418,8 +386,7 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
     keys[0].Attribute("time");
   }
   for (std::size_t i = 1; i < keys.size(); ++i) {
-    keys[i].Ignore();
-    model->draft->Note(keys[i], "dropped: the first <key> is the start");
+    model->draft->DropWhole(keys[i], "the first <key> is the start");
   }
   ReadMjcfActuators(root, controls, model);
 }

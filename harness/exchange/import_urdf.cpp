@@ -13,14 +13,14 @@ constexpr DroppedReason kUrdfReasons[] = {
     {"visual", "shapes do not move anything"},
     {"collision", "there is no contact"},
     {"mujoco", "it is for another program"},
-    {"limit", "joints turn and slide without ends", true},
+    {"limit", kNoEnds, true},
     {"mimic", "no joint follows another: this is a freedom more than in the file", true},
     {"safety_controller", "there is no controller"},
     {"calibration", "it says where a sensor's zero is"},
     {"transmission", "there are no actuators"},
     {"gazebo", "it is for another program; loops in it belong in a sidecar (--loops)", true},
     {"sensor", "there are no sensors"},
-    {"dynamics@friction", "dry friction is no force of mechanism files", true},
+    {"dynamics@friction", kDryFriction, true},
     // without influence on the motion
     {"material robot@version link@type", ""}};
 
@@ -39,72 +39,23 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   const Placement X = OriginOf(*inertial, draft);
   const XmlElement mass = inertial->RequiredChild("mass");
   const XmlElement inertia = inertial->RequiredChild("inertia");
-  const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
-  const auto moment = [&](const char* name) {
-    return inertia.Required(name, "a number [kg m^2]").Number();
-  };
-  const auto product = [&](const char* name) {
-    const auto value = inertia.Attribute(name);
-    return value ? value->Number() : 0.0;
-  };
-  const Eigen::Matrix3d I = SymmetricMatrix(moment("ixx"), moment("iyy"), moment("izz"),
-                                            product("ixy"), product("ixz"), product("iyz"));
-  BodyDescription& described = draft->description.bodies[static_cast<std::size_t>(body)];
-  described.mass = kg;
+  BodyDescription& described = draft->description.bodies[body];
+  described.mass = mass.Required("value", "a number [kg]").Number(kNotNegative);
   described.com = X.p;
-  described.inertia = InTurnedAxes(X.q, I);
+  described.inertia =
+      InTurnedAxes(X.q, InertiaOf([&](const char* name, bool is_moment) {
+                     return is_moment ? inertia.Required(name, "a number [kg m^2]").Number()
+                                      : NumberOr(inertia.Attribute(name), 0.0);
+                   }));
 }
 
 /// A joint as given in the file, before poses are known.
 struct UrdfJoint {
   XmlElement element;
-  std::string type;
   int parent = -1, child = -1;
   Placement X_PC;
+  JointType type = JointType::kRevolute;
 };
-
-const std::vector<std::string>& UrdfTypes() {
-  static const std::vector<std::string> names = {"revolute", "continuous", "prismatic",
-                                                 "fixed",    "floating",   "planar"};
-  return names;
-}
-
-JointType TypeOfUrdf(const std::string& name) {
-  if (name == "prismatic") return JointType::kPrismatic;
-  if (name == "fixed") return JointType::kWeld;
-  if (name == "floating") return JointType::kFree;
-  return name == "planar" ? JointType::kPlanar : JointType::kRevolute;
-}
-
-void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
-  const XmlElement& element = read.element;
-  const JointType type = TypeOfUrdf(read.type);
-  const std::string name = draft->NewJointName(element, element.Required("name", "a name").Name());
-  JointDescription& joint = draft->AddJoint(name, type, read.parent, read.X_PC, read.child, {});
-  if (const auto axis = element.Child("axis")) {
-    const Eigen::Vector3d xyz = draft->Vector(axis->Required("xyz", "3 numbers"), "d");
-    if (TraitsOf(type).own_axis != '-') {
-      if (xyz.isZero()) axis->Fail("an axis of length 0", "one that is not zero");
-      joint.axis = xyz;
-    }
-  } else if (TraitsOf(type).own_axis != '-') {
-    joint.axis = Eigen::Vector3d::UnitX();  // the default of URDF
-  }
-  const auto dynamics = element.Child("dynamics");
-  const auto damping = dynamics ? dynamics->Attribute("damping") : std::nullopt;
-  const double c = damping ? damping->Number(kNotNegative) : 0.0;
-  if (c > 0.0 && NumValues(type, SpaceKind::kSpatial, true) == 1) {
-    draft->description.forces.emplace_back(JointDamper{draft->last_joint(), c});
-  } else if (c > 0.0) {
-    draft->Note(*dynamics, "damping", "dropped: only joints with one coordinate have dampers",
-                true);
-  }
-  const auto friction = dynamics ? dynamics->Attribute("friction") : std::nullopt;
-  if (friction && friction->Number() != 0.0) {
-    draft->Note(*dynamics, "friction", "dropped: dry friction is no force of mechanism files",
-                true);
-  }
-}
 
 std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world, ImportDraft* draft) {
   std::vector<UrdfJoint> joints;
@@ -115,85 +66,85 @@ std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world, Import
                             ground);
   };
   for (const XmlElement& element : root.Children("joint")) {
-    UrdfJoint joint{element, "", link(element, "parent"), link(element, "child"),
+    UrdfJoint joint{element, link(element, "parent"), link(element, "child"),
                     OriginOf(element, draft)};
-    const XmlValue type = element.Required("type", "a joint type");
-    joint.type = UrdfTypes()[type.Choice(UrdfTypes())];
+    joint.type = element.Required("type", "a joint type")
+                     .Choice<JointType>({{"revolute", JointType::kRevolute},
+                                         {"continuous", JointType::kRevolute},
+                                         {"prismatic", JointType::kPrismatic},
+                                         {"fixed", JointType::kWeld},
+                                         {"floating", JointType::kFree},
+                                         {"planar", JointType::kPlanar}});
     if (joint.child == kGround) element.Fail("\"world\" as a child", "a link that can move");
     joints.push_back(joint);
   }
   return joints;
 }
 
-/// Joints ordered from parents to children, and links without a parent.
-class UrdfTree {
- public:
-  UrdfTree(std::vector<UrdfJoint> joints, std::size_t count)
-      : joints_(std::move(joints)), parent_(count, -1), below_(count) {
-    for (std::size_t j = 0; j < joints_.size(); ++j) {
-      const UrdfJoint& joint = joints_[j];
-      int& known = parent_[static_cast<std::size_t>(joint.child)];
-      if (known >= 0) {
-        joint.element.Fail(
-            fmt::format("a second joint that leads to this child (the first is in line {})",
-                        joints_[static_cast<std::size_t>(known)].element.line()),
-            "a tree: joints that close loops stand in a sidecar (--loops)");
-      }
-      known = static_cast<int>(j);
-      below_[static_cast<std::size_t>(joint.parent)].push_back(static_cast<int>(j));
+/// Sets the poses of all links and returns the root of the tree. Rejects joints that are no tree.
+int PlaceLinks(const std::vector<UrdfJoint>& joints, const XmlElement& root, bool has_world,
+               ImportDraft* draft) {
+  constexpr const char* kTree = "a tree: joints that close loops stand in a sidecar (--loops)";
+  const int count = static_cast<int>(draft->at_rest.size());
+  std::vector<const UrdfJoint*> leading(count, nullptr);  // the joint to each link
+  std::vector<std::vector<const UrdfJoint*>> below(count);
+  for (const UrdfJoint& joint : joints) {
+    const UrdfJoint*& known = leading[joint.child];
+    if (known != nullptr) {
+      joint.element.Fail(
+          fmt::format("a second joint that leads to this child (the first is in line {})",
+                      known->element.line()),
+          kTree);
+    }
+    known = &joint;
+    below[joint.parent].push_back(&joint);
+  }
+  std::vector<int> roots, queue;
+  for (int i = has_world ? kGround : 1; i < count; ++i) {
+    if (leading[i] == nullptr) roots.push_back(i);
+  }
+  std::vector<bool> placed(count, false);
+  queue = roots;
+  for (std::size_t k = 0; k < queue.size(); ++k) {
+    placed[queue[k]] = true;
+    for (const UrdfJoint* joint : below[queue[k]]) {
+      draft->at_rest[joint->child] = draft->at_rest[joint->parent] * joint->X_PC;
+      queue.push_back(joint->child);
     }
   }
-
-  std::vector<int> Roots() const {
-    std::vector<int> roots;
-    for (std::size_t i = 1; i < parent_.size(); ++i) {
-      if (parent_[i] < 0) roots.push_back(static_cast<int>(i));
-    }
-    return roots;
+  for (const UrdfJoint& joint : joints) {
+    if (placed[joint.child]) continue;
+    joint.element.Fail("a joint of a cycle, which no root leads to", kTree);
   }
-  std::vector<UrdfJoint> Below(int root) const {
-    std::vector<UrdfJoint> ordered;
-    std::vector<int> queue = {root};
-    for (std::size_t k = 0; k < queue.size(); ++k) {
-      for (const int j : below_[static_cast<std::size_t>(queue[k])]) {
-        ordered.push_back(joints_[static_cast<std::size_t>(j)]);
-        queue.push_back(ordered.back().child);
-      }
-    }
-    return ordered;
+  if (roots.size() != 1) {
+    const std::string found = fmt::format("{} links without a parent", roots.size());
+    root.Fail(roots.empty() ? "no link without a parent" : found, "one, the root of the tree");
   }
-  const std::vector<UrdfJoint>& joints() const { return joints_; }
-
- private:
-  std::vector<UrdfJoint> joints_;
-  std::vector<int> parent_;
-  std::vector<std::vector<int>> below_;
-};
-
-/// Sets the poses of all links; links that no root reaches form a cycle.
-void PlaceLinks(const UrdfTree& tree, const std::vector<int>& roots, ImportDraft* draft) {
-  std::vector<bool> placed(draft->at_rest.size(), false);
-  for (const int root : roots) {
-    placed[static_cast<std::size_t>(root)] = true;
-    for (const UrdfJoint& joint : tree.Below(root)) {
-      const auto child = static_cast<std::size_t>(joint.child);
-      placed[child] = true;
-      draft->at_rest[child] = draft->at_rest[static_cast<std::size_t>(joint.parent)] * joint.X_PC;
-    }
-  }
-  for (const UrdfJoint& joint : tree.joints()) {
-    if (!placed[static_cast<std::size_t>(joint.child)]) {
-      joint.element.Fail("a joint of a cycle, which no root leads to",
-                         "a tree: joints that close loops stand in a sidecar (--loops)");
-    }
-  }
+  return roots[0];
 }
 
-void HoldRoots(const std::vector<int>& roots, const ImportOptions& options, ImportDraft* draft) {
-  for (const int root : roots) {
-    if (root == kGround || options.floats) continue;
-    const std::string& link = draft->description.bodies[static_cast<std::size_t>(root)].name;
-    draft->AddJoint(draft->NameLater(link + " to ground"), JointType::kWeld, kGround, {}, root, {});
+void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
+  const XmlElement& element = read.element;
+  const std::string name = draft->NewJointName(element, element.RequiredName());
+  JointDescription& joint =
+      draft->AddJoint(name, read.type, read.parent, read.X_PC, read.child, {});
+  const bool has_axis = TraitsOf(read.type).own_axis != '-';
+  if (has_axis) joint.axis = Eigen::Vector3d::UnitX();  // the default of URDF
+  if (const auto axis = element.Child("axis")) {
+    const Eigen::Vector3d xyz = draft->Vector(axis->Required("xyz", "3 numbers"), "d");
+    if (has_axis && xyz.isZero()) axis->Fail("an axis of length 0", "one that is not zero");
+    if (has_axis) joint.axis = xyz;
+  }
+  const auto dynamics = element.Child("dynamics");
+  if (!dynamics) return;
+  const double c = NumberOr(dynamics->Attribute("damping"), 0.0, kNotNegative);
+  if (NumValues(read.type, SpaceKind::kSpatial, true) == 1) {
+    draft->AddSpringAndDamper(0.0, 0.0, c);
+  } else if (c > 0.0) {
+    draft->Drop(*dynamics, "damping", "only joints with one coordinate have dampers");
+  }
+  if (NumberOr(dynamics->Attribute("friction"), 0.0) != 0.0) {
+    draft->Drop(*dynamics, "friction", kDryFriction);
   }
 }
 
@@ -202,7 +153,6 @@ void HoldRoots(const std::vector<int>& roots, const ImportOptions& options, Impo
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft) {
   if (const auto name = root.Attribute("name")) draft->description.name = name->Name();
   bool has_world = false;
-  std::vector<XmlElement> of_body = {root};
   for (const XmlElement& link : root.Children("link")) {
     const XmlValue name = link.Required("name", "a name");
     // "world" is by convention the fixed link
@@ -211,22 +161,15 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
       has_world = true;
       continue;
     }
-    of_body.push_back(link);
     ReadInertial(link, draft->AddBody(link, name.Name()), draft);
   }
-  const UrdfTree tree(ReadJoints(root, has_world, draft), draft->at_rest.size());
-  std::vector<int> roots = tree.Roots();
-  if (has_world) roots.insert(roots.begin(), kGround);
-  PlaceLinks(tree, roots, draft);
-  if (roots.size() != 1) {
-    const std::string found = fmt::format("{} links without a parent", roots.size());
-    root.Fail(roots.empty() ? "no link without a parent" : found, "one, the root of the tree");
-  }
-  for (const UrdfJoint& joint : tree.joints()) AddJoint(joint, draft);
-  HoldRoots(roots, options, draft);
+  const std::vector<UrdfJoint> joints = ReadJoints(root, has_world, draft);
+  const int base = PlaceLinks(joints, root, has_world, draft);
+  for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   draft->AssumeGravity(root, kGravity);
-  if (!options.floats && roots[0] != kGround) {
-    draft->Note(of_body[static_cast<std::size_t>(roots[0])],
+  if (base != kGround && !options.floats) {
+    draft->Fix(kGround, {}, base, " to ground");
+    draft->Note(draft->element(base),
                 "the root link is taken as fixed to the ground (--floating leaves it free)");
   }
   draft->NoteUnread(kUrdfReasons);

@@ -28,22 +28,6 @@ std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '
 /// which would garble messages and cannot be written as JSON.
 bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
 
-std::string ShownElement(const tinyxml2::XMLElement& element) {
-  const char* name = element.Attribute("name");
-  std::string shown = "<" + Abbreviated(element.Name());
-  if (name != nullptr && IsText(name)) shown += " name=" + Quoted(name);
-  return shown + ">";
-}
-
-[[noreturn]] void FailAt(const XmlDocument& document, const tinyxml2::XMLElement& element,
-                         const std::string& attribute, std::string_view found,
-                         std::string_view expected) {
-  const std::string where = attribute.empty() ? "" : " " + Abbreviated(attribute);
-  throw ConfigError(
-      Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", document.file,
-                            element.GetLineNum(), ShownElement(element), where, found, expected)));
-}
-
 std::string_view Trimmed(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\r\n";
   const std::size_t start = text.find_first_not_of(kBlanks);
@@ -95,15 +79,27 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
   }
 }
 
-bool IsOneOf(const tinyxml2::XMLElement& element, const std::vector<std::string_view>& tags) {
-  return std::ranges::find(tags, std::string_view(element.Name())) != tags.end();
+std::vector<const tinyxml2::XMLElement*> ChildrenIn(const tinyxml2::XMLElement& element) {
+  std::vector<const tinyxml2::XMLElement*> children;
+  for (const auto* child = element.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    children.push_back(child);
+  }
+  return children;
+}
+
+std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const tinyxml2::XMLElement& element) {
+  std::vector<const tinyxml2::XMLAttribute*> attributes;
+  for (const auto* one = element.FirstAttribute(); one != nullptr; one = one->Next()) {
+    attributes.push_back(one);
+  }
+  return attributes;
 }
 
 const tinyxml2::XMLElement* FirstWithin(const tinyxml2::XMLElement& element,
                                         const std::vector<std::string_view>& tags) {
-  for (const auto* child = element.FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    if (IsOneOf(*child, tags)) return child;
+  for (const auto* child : ChildrenIn(element)) {
+    if (std::ranges::find(tags, child->Name()) != tags.end()) return child;
     if (const auto* within = FirstWithin(*child, tags)) return within;
   }
   return nullptr;
@@ -111,17 +107,11 @@ const tinyxml2::XMLElement* FirstWithin(const tinyxml2::XMLElement& element,
 
 }  // namespace
 
-XmlValue::XmlValue(const XmlElement& element, std::string attribute, std::string text)
-    : document_(element.document_),
-      element_(element.element_),
-      attribute_(std::move(attribute)),
-      text_(Trimmed(text)) {}
-
-XmlElement XmlValue::element() const { return XmlElement(document_, element_); }
+XmlValue::XmlValue(XmlElement element, std::string attribute, std::string_view text)
+    : element_(std::move(element)), attribute_(std::move(attribute)), text_(Trimmed(text)) {}
 
 void XmlValue::Fail(std::string_view expected) const {
-  FailAt(*document_, *element_, attribute_,
-         IsText(text_) ? Quoted(text_) : "a text that is not UTF-8", expected);
+  element_.FailAt(attribute_, IsText(text_) ? Quoted(text_) : "a text that is not UTF-8", expected);
 }
 
 std::string XmlValue::Name() const {
@@ -141,8 +131,7 @@ double XmlValue::OneNumber(std::string_view word) const {
 
 double XmlValue::Number(const Range& range) const {
   const std::vector<std::string_view> words = Words(text_);
-  if (words.size() != 1) Fail("a number" + range.Text());
-  const double number = OneNumber(words[0]);
+  const double number = words.size() == 1 ? OneNumber(words[0]) : std::nan("");
   if (!range.Contains(number)) Fail("a number" + range.Text());
   return number;
 }
@@ -157,10 +146,7 @@ std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const
   return numbers;
 }
 
-Eigen::Vector3d XmlValue::Vector() const {
-  const std::vector<double> numbers = Numbers(3, 3);
-  return {numbers[0], numbers[1], numbers[2]};
-}
+Eigen::Vector3d XmlValue::Vector() const { return Eigen::Vector3d(Numbers(3, 3).data()); }
 
 bool XmlValue::Bool() const {
   if (text_ == "true" || text_ == "1") return true;
@@ -168,10 +154,8 @@ bool XmlValue::Bool() const {
   return false;
 }
 
-std::size_t XmlValue::Choice(const std::vector<std::string>& words) const {
-  const auto found = std::ranges::find(words, text_);
-  if (found == words.end()) Fail(fmt::format("one of {}", fmt::join(words, ", ")));
-  return static_cast<std::size_t>(found - words.begin());
+void XmlValue::FailChoice(const std::vector<std::string>& words) const {
+  Fail(fmt::format("one of {}", fmt::join(words, ", ")));
 }
 
 XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XMLElement* element)
@@ -181,32 +165,37 @@ XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XM
 
 std::string XmlElement::tag() const { return element_->Name(); }
 int XmlElement::line() const { return element_->GetLineNum(); }
-std::string XmlElement::Shown() const { return ShownElement(*element_); }
+
+std::string XmlElement::Shown() const {
+  const char* name = element_->Attribute("name");
+  std::string shown = "<" + Abbreviated(element_->Name());
+  if (name != nullptr && IsText(name)) shown += " name=" + Quoted(name);
+  return shown + ">";
+}
+
+void XmlElement::FailAt(const std::string& attribute, std::string_view found,
+                        std::string_view expected) const {
+  const std::string where = attribute.empty() ? "" : " " + Abbreviated(attribute);
+  throw ConfigError(Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", document_->file,
+                                          line(), Shown(), where, found, expected)));
+}
 
 void XmlElement::Fail(std::string_view found, std::string_view expected) const {
-  FailAt(*document_, *element_, "", found, expected);
+  FailAt("", found, expected);
 }
 
-std::vector<XmlElement> XmlElement::Children() const {
+std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> children;
-  for (const auto* child = element_->FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    children.emplace_back(document_, child);
+  for (const auto* child : ChildrenIn(*element_)) {
+    if (tags.empty() || std::ranges::find(tags, child->Name()) != tags.end()) {
+      children.emplace_back(document_, child);
+    }
   }
   return children;
 }
 
-std::vector<XmlElement> XmlElement::Children(std::string_view tag) const {
-  return ChildrenOf({tag});
-}
-
-std::vector<XmlElement> XmlElement::ChildrenOf(const std::vector<std::string_view>& tags) const {
-  std::vector<XmlElement> children;
-  for (const auto* child = element_->FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    if (IsOneOf(*child, tags)) children.emplace_back(document_, child);
-  }
-  return children;
+std::vector<XmlElement> XmlElement::Children(const char* tag) const {
+  return Children(std::vector<std::string_view>{tag});
 }
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
@@ -215,7 +204,7 @@ std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>
   return XmlElement(document_, found);
 }
 
-std::optional<XmlElement> XmlElement::Child(std::string_view tag) const {
+std::optional<XmlElement> XmlElement::Child(const char* tag) const {
   const std::vector<XmlElement> children = Children(tag);
   if (children.empty()) return std::nullopt;
   if (children.size() > 1) {
@@ -224,7 +213,7 @@ std::optional<XmlElement> XmlElement::Child(std::string_view tag) const {
   return children[0];
 }
 
-XmlElement XmlElement::RequiredChild(std::string_view tag) const {
+XmlElement XmlElement::RequiredChild(const char* tag) const {
   const auto child = Child(tag);
   if (!child) Fail(fmt::format("no <{}>", tag), "one");
   return *child;
@@ -237,31 +226,34 @@ std::optional<XmlValue> XmlElement::Attribute(const std::string& name) const {
   return XmlValue(*this, name, attribute->Value());
 }
 
+std::optional<XmlValue> XmlElement::Filled(const std::string& name) const {
+  auto value = Attribute(name);
+  if (value && value->text().empty()) value.reset();
+  return value;
+}
+
 XmlValue XmlElement::Required(const std::string& name, std::string_view expected) const {
   auto value = Attribute(name);
-  if (!value) FailAt(*document_, *element_, "", fmt::format("no \"{}\"", name), expected);
+  if (!value) Fail(fmt::format("no \"{}\"", name), expected);
   return *std::move(value);
 }
+
+std::string XmlElement::RequiredName() const { return Required("name", "a name").Name(); }
 
 XmlValue XmlElement::Content() const {
   const char* text = element_->GetText();
   return XmlValue(*this, "", text == nullptr ? "" : text);
 }
 
-bool XmlElement::HasAttribute(const std::string& name) const {
-  return element_->FindAttribute(name.c_str()) != nullptr;
+std::optional<XmlValue> XmlElement::Content(const char* tag) const {
+  const auto child = Child(tag);
+  if (!child) return std::nullopt;
+  return child->Content();
 }
 
 void XmlElement::Ignore() const {
-  IgnoreAttributes();
+  for (const auto* attribute : AttributesIn(*element_)) document_->read.insert(attribute);
   for (const XmlElement& child : Children()) child.Ignore();
-}
-
-void XmlElement::IgnoreAttributes() const {
-  for (const auto* attribute = element_->FirstAttribute(); attribute != nullptr;
-       attribute = attribute->Next()) {
-    document_->read.insert(attribute);
-  }
 }
 
 XmlFile::XmlFile(std::string_view text, const std::string& file)
@@ -296,29 +288,27 @@ const std::string& XmlFile::name() const { return document_->file; }
 
 namespace {
 
-using See = std::function<void(const XmlElement&, const std::string&)>;
+using Parts = std::vector<std::pair<XmlElement, std::string>>;
 
-void SeeUnread(const std::shared_ptr<XmlDocument>& document, const tinyxml2::XMLElement* element,
-               const See& see) {
+void AddUnread(const std::shared_ptr<XmlDocument>& document, const tinyxml2::XMLElement* element,
+               Parts* parts) {
   if (!document->read.contains(element)) {
-    see(XmlElement(document, element), "");
+    parts->emplace_back(XmlElement(document, element), "");
     return;
   }
-  for (const auto* attribute = element->FirstAttribute(); attribute != nullptr;
-       attribute = attribute->Next()) {
-    if (document->read.contains(attribute)) continue;
-    see(XmlElement(document, element), IsText(attribute->Name()) ? attribute->Name() : "?");
+  for (const auto* one : AttributesIn(*element)) {
+    if (document->read.contains(one)) continue;
+    parts->emplace_back(XmlElement(document, element), IsText(one->Name()) ? one->Name() : "?");
   }
-  for (const auto* child = element->FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    SeeUnread(document, child, see);
-  }
+  for (const auto* child : ChildrenIn(*element)) AddUnread(document, child, parts);
 }
 
 }  // namespace
 
-void XmlFile::Unread(const See& see) const {
-  SeeUnread(document_, document_->xml.RootElement(), see);
+Parts XmlFile::Unread() const {
+  Parts parts;
+  AddUnread(document_, document_->xml.RootElement(), &parts);
+  return parts;
 }
 
 }  // namespace loopbench::harness

@@ -8,12 +8,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <filesystem>
-#include <functional>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "harness/json/json_reader.h"
@@ -24,39 +24,8 @@ class XMLElement;
 
 namespace loopbench::harness {
 
-class XmlElement;
+class XmlValue;
 struct XmlDocument;
-
-/// The name and text of an attribute, or the text within an element (name "").
-class XmlValue {
- public:
-  XmlValue(const XmlElement& element, std::string attribute, std::string text);
-
-  /// Returns the text without surrounding blanks; may be empty.
-  const std::string& text() const { return text_; }
-  const std::string& attribute() const { return attribute_; }
-  XmlElement element() const;
-  /// Returns a non-empty printable text: UTF-8 without zero bytes.
-  std::string Name() const;
-  /// Returns a finite number, with a decimal point in any locale and nothing after it.
-  double Number(const Range& range = {}) const;
-  /// Returns `least` to `most` numbers separated by blanks.
-  std::vector<double> Numbers(std::size_t least, std::size_t most) const;
-  Eigen::Vector3d Vector() const;
-  /// Accepts true, false, 1 or 0.
-  bool Bool() const;
-  /// Returns the index among `words`.
-  std::size_t Choice(const std::vector<std::string>& words) const;
-
-  [[noreturn]] void Fail(std::string_view expected) const;
-
- private:
-  double OneNumber(std::string_view word) const;
-
-  std::shared_ptr<XmlDocument> document_;
-  const tinyxml2::XMLElement* element_;
-  std::string attribute_, text_;
-};
 
 class XmlElement {
  public:
@@ -67,39 +36,89 @@ class XmlElement {
   /// Returns <tag name="...">, for messages and notes.
   std::string Shown() const;
 
-  /// Returns its children in file order and marks them as read.
-  std::vector<XmlElement> Children() const;
-  std::vector<XmlElement> Children(std::string_view tag) const;
-  /// Returns children with one of these tags, in file order.
-  std::vector<XmlElement> ChildrenOf(const std::vector<std::string_view>& tags) const;
+  /// Returns its children in file order, of these tags if any, and marks them as read.
+  std::vector<XmlElement> Children(const std::vector<std::string_view>& tags = {}) const;
+  std::vector<XmlElement> Children(const char* tag) const;
   /// Returns the only child with this tag; throws if there are several.
-  std::optional<XmlElement> Child(std::string_view tag) const;
+  std::optional<XmlElement> Child(const char* tag) const;
   /// Returns the only child with this tag; throws if it is absent.
-  XmlElement RequiredChild(std::string_view tag) const;
+  XmlElement RequiredChild(const char* tag) const;
 
   std::optional<XmlValue> Attribute(const std::string& name) const;
+  /// Returns an attribute that is not empty.
+  std::optional<XmlValue> Filled(const std::string& name) const;
   /// Returns an attribute; if absent, throws with `expected`.
   XmlValue Required(const std::string& name, std::string_view expected) const;
+  /// Returns the attribute "name".
+  std::string RequiredName() const;
   /// Returns the text of the element itself.
   XmlValue Content() const;
-  bool HasAttribute(const std::string& name) const;
+  /// Returns the text of the only child with this tag, if any.
+  std::optional<XmlValue> Content(const char* tag) const;
 
   /// Returns the first descendant with one of these tags; marks only that element as read.
   std::optional<XmlElement> Within(const std::vector<std::string_view>& tags) const;
 
   /// Marks the element and all its contents as read.
   void Ignore() const;
-  /// Marks its attributes as read, but not its children.
-  void IgnoreAttributes() const;
 
   [[noreturn]] void Fail(std::string_view found, std::string_view expected) const;
 
  private:
-  friend class XmlFile;
   friend class XmlValue;
+  [[noreturn]] void FailAt(const std::string& attribute, std::string_view found,
+                           std::string_view expected) const;
+
   std::shared_ptr<XmlDocument> document_;
   const tinyxml2::XMLElement* element_;
 };
+
+/// The name and text of an attribute, or the text within an element (name "").
+class XmlValue {
+ public:
+  XmlValue(XmlElement element, std::string attribute, std::string_view text);
+
+  /// Returns the text without surrounding blanks; may be empty.
+  const std::string& text() const { return text_; }
+  const std::string& attribute() const { return attribute_; }
+  const XmlElement& element() const { return element_; }
+  /// Returns a non-empty printable text: UTF-8 without zero bytes.
+  std::string Name() const;
+  /// Returns a finite number, with a decimal point in any locale and nothing after it.
+  double Number(const Range& range = {}) const;
+  /// Returns `least` to `most` numbers separated by blanks.
+  std::vector<double> Numbers(std::size_t least, std::size_t most) const;
+  Eigen::Vector3d Vector() const;
+  /// Accepts true, false, 1 or 0.
+  bool Bool() const;
+  /// Returns the value of the row with this word.
+  template <class T>
+  T Choice(std::initializer_list<std::pair<std::string_view, T>> rows) const {
+    std::vector<std::string> words;
+    for (const auto& [word, value] : rows) {
+      if (word == text_) return value;
+      words.emplace_back(word);
+    }
+    FailChoice(words);
+  }
+
+  [[noreturn]] void Fail(std::string_view expected) const;
+
+ private:
+  double OneNumber(std::string_view word) const;
+  [[noreturn]] void FailChoice(const std::vector<std::string>& words) const;
+
+  XmlElement element_;
+  std::string attribute_, text_;
+};
+
+inline double NumberOr(const std::optional<XmlValue>& value, double otherwise,
+                       const Range& range = {}) {
+  return value ? value->Number(range) : otherwise;
+}
+inline bool BoolOr(const std::optional<XmlValue>& value, bool otherwise = false) {
+  return value ? value->Bool() : otherwise;
+}
 
 class XmlFile {
  public:
@@ -109,10 +128,9 @@ class XmlFile {
   XmlElement root() const;
   const std::string& name() const;
 
-  /// Calls `see` for all unread parts in file order: for an element with its contents (attribute
-  /// ""), or for an attribute of an element that was read.
-  void Unread(
-      const std::function<void(const XmlElement&, const std::string& attribute)>& see) const;
+  /// Returns all unread parts in file order: an element with its contents (attribute ""), or an
+  /// attribute of an element that was read.
+  std::vector<std::pair<XmlElement, std::string>> Unread() const;
 
  private:
   std::shared_ptr<XmlDocument> document_;

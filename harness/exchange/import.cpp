@@ -16,16 +16,6 @@
 
 namespace loopbench::harness {
 
-namespace {
-
-/// Returns the root element of each format, in their order.
-const std::vector<std::string>& Roots() {
-  static const std::vector<std::string> roots = {"mujoco", "robot", "sdf"};
-  return roots;
-}
-
-}  // namespace
-
 const std::vector<std::string>& ImportFormats() {
   static const std::vector<std::string> formats = {"mjcf", "urdf", "sdf"};
   return formats;
@@ -34,15 +24,13 @@ const std::vector<std::string>& ImportFormats() {
 Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
   const XmlFile xml(text, file);
   const XmlElement root = xml.root();
-  const auto found = std::ranges::find(Roots(), root.tag());
-  const auto wanted = std::ranges::find(ImportFormats(), options.format);
-  if (found == Roots().end()) {
-    root.Fail("this root element", "<mujoco> (MJCF), <robot> (URDF) or <sdf>");
-  }
-  const auto index = found - Roots().begin();
-  const std::string& format = ImportFormats()[index];
-  if (wanted != ImportFormats().end() && *wanted != format) {
-    root.Fail(format, fmt::format("{}, as --input-format says", *wanted));
+  const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
+                                               : tag == "robot" ? "urdf"
+                                               : tag == "sdf"   ? "sdf"
+                                                                : "";
+  if (format.empty()) root.Fail("this root element", "<mujoco> (MJCF), <robot> (URDF) or <sdf>");
+  if (!options.format.empty() && options.format != format) {
+    root.Fail(format, fmt::format("{}, as --input-format says", options.format));
   }
   if (options.floats && format != "urdf") {
     root.Fail(format, "urdf with --floating: other formats say what is free");
@@ -91,71 +79,48 @@ MassFault MassFaultOf(const BodyDescription& body) {
   return {};
 }
 
-/// Bodies welded to `root`, and their carrier in or next to the cluster: the ground if present,
+/// Bodies welded to a root, and their carrier in or next to the cluster: the ground if present,
 /// else the first body with valid mass properties, else the first with a mass.
-class Cluster {
- public:
-  /// `welds`: indices of the welds at each body. Bodies with valid mass properties end the cluster
-  /// and carry it, unless `whole` includes all parts fixed together.
-  Cluster(const MechanismDescription& description, const std::vector<std::vector<int>>& welds,
-          const std::vector<bool>& sound, bool whole, int root)
-      : d_(description), sound_(sound) {
-    poses_[root] = Frame();
-    Consider(root);
-    std::vector<int> queue = {root};
-    for (std::size_t k = 0; k < queue.size(); ++k) {
-      for (const int weld : welds[queue[k]]) {
-        const JointDescription& joint = d_.joints[weld];
+struct Cluster {
+  std::vector<int> members;
+  std::map<int, Frame> poses;
+  int carrier = -1;  ///< -1 if no body has a mass
+};
+
+/// Returns a function of the root. Bodies with valid mass properties (`sound`) end a cluster and
+/// carry it, unless `whole` includes all parts fixed together.
+std::function<Cluster(int)> ClusterFinder(const MechanismDescription& d,
+                                          const std::vector<bool>& sound, bool whole) {
+  std::vector<std::vector<const JointDescription*>> welds(d.bodies.size());
+  for (const JointDescription& joint : d.joints) {
+    if (joint.type != JointType::kWeld) continue;
+    for (const int body : {joint.from.body, joint.to.body}) welds[body].push_back(&joint);
+  }
+  return [&d, &sound, whole, welds](int root) {
+    Cluster cluster;
+    int best = 0;
+    const auto add = [&](int body, const Frame& X) {
+      cluster.poses[body] = X;
+      const bool ends = body == kGround || (sound[body] && !whole);
+      if (!ends || body == root) cluster.members.push_back(body);
+      const int rank = body == kGround ? 3 : sound[body] ? 2 : d.bodies[body].mass > 0.0 ? 1 : 0;
+      if (rank <= best) return;
+      best = rank;
+      cluster.carrier = body;
+    };
+    add(root, Frame());
+    for (std::size_t k = 0; k < cluster.members.size(); ++k) {
+      const int at = cluster.members[k];
+      for (const JointDescription* weld : welds[at]) {
         for (const auto& [here, there] :
-             {std::pair{&joint.from, &joint.to}, {&joint.to, &joint.from}}) {
-          if (here->body != queue[k] || poses_.contains(there->body)) continue;
-          poses_[there->body] = poses_[here->body] * PoseOf(*here) * PoseOf(*there).Inverse();
-          Consider(there->body);
-          const bool ends = there->body == kGround || (IsSound(there->body) && !whole);
-          if (!ends) queue.push_back(there->body);
+             {std::pair{&weld->from, &weld->to}, {&weld->to, &weld->from}}) {
+          if (here->body != at || cluster.poses.contains(there->body)) continue;
+          add(there->body, cluster.poses[at] * PoseOf(*here) * PoseOf(*there).Inverse());
         }
       }
     }
-    members_ = std::move(queue);
-  }
-
-  /// Returns the carrier; -1 if no body has a mass.
-  int carrier() const { return carrier_; }
-  const std::vector<int>& members() const { return members_; }
-  Attachment AttachmentOf(int body) const {
-    Attachment at;
-    at.carrier = carrier_;
-    at.attached = true;
-    at.X = poses_.at(carrier_).Inverse() * poses_.at(body);
-    return at;
-  }
-
- private:
-  bool IsSound(int body) const { return sound_[body]; }
-  void Consider(int body) {
-    const int rank = body == kGround ? 3 : IsSound(body) ? 2 : d_.bodies[body].mass > 0.0 ? 1 : 0;
-    if (rank <= rank_) return;
-    rank_ = rank;
-    carrier_ = body;
-  }
-
-  const MechanismDescription& d_;
-  const std::vector<bool>& sound_;
-  std::map<int, Frame> poses_;
-  std::vector<int> members_;
-  int carrier_ = -1, rank_ = 0;
-};
-
-std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& description) {
-  std::vector<std::vector<int>> welds(description.bodies.size());
-  for (std::size_t j = 0; j < description.joints.size(); ++j) {
-    const JointDescription& joint = description.joints[j];
-    if (joint.type != JointType::kWeld) continue;
-    for (const int body : {joint.from.body, joint.to.body}) {
-      welds[body].push_back(static_cast<int>(j));
-    }
-  }
-  return welds;
+    return cluster;
+  };
 }
 
 }  // namespace
@@ -163,10 +128,9 @@ std::vector<std::vector<int>> WeldsAtBodies(const MechanismDescription& descript
 void ImportDraft::CheckUnreadMasses() const {
   if (without_mass_.empty()) return;
   const std::vector<bool> sound(description.bodies.size(), true);
-  const Cluster fixed(description, WeldsAtBodies(description), sound, true, kGround);
-  const std::set<int> members(fixed.members().begin(), fixed.members().end());
+  const Cluster fixed = ClusterFinder(description, sound, true)(kGround);
   for (const auto& [body, value] : without_mass_) {
-    if (!members.contains(body)) value.Fail("false: masses are not found from shapes");
+    if (!fixed.poses.contains(body)) value.Fail("false: masses are not found from shapes");
   }
 }
 
@@ -177,29 +141,28 @@ void ImportDraft::MergeFixed(bool whole) {
     sound[i] = i == kGround || MassFaultOf(description.bodies[i]).found.empty();
   }
   std::vector<Attachment> attachments(count);
-  const std::vector<std::vector<int>> welds = WeldsAtBodies(description);
-  bool any = false;
-  for (std::size_t i = 1; i < count; ++i) {
+  const auto cluster_of = ClusterFinder(description, sound, whole);
+  for (int i = 1; i < std::ssize(sound); ++i) {
     if (sound[i] || seen[i]) continue;
-    const Cluster cluster(description, welds, sound, whole, static_cast<int>(i));
-    for (const int body : cluster.members()) {
-      const auto index = static_cast<std::size_t>(body);
-      seen[index] = true;
-      if (body == cluster.carrier() || cluster.carrier() < 0) continue;
-      attachments[index] = cluster.AttachmentOf(body);
-      const auto carrier = static_cast<std::size_t>(cluster.carrier());
-      const BodyDescription& merged = description.bodies[index];
+    const Cluster cluster = cluster_of(i);
+    for (const int body : cluster.members) {
+      seen[body] = true;
+      if (body == cluster.carrier || cluster.carrier < 0) continue;
+      attachments[body] = {
+          .carrier = cluster.carrier,
+          .X = cluster.poses.at(cluster.carrier).Inverse() * cluster.poses.at(body),
+          .attached = true};
+      const BodyDescription& merged = description.bodies[body];
       const char* why = merged.mass == 0.0 ? "without mass and fixed"
-                        : sound[index]     ? "fixed to a body without an inertia of its own"
+                        : sound[body]      ? "fixed to a body without an inertia of its own"
                                            : "without an inertia of its own and fixed";
       std::string reason =
-          fmt::format("{}: merged with \"{}\"", why, description.bodies[carrier].name);
+          fmt::format("{}: merged with \"{}\"", why, description.bodies[cluster.carrier].name);
       if (!merged.points.empty()) reason += fmt::format(", points are \"{}.POINT\"", merged.name);
-      Note(elements_[index], reason);
-      any = true;
+      Note(elements_[body], reason);
     }
   }
-  if (!any) return;
+  if (std::ranges::none_of(attachments, &Attachment::attached)) return;
   Renumbering renumbering;
   MechanismDescription merged_description = Attach(description, attachments, &renumbering);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
@@ -211,8 +174,8 @@ void ImportDraft::MergeFixed(bool whole) {
   }
   description = std::move(merged_description);
   for (std::size_t i = 0; i < count; ++i) {
-    if (renumbering.bodies[i] < 0) continue;
-    const auto kept = static_cast<std::size_t>(renumbering.bodies[i]);  // never above i
+    const int kept = renumbering.bodies[i];  // never above i
+    if (kept < 0) continue;
     at_rest[kept] = at_rest[i];
     elements_[kept] = elements_[i];
   }
@@ -230,65 +193,21 @@ void ImportDraft::HoldFloatingParts() {
   for (const Island& island : FindIslands(description, Connection::kJoints)) {
     if (island.grounded) continue;
     const int root = island.bodies.front();
-    const auto index = static_cast<std::size_t>(root);
-    AddJoint(NameLater(description.bodies[index].name), JointType::kFree, kGround, {}, root, {});
-    const Placement& X = at_rest[index];
-    description.initial.coordinates.push_back(
-        {last_joint(), {X.q.w(), X.q.x(), X.q.y(), X.q.z(), X.p.x(), X.p.y(), X.p.z()}});
+    AddJoint(NameLater(description.bodies[root].name), JointType::kFree, kGround, {}, root, {});
+    description.initial.coordinates.push_back({last_joint(), at_rest[root].AsCoordinates()});
   }
   NameJoints();
-}
-
-Imported ImportDraft::Finish(const std::string& format) {
-  Imported imported;
-  imported.format = format;
-  NameJoints();
-  bool gravity_is_said = options_.gravity.has_value() || !assumed_gravity_;
-  if (!options_.sidecar.empty()) {
-    std::vector<Frame> rest;
-    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
-    const SidecarFacts facts = ReadSidecar(options_.sidecar, rest, &description);
-    imported.observe = facts.observe;
-    gravity_is_said = gravity_is_said || facts.has_gravity;
-  }
-  if (!gravity_is_said) {
-    Note(*assumed_gravity_, fmt::format("no gravity is said: {} m/s^2 along -z (--gravity x,y,z "
-                                        "says another)",
-                                        -description.gravity.z()));
-  }
-  if (options_.gravity) description.gravity = *options_.gravity;
-  for (const auto& [body, share] : lifts_) {
-    const BodyDescription& lifted = description.bodies[body];
-    if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
-    description.forces.emplace_back(
-        PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
-  }
-  if (rounded_ > 0) {
-    notes_[rounded_note_].reason += fmt::format(
-        "; values with rounded angles or directions: {} (--keep-digits keeps them)", rounded_);
-  }
-  HoldFloatingParts();
-  CheckUnreadMasses();
-  MergeFixed(false);
-  MergeFixed(true);
-  CheckMasses();
-  if (description.bodies.size() < 2) {
-    elements_[kGround].Fail("no body", "at least one that is not fixed to the ground");
-  }
-  if (options_.planar) GoToPlane();
-  const std::string fault = Validate(description);
-  if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
-  std::ranges::stable_sort(notes_, {}, &ImportNote::line);
-  imported.description = std::move(description);
-  imported.notes = std::move(notes_);
-  return imported;
 }
 
 namespace {
 
-/// The present mechanism and the poses of its bodies.
+// Sidecar: loops, forces and a start that the other format cannot express, with the keys of
+// mechanism files (docs/exchange.md).
+
+/// The present mechanism, and poses of its bodies in ground axes at zero coordinates, where loops
+/// given on one side close.
 struct Sidecar : Draft {
-  const std::vector<Frame>* at_rest = nullptr;
+  std::vector<Frame> at_rest;
   bool has_gravity = false;
 };
 
@@ -360,7 +279,7 @@ void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
     Loop loop;
     loop.from.body = loop.to.body = -1;
     loop = ReadPart(LoopFields(), element, sidecar, loop);
-    CloseAtRest(*sidecar.at_rest, &loop);
+    CloseAtRest(sidecar.at_rest, &loop);
     sidecar.joints.push_back(loop);
     sidecar.joint_names.Add(loop.name);
   }
@@ -386,22 +305,69 @@ const Fields<Sidecar>& SidecarFields() {
   return fields;
 }
 
-}  // namespace
-
-SidecarFacts ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
-                         MechanismDescription* description) {
+/// Adds the content of the file to `description`; its start replaces the given one. Throws
+/// ConfigError with all mistakes, one per line.
+Sidecar ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
+                    MechanismDescription* description) {
   const std::string text = ReadTextFile(path);
   const Json document = ParseDocument(text, path.string());
   ErrorList errors(path.string(), text);
   Sidecar sidecar;
   static_cast<MechanismDescription&>(sidecar) = *description;
-  sidecar.at_rest = &at_rest;
+  sidecar.at_rest = at_rest;
   for (const BodyDescription& body : sidecar.bodies) sidecar.body_names.Add(body.name);
   for (const JointDescription& joint : sidecar.joints) sidecar.joint_names.Add(joint.name);
   SidecarFields().Read(JsonNode(document, "", errors), &sidecar);
   errors.ThrowIfAny();
   *description = static_cast<MechanismDescription&>(sidecar);
-  return {sidecar.observe, sidecar.has_gravity};
+  return sidecar;
+}
+
+}  // namespace
+
+Imported ImportDraft::Finish(const std::string& format) {
+  Imported imported;
+  imported.format = format;
+  NameJoints();
+  bool gravity_is_said = options_.gravity.has_value() || !assumed_gravity_;
+  if (!options_.sidecar.empty()) {
+    std::vector<Frame> rest;
+    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
+    const Sidecar facts = ReadSidecar(options_.sidecar, rest, &description);
+    imported.observe = facts.observe;
+    gravity_is_said = gravity_is_said || facts.has_gravity;
+  }
+  if (!gravity_is_said) {
+    Note(*assumed_gravity_, fmt::format("no gravity is said: {} m/s^2 along -z (--gravity x,y,z "
+                                        "says another)",
+                                        -description.gravity.z()));
+  }
+  if (options_.gravity) description.gravity = *options_.gravity;
+  for (const auto& [body, share] : lifts_) {
+    const BodyDescription& lifted = description.bodies[body];
+    if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
+    description.forces.emplace_back(
+        PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
+  }
+  if (rounded_ > 0) {
+    notes_[rounded_note_].reason += fmt::format(
+        "; values with rounded angles or directions: {} (--keep-digits keeps them)", rounded_);
+  }
+  HoldFloatingParts();
+  CheckUnreadMasses();
+  MergeFixed(false);
+  MergeFixed(true);
+  CheckMasses();
+  if (description.bodies.size() < 2) {
+    elements_[kGround].Fail("no body", "at least one that is not fixed to the ground");
+  }
+  if (options_.planar) GoToPlane();
+  const std::string fault = Validate(description);
+  if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
+  std::ranges::stable_sort(notes_, {}, &ImportNote::line);
+  imported.description = std::move(description);
+  imported.notes = std::move(notes_);
+  return imported;
 }
 
 }  // namespace loopbench::harness

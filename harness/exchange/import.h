@@ -52,18 +52,4 @@ Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions&
 Imported ImportText(std::string_view text, const std::string& file,
                     const ImportOptions& options = {});
 
-// Sidecar: loops, forces and a start that the other format cannot express, with the keys of
-// mechanism files (docs/exchange.md).
-
-struct SidecarFacts {
-  SceneObservation observe;
-  bool has_gravity = false;
-};
-
-/// Adds the content of the file to `description`; its start replaces the given one. `at_rest`
-/// contains body frames in ground axes at zero coordinates: loops given on one side close there.
-/// Throws ConfigError with all mistakes, one per line.
-SidecarFacts ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
-                         MechanismDescription* description);
-
 }  // namespace loopbench::harness

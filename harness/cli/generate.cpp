@@ -9,7 +9,6 @@
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/exchange/export_c.h"
-#include "harness/exchange/export_fmu.h"
 #include "harness/integrator/arkode.h"
 #include "harness/isolation/processes.h"
 #include "harness/record/provenance.h"

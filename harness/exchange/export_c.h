@@ -60,4 +60,13 @@ std::string Fill(std::string text, const std::map<std::string, std::string>& wor
 /// Returns the words of all texts: ID, the identifier, and UP, the same in capitals.
 std::map<std::string, std::string> WordsOf(const Code& code);
 
+/// Returns the bytes of an archive with the code as a Functional Mock-up Unit: FMI 2.0 for model
+/// exchange and for co-simulation, with sources and a binary for 64-bit Linux. They depend only on
+/// the code and the compiler. Throws generate::NotCovered if there is no C compiler.
+///
+/// Variables: the state, its derivatives, energies and poses. Co-simulation integrates by the
+/// classical Runge-Kutta method of order 4, in steps of at most `step` [s], and projects after each
+/// communication step.
+std::string MakeFmu(const Code& code, const std::string& model_name, double step);
+
 }  // namespace loopbench::exchange

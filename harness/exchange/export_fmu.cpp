@@ -1,5 +1,3 @@
-#include "harness/exchange/export_fmu.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <cstdint>
 #include <set>
 
+#include "harness/exchange/export_c.h"
 #include "harness/exchange/export_names.h"
 #include "harness/generate/generated.h"
 #include "harness/text/files.h"

@@ -114,11 +114,8 @@ int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
 }
 
 int ImportDraft::BodyNamed(const XmlValue& value, const std::set<std::string>& also) const {
-  const std::string name = value.Name();
-  if (also.contains(name)) return kGround;
-  const auto found = bodies_.find(name);
-  if (found == bodies_.end()) value.Fail("the name of a body in this file");
-  return found->second;
+  if (also.contains(value.Name())) return kGround;
+  return Named(bodies_, value, "the name of a body in this file");
 }
 
 int ImportDraft::BodyNamed(const std::string& name, const XmlElement& user) const {

@@ -93,6 +93,15 @@ struct DroppedReason {
 inline constexpr const char* kDryFriction = "dry friction is no force of mechanism files";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
+/// Returns the entry that a value names; if there is none, rejects the value with `expected`.
+template <class Entry>
+const Entry& Named(const std::map<std::string, Entry>& entries, const XmlValue& value,
+                   std::string_view expected) {
+  const auto found = entries.find(value.Name());
+  if (found == entries.end()) value.Fail(expected);
+  return found->second;
+}
+
 class ImportDraft {
  public:
   ImportDraft(const XmlFile& file, const ImportOptions& options);

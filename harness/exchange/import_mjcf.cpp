@@ -136,14 +136,12 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
 /// Returns tendons whose length an active <equality><tendon> keeps constant.
 std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
   std::map<std::string, XmlElement> held;
-  for (const XmlElement& section : root.Children("equality")) {
-    for (const XmlElement& element : section.Children("tendon")) {
-      const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
-      const auto active = equality.Attribute("active");
-      const auto first = equality.Attribute("tendon1");
-      if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
-      held.emplace(first->Name(), element);
-    }
+  for (const XmlElement& element : root.InSections("equality", "tendon")) {
+    const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
+    const auto active = equality.Attribute("active");
+    const auto first = equality.Attribute("tendon1");
+    if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
+    held.emplace(first->Name(), element);
   }
   return held;
 }
@@ -165,7 +163,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
   AdjustMasses(&model);
   const auto held = HeldTendons(root, model);
-  for (const XmlElement& section : root.Children("equality")) ReadMjcfEquality(section, &model);
+  ReadMjcfEquality(root, &model);
   ReadMjcfTendons(root, held, &model);
   ReadMjcfKeys(root, &model);
   model.defaults.IgnoreUnused();
@@ -190,8 +188,8 @@ std::string DescribedBy(const std::string& tag) {
 }  // namespace
 
 std::optional<XmlValue> MjcfElement::Attribute(const std::string& name) const {
-  std::optional<XmlValue> found = own_.Attribute(name);
-  for (const XmlElement& layer : classes_) {
+  std::optional<XmlValue> found;
+  for (const XmlElement& layer : layers_) {
     auto value = layer.Attribute(name);
     if (!found) found = std::move(value);
   }
@@ -200,14 +198,8 @@ std::optional<XmlValue> MjcfElement::Attribute(const std::string& name) const {
 
 XmlValue MjcfElement::Required(const std::string& name, std::string_view expected) const {
   auto value = Attribute(name);
-  if (!value) own_.Fail(fmt::format("no \"{}\"", name), expected);
+  if (!value) own().Fail(fmt::format("no \"{}\"", name), expected);
   return *std::move(value);
-}
-
-std::vector<XmlElement> MjcfElement::Layers() const {
-  std::vector<XmlElement> layers = {own_};
-  layers.insert(layers.end(), classes_.begin(), classes_.end());
-  return layers;
 }
 
 void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
@@ -249,19 +241,20 @@ MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& child
     CheckClass(*given);
     name = given->text();
   }
-  std::vector<XmlElement> layers;
+  MjcfElement made(element);
   for (auto found = classes_.find(Known(name)); found != classes_.end();
        found = classes_.find(found->second.parent)) {
     const auto defaults = found->second.elements.find(wanted);
     if (defaults == found->second.elements.end()) continue;
     // of several defaults in one class, the last one counts
-    layers.insert(layers.end(), defaults->second.rbegin(), defaults->second.rend());
+    std::for_each(defaults->second.rbegin(), defaults->second.rend(),
+                  [&made](const XmlElement& layer) { made.Add(layer); });
     if (uses) used_.emplace(found->first, wanted);
-    if (layers.size() > kMostLayers) {
+    if (made.layers().size() > kMostLayers + 1) {
       element.Fail(fmt::format("more than {} defaults of its kind", kMostLayers), "fewer");
     }
   }
-  return {element, layers};
+  return made;
 }
 
 void MjcfDefaults::IgnoreUnused() const {
@@ -277,7 +270,7 @@ Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
   constexpr const char* kWays[] = {"quat", "axisangle", "euler", "xyaxes", "zaxis"};
   std::optional<XmlValue> found;
   std::string way;
-  for (const XmlElement& layer : element.Layers()) {
+  for (const XmlElement& layer : element.layers()) {
     std::string here;
     for (const char* one : kWays) {
       auto value = layer.Attribute(one);
@@ -346,18 +339,6 @@ void MjcfModel::NoteLimits(const MjcfElement& element, const char* reason) const
   if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
     draft->Drop(element.own(), range ? "range" : "limited", reason);
   }
-}
-
-const BodyPoint& MjcfModel::SiteNamed(const XmlValue& value) const {
-  const auto found = sites.find(value.Name());
-  if (found == sites.end()) value.Fail("the name of a site");
-  return found->second;
-}
-
-MjcfJoint& MjcfModel::JointNamed(const XmlValue& value) {
-  const auto found = joint_names.find(value.Name());
-  if (found == joint_names.end()) value.Fail("the name of a joint");
-  return joints[found->second];
 }
 
 }  // namespace loopbench::harness

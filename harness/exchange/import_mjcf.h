@@ -25,22 +25,22 @@ inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange =
 /// An element with the defaults of its classes: own attributes first, then the nearest class.
 class MjcfElement {
  public:
-  MjcfElement(XmlElement own, std::vector<XmlElement> classes)
-      : own_(std::move(own)), classes_(std::move(classes)) {}
+  explicit MjcfElement(const XmlElement& own) : layers_{own} {}
 
-  const XmlElement& own() const { return own_; }
+  const XmlElement& own() const { return layers_[0]; }
+  /// Returns the element and its classes, nearest first.
+  const std::vector<XmlElement>& layers() const { return layers_; }
+  void Add(const XmlElement& layer) { layers_.push_back(layer); }
+
   std::optional<XmlValue> Attribute(const std::string& name) const;
   double Number(const std::string& name, double otherwise, const Range& range = {}) const {
     return NumberOr(Attribute(name), otherwise, range);
   }
   /// Returns an attribute; if absent, throws with `expected`.
   XmlValue Required(const std::string& name, std::string_view expected) const;
-  /// Returns the element and its classes, nearest first.
-  std::vector<XmlElement> Layers() const;
 
  private:
-  XmlElement own_;
-  std::vector<XmlElement> classes_;
+  std::vector<XmlElement> layers_;
 };
 
 /// <default> and its nested classes. The top class is "main", the default of elements without a
@@ -151,8 +151,12 @@ class MjcfModel {
   /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
   /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
-  const BodyPoint& SiteNamed(const XmlValue& value) const;
-  MjcfJoint& JointNamed(const XmlValue& value);
+  const BodyPoint& SiteNamed(const XmlValue& value) const {
+    return Named(sites, value, "the name of a site");
+  }
+  MjcfJoint& JointNamed(const XmlValue& value) {
+    return joints[Named(joint_names, value, "the name of a joint")];
+  }
 };
 
 /// Reads <worldbody>.
@@ -168,7 +172,7 @@ struct MjcfPlaced {
 /// Makes one Loopbench joint from the joints of a body; X_PB is the drawn pose of the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
                   const Placement& X_PB, const std::vector<MjcfPlaced>& joints);
-void ReadMjcfEquality(const XmlElement& section, MjcfModel* model);
+void ReadMjcfEquality(const XmlElement& root, MjcfModel* model);
 /// Reads spatial tendons between two sites; `held` contains tendons of constant length, which
 /// become rods.
 void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,

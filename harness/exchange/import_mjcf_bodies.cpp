@@ -170,7 +170,7 @@ MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& 
 
 /// Marks a geom and its classes as read, with a note.
 void IgnoreGeom(const MjcfElement& geom, const std::string& fate, MjcfModel* model) {
-  for (const XmlElement& layer : geom.Layers()) layer.Ignore();
+  for (const XmlElement& layer : geom.layers()) layer.Ignore();
   if (model->settings.has_contact) model->draft->Note(geom.own(), fate + "there is no contact");
 }
 
@@ -204,7 +204,7 @@ void Gather(const MjcfModel& model, const XmlElement& element, const Placement& 
       continue;
     }
     child.Attribute("name");
-    const Placement within = X * model.PlacementOf({child, {}});
+    const Placement within = X * model.PlacementOf(MjcfElement(child));
     Gather(model, child, within, ClassWithin(model, child, childclass), contents);
   }
 }
@@ -225,7 +225,7 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
 
 /// Reads <inertial>: about its own axes, rotated into body axes.
 MassProperties ReadInertial(const XmlElement& element, const MjcfModel& model) {
-  const Placement X = model.PlacementOf({element, {}});
+  const Placement X = model.PlacementOf(MjcfElement(element));
   MassProperties read = {element.Required("mass", "a number [kg]").Number(kNotNegative), X.p};
   const auto full = element.Attribute("fullinertia");
   const auto diagonal = element.Attribute("diaginertia");
@@ -275,7 +275,7 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   const std::string childclass = ClassWithin(*model, element, placed.childclass);
   const auto name = element.Attribute("name");
   const int body = draft->AddBody(element, name ? name->Name() : "");
-  const Placement X_PB = placed.X * model->PlacementOf({element, {}});
+  const Placement X_PB = placed.X * model->PlacementOf(MjcfElement(element));
   draft->at_rest[body] = draft->at_rest[parent] * X_PB;
   Contents contents;
   Gather(*model, element, {}, childclass, &contents);

@@ -301,53 +301,35 @@ struct Law {
   }
 };
 
-/// Applies one layer; in a shorter list the remaining values stay unchanged.
-void Apply(const XmlElement& layer, Law* law) {
-  if (layer.tag() == "motor") {
-    *law = Law();
-    return;
-  }
-  if (layer.tag() != "general") {
-    law->is_other = true;
-    // parameters of such actuators, which a nearer motor replaces
-    for (const char* name : {"kp", "kv", "dampratio", "timeconst", "inheritrange", "area",
-                             "diameter", "bias", "gain", "scale", "force"}) {
-      layer.Attribute(name);
-    }
-    return;
-  }
-  const auto type = [&layer](const char* key, std::string* text) {
-    if (const auto given = layer.Attribute(key)) *text = given->text();
-  };
-  const auto numbers = [&layer](const char* key, std::vector<double>* values) {
-    const auto given = layer.Attribute(key);
-    if (!given) return;
-    const std::vector<double> said = given->Numbers(1, 10);
-    if (values->size() < said.size()) values->resize(said.size());
-    std::ranges::copy(said, values->begin());
-  };
-  type("gaintype", &law->gain_type);
-  type("biastype", &law->bias_type);
-  type("dyntype", &law->dynamics);
-  numbers("gainprm", &law->gain);
-  numbers("biasprm", &law->bias);
-}
-
-/// Returns the law from layers of all kinds of actuators, where the nearest one has precedence.
+/// Returns the law from layers of all kinds of actuators, where the nearest one has precedence. In
+/// a shorter list the remaining values stay unchanged.
 Law LawOf(const MjcfElement& actuator) {
   Law law;
-  const std::vector<XmlElement> layers = actuator.Layers();
-  std::for_each(layers.rbegin(), layers.rend(),
-                [&law](const XmlElement& layer) { Apply(layer, &law); });
-  return law;
-}
-
-/// Reads attributes without effect on an actuator without dynamics.
-void ReadRest(const MjcfElement& actuator) {
-  for (const char* name : {"name", "group", "user", "dynprm", "actdim", "actlimited", "actrange",
-                           "actearly", "lengthrange", "cranklength"}) {
-    actuator.Attribute(name);
+  for (auto layer = actuator.layers().rbegin(); layer != actuator.layers().rend(); ++layer) {
+    if (layer->tag() == "motor") {
+      law = Law();
+    } else if (layer->tag() != "general") {
+      law.is_other = true;
+      // parameters of such actuators, which a nearer motor replaces
+      for (const char* name : {"kp", "kv", "dampratio", "timeconst", "inheritrange", "area",
+                               "diameter", "bias", "gain", "scale", "force"}) {
+        layer->Attribute(name);
+      }
+    } else {
+      for (const auto& [key, text] : {std::pair{"gaintype", &law.gain_type},
+                                      {"biastype", &law.bias_type},
+                                      {"dyntype", &law.dynamics}}) {
+        if (const auto given = layer->Attribute(key)) *text = given->text();
+      }
+      for (const auto& [key, values] : {std::pair{"gainprm", &law.gain}, {"biasprm", &law.bias}}) {
+        const auto given = layer->Attribute(key);
+        const std::vector<double> said = given ? given->Numbers(1, 10) : std::vector<double>();
+        values->resize(std::max(values->size(), said.size()));
+        std::ranges::copy(said, values->begin());
+      }
+    }
   }
+  return law;
 }
 
 /// A constant effort on a joint in MjcfModel::joints.
@@ -386,7 +368,11 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   const MjcfJoint& joint = model->JointNamed(*name);
   if (!joint.has_coordinate()) return drop(kNeedsOneCoordinate, true);
   const MjcfElement motor = model->defaults.Of(element, "");
-  ReadRest(motor);
+  // without effect on an actuator without dynamics
+  for (const char* rest : {"name", "group", "user", "dynprm", "actdim", "actlimited", "actrange",
+                           "actearly", "lengthrange", "cranklength"}) {
+    motor.Attribute(rest);
+  }
   const auto gear = motor.Attribute("gear");
   const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
   model->draft->Note(element, "a constant effort here, with the control of the start");
@@ -397,10 +383,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
 
 void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& controls,
                        MjcfModel* model) {
-  std::vector<XmlElement> actuators;
-  for (const XmlElement& section : root.Children("actuator")) {
-    for (const XmlElement& element : section.Children()) actuators.push_back(element);
-  }
+  const std::vector<XmlElement> actuators = root.InSections("actuator");
   std::vector<double> ctrl(actuators.size(), 0.0);
   if (controls) ctrl = controls->Numbers(ctrl.size(), ctrl.size());
   std::vector<Effort> efforts;  // summed for each joint, in the order of their first actuators

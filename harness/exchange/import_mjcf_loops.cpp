@@ -108,8 +108,8 @@ bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
 
 }  // namespace
 
-void ReadMjcfEquality(const XmlElement& section, MjcfModel* model) {
-  for (const XmlElement& element : section.Children()) {
+void ReadMjcfEquality(const XmlElement& root, MjcfModel* model) {
+  for (const XmlElement& element : root.InSections("equality")) {
     const auto active = model->defaults.Of(element, "", "equality", false).Attribute("active");
     if (!model->settings.has_equality || !BoolOr(active, true)) {
       model->draft->DropWhole(element, "it is not active");
@@ -203,10 +203,8 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
 void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,
                      MjcfModel* model) {
   const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
-  for (const XmlElement& section : root.Children("tendon")) {
-    for (const XmlElement& element : section.Children()) {
-      ReadTendon(element, held, free_poses, model);
-    }
+  for (const XmlElement& element : root.InSections("tendon")) {
+    ReadTendon(element, held, free_poses, model);
   }
 }
 
@@ -361,10 +359,7 @@ std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
 }
 
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
-  std::vector<XmlElement> keys;
-  for (const XmlElement& section : root.Children("keyframe")) {
-    for (const XmlElement& key : section.Children("key")) keys.push_back(key);
-  }
+  const std::vector<XmlElement> keys = root.InSections("keyframe", "key");
   std::optional<XmlValue> controls;
   if (!keys.empty()) {
     std::vector<double> qpos, qvel;

@@ -198,6 +198,16 @@ std::vector<XmlElement> XmlElement::Children(const char* tag) const {
   return Children(std::vector<std::string_view>{tag});
 }
 
+std::vector<XmlElement> XmlElement::InSections(const char* section, const char* tag) const {
+  std::vector<XmlElement> all;
+  for (const XmlElement& one : Children(section)) {
+    for (const XmlElement& child : tag != nullptr ? one.Children(tag) : one.Children()) {
+      all.push_back(child);
+    }
+  }
+  return all;
+}
+
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
   const auto* found = FirstWithin(*element_, tags);
   if (found == nullptr) return std::nullopt;

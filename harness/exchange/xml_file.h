@@ -39,6 +39,8 @@ class XmlElement {
   /// Returns its children in file order, of these tags if any, and marks them as read.
   std::vector<XmlElement> Children(const std::vector<std::string_view>& tags = {}) const;
   std::vector<XmlElement> Children(const char* tag) const;
+  /// Returns the children of all its children with tag `section`, of a tag if any.
+  std::vector<XmlElement> InSections(const char* section, const char* tag = nullptr) const;
   /// Returns the only child with this tag; throws if there are several.
   std::optional<XmlElement> Child(const char* tag) const;
   /// Returns the only child with this tag; throws if it is absent.

@@ -45,9 +45,8 @@ std::vector<double> Inputs(const MotionState& state) {
 /// Returns true if a branch covers a state: comparisons agree and the result is finite.
 bool Serves(const RecordedFunction& branch, const MotionState& state) {
   const std::vector<double> values = branch.graph.Values(Inputs(state));
-  return branch.graph.Holds(values) && std::ranges::all_of(branch.outputs, [&](int node) {
-           return std::isfinite(values[static_cast<std::size_t>(node)]);
-         });
+  return branch.graph.Holds(values) &&
+         std::ranges::all_of(branch.outputs, [&](int node) { return std::isfinite(values[node]); });
 }
 
 Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
@@ -330,10 +329,7 @@ class Writer {
   std::string declarations_, functions_;
 };
 
-/// A name with its unit.
-struct Labelled {
-  std::string name, unit;
-};
+using Labelled = std::pair<std::string, std::string>;  ///< a name with its unit
 
 /// Returns names of all positions or all speeds of a mechanism, in order.
 template <class Space>
@@ -345,9 +341,7 @@ std::vector<Labelled> Coordinates(const MechanismDescription& description,
     const loopbench::Joint<Space, double>& joint = mechanism.joints()[i];
     if (!joint.in_tree()) continue;
     const JointType type =
-        joint.description < 0
-            ? JointType::kFree
-            : description.joints[static_cast<std::size_t>(joint.description)].type;
+        joint.description < 0 ? JointType::kFree : description.joints[joint.description].type;
     auto at = static_cast<std::size_t>(speeds ? joint.u_offset : joint.q_offset);
     int coordinate = 0;
     for (const ValueWord& word : ValueWords(TraitsOf(type), description.space, speeds)) {
@@ -380,7 +374,7 @@ void Describe(const CodeRequest& request, const std::vector<int>& carried_speeds
   code.body_names.assign(mechanism.body_names().begin() + 1, mechanism.body_names().end());
   std::vector<Labelled> state = Coordinates<Space>(description, mechanism, false);
   const std::vector<Labelled> speeds = Coordinates<Space>(description, mechanism, true);
-  for (const int i : carried_speeds) state.push_back(speeds[static_cast<std::size_t>(i)]);
+  for (const int i : carried_speeds) state.push_back(speeds[i]);
   UniqueNames names;
   for (const auto& [name, unit] : state) {
     code.state_names.push_back(names.Take(name));

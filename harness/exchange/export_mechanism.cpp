@@ -46,8 +46,7 @@ class Maker {
       Joint joint = MakeJoint(mechanism, step.joint);
       joint.from_is_child = step.sign < 0;
       const int index = mechanism.joints()[step.joint].description;
-      if (index >= 0)
-        tree_of_[static_cast<std::size_t>(index)] = static_cast<int>(model_.tree.size());
+      if (index >= 0) tree_of_[index] = static_cast<int>(model_.tree.size());
       model_.tree.push_back(std::move(joint));
     }
     for (const int index : mechanism.constraints())
@@ -120,7 +119,7 @@ class Maker {
   std::string NameOf(int joint) const { return description_.joints[joint].name; }
 
   void Add(const JointForce& force, int joint, const char* kind) {
-    const int tree = tree_of_[static_cast<std::size_t>(joint)];
+    const int tree = tree_of_[joint];
     if (tree < 0) {
       Miss("{} along joint \"{}\", which closes a loop", kind, NameOf(joint));
       return;
@@ -163,7 +162,7 @@ class Maker {
     model_.q.assign(static_cast<std::size_t>(model_.num_q), 0.0);
     model_.u.assign(static_cast<std::size_t>(model_.num_u), 0.0);
     for (const Joint& joint : model_.tree) {
-      if (joint.num_q > joint.num_u) model_.q[static_cast<std::size_t>(joint.q)] = 1.0;
+      if (joint.num_q > joint.num_u) model_.q[joint.q] = 1.0;
     }
   }
 

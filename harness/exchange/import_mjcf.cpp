@@ -133,19 +133,6 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
   }
 }
 
-/// Returns tendons whose length an active <equality><tendon> keeps constant.
-std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
-  std::map<std::string, XmlElement> held;
-  for (const XmlElement& element : root.InSections("equality", "tendon")) {
-    const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
-    const auto active = equality.Attribute("active");
-    const auto first = equality.Attribute("tendon1");
-    if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
-    held.emplace(first->Name(), element);
-  }
-  return held;
-}
-
 }  // namespace
 
 void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
@@ -162,9 +149,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   if (worlds.empty()) root.Fail("no <worldbody>", "one");
   for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
   AdjustMasses(&model);
-  const auto held = HeldTendons(root, model);
-  ReadMjcfEquality(root, &model);
-  ReadMjcfTendons(root, held, &model);
+  ReadMjcfLoops(root, &model);
   ReadMjcfKeys(root, &model);
   model.defaults.IgnoreUnused();
   draft->NoteUnread(kMjcfReasons);

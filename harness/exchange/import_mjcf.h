@@ -172,11 +172,9 @@ struct MjcfPlaced {
 /// Makes one Loopbench joint from the joints of a body; X_PB is the drawn pose of the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
                   const Placement& X_PB, const std::vector<MjcfPlaced>& joints);
-void ReadMjcfEquality(const XmlElement& root, MjcfModel* model);
-/// Reads spatial tendons between two sites; `held` contains tendons of constant length, which
-/// become rods.
-void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,
-                     MjcfModel* model);
+/// Reads constraints, and spatial tendons between two sites: springs, or rods if an <equality>
+/// keeps their length.
+void ReadMjcfLoops(const XmlElement& root, MjcfModel* model);
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model);
 /// Sets constant actuator efforts for these controls; by default all controls are 0.
 void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& controls,

@@ -106,9 +106,7 @@ bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
   return true;
 }
 
-}  // namespace
-
-void ReadMjcfEquality(const XmlElement& root, MjcfModel* model) {
+void ReadEquality(const XmlElement& root, MjcfModel* model) {
   for (const XmlElement& element : root.InSections("equality")) {
     const auto active = model->defaults.Of(element, "", "equality", false).Attribute("active");
     if (!model->settings.has_equality || !BoolOr(active, true)) {
@@ -130,7 +128,18 @@ void ReadMjcfEquality(const XmlElement& root, MjcfModel* model) {
   }
 }
 
-namespace {
+/// Returns tendons whose length an active <equality><tendon> keeps constant.
+std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
+  std::map<std::string, XmlElement> held;
+  for (const XmlElement& element : root.InSections("equality", "tendon")) {
+    const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
+    const auto active = equality.Attribute("active");
+    const auto first = equality.Attribute("tendon1");
+    if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
+    held.emplace(first->Name(), element);
+  }
+  return held;
+}
 
 /// Returns the two sites of a straight tendon, or nothing.
 std::optional<std::pair<BodyPoint, BodyPoint>> StraightEnds(const XmlElement& element,
@@ -200,8 +209,9 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
 
 }  // namespace
 
-void ReadMjcfTendons(const XmlElement& root, const std::map<std::string, XmlElement>& held,
-                     MjcfModel* model) {
+void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
+  const std::map<std::string, XmlElement> held = HeldTendons(root, *model);
+  ReadEquality(root, model);
   const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
   for (const XmlElement& element : root.InSections("tendon")) {
     ReadTendon(element, held, free_poses, model);

@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3690,  17,   6},  2700},
     {"harness/figures",         { 3040,  12,   7},  1900},
     {"harness/view",            { 2490,  10,   8},  2050},
-    {"harness/exchange",        { 7350,  30,  10},  5000},
+    {"harness/exchange",        { 6890,  29,  10},  5000},
     {"harness/report",          { 1100,   4,  10},  1100},
     {"harness/history",         { 1970,  10,   7},  1500},
     {"harness/cli",             { 8300,  32,  29},  3600},
     {"peers",                   {  709,  12,   5},   650},
-    {"",                        {86500, 509, 238}, 62000}
+    {"",                        {86040, 508, 238}, 62000}
 };
 // clang-format on
 

@@ -45,6 +45,13 @@ char StateOf(pid_t pid) {
   return name_end == std::string::npos || name_end + 2 >= line.size() ? '?' : line[name_end + 2];
 }
 
+/// True if the process has children: it waits for a program, whose time has limits of its own.
+bool RunsProgram(pid_t pid) {
+  std::ifstream file(fmt::format("/proc/{0}/task/{0}/children", pid));
+  pid_t child = 0;
+  return static_cast<bool>(file >> child);
+}
+
 }  // namespace
 
 double ChildWatch::cpu_s() const {
@@ -63,7 +70,7 @@ void ChildWatch::Look(bool unread) {
   const bool computed = used - cpu_before_ > kComputes * since;
   if (computed || unread) {
     idle_s_ = 0.0;
-  } else if (StateOf(pid_) == 'S') {
+  } else if (StateOf(pid_) == 'S' && !RunsProgram(pid_)) {
     idle_s_ += std::min(since, kLook_s);
   }
   looked_ = now;

@@ -25,7 +25,8 @@ namespace loopbench::harness {
 // depend on other work:
 //   - its CPU time, which the kernel counts;
 //   - its time asleep by itself. Computing work has no reason to sleep: it reads nothing, waits for
-//     no other process, and its answer is read at once.
+//     no process except programs such as a compiler (RunProgram), which do not count, and its
+//     answer is read at once.
 // Asleep is the kernel's state S. Time in other states without computing is ignored, because the
 // machine causes it: ready without a processor (R), stopped or traced (T, t), waiting for a disk or
 // swapped memory (D). Since the parent may be stopped too, a check adds at most the nominal time

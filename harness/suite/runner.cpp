@@ -8,7 +8,6 @@
 #include <numeric>
 #include <optional>
 
-#include "harness/generate/generated.h"
 #include "harness/isolation/processes.h"
 #include "harness/record/noise.h"
 #include "harness/record/provenance.h"
@@ -120,11 +119,6 @@ double CostOf(const Case& one) { return one.ensemble * ExpectedSteps(one); }
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
-/// Extends the idle limit for pieces that wait for the compiler of generated code.
-void AllowCompiler(const Column& column, ProcessLimits* limits) {
-  if (column.execution != Execution::kLibrary) limits->idle_s += generate::kCompilerSeconds;
-}
-
 }  // namespace
 
 ProcessLimits LimitsOfRuns(const Limits& limits, double runs) {
@@ -146,7 +140,6 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one,
     return std::vector<Record>{std::move(record)};
   };
   ProcessLimits limits = LimitsOfRuns(one.limits, runs * one.column.threads);
-  AllowCompiler(one.column, &limits);
   return {.owed = {one.keys},
           .work = work,
           .limits = limits,
@@ -179,7 +172,6 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   constexpr double kDerivatives_s = 60.0;
   piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns * threads,
                   experiment.limits.memory_mb};
-  for (const Case& one : group.cases) AllowCompiler(one.column, &piece.limits);
   piece.work = [&experiment, &group](int) { return TimeTogether(experiment, group); };
   piece.label = group.name;
   return piece;

@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 1970,  10,   7},  1500},
     {"harness/cli",             { 8300,  32,  29},  3600},
     {"peers",                   {  709,  12,   5},   650},
-    {"",                        {86040, 508, 238}, 62000}
+    {"",                        {85812, 508, 238}, 62000}
 };
 // clang-format on
 

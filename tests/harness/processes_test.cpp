@@ -1,5 +1,6 @@
 // Work in child processes: each way to end has its name, and the others go on.
 #include "harness/isolation/processes.h"
+#include "harness/text/run_program.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -84,6 +85,12 @@ TEST(ProcessesTest, EachEndingHasItsName) {
   EXPECT_EQ(results.at(3).ending, ProcessEnding::kOverTime);
   EXPECT_NE(results.at(3).text.find("0.5 s asleep"), std::string::npos) << results.at(3).text;
   EXPECT_EQ(results.at(4).text, "fine");
+}
+
+TEST(ProcessesTest, WaitingForAProgramIsNoSleep) {
+  const auto results = RunAll({[] { return RunProgram({"sh", "-c", "sleep 2; echo x"}).output; }}, 1,
+                              {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
+  EXPECT_EQ(results.at(0).text, "x\n");
 }
 
 TEST(ProcessesTest, CpuTimeIsLimited) {

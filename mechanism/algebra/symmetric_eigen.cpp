@@ -147,15 +147,6 @@ void SymmetricEigen(Square<S> A, Square<S> U, Column<S> lambda) {
   }
 }
 
-#ifndef LOOPBENCH_ONE_SCALAR
-VectorX<double> SymmetricEigenvalues(MatrixX<double> A) {
-  MatrixX<double> U(A.rows(), A.rows());
-  VectorX<double> lambda(A.rows());
-  SymmetricEigen<double>(A, U, lambda);
-  return lambda;
-}
-#endif
-
 #define LOOPBENCH_INSTANTIATE(S) template void SymmetricEigen<S>(Square<S>, Square<S>, Column<S>);
 LOOPBENCH_FOR_EACH_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

@@ -15,7 +15,13 @@ template <class S>
 void SymmetricEigen(Eigen::Ref<MatrixX<S>> A, Eigen::Ref<MatrixX<S>> U,
                     Eigen::Ref<VectorX<S>> lambda);
 
-/// The eigenvalues alone, with an allocation.
-VectorX<double> SymmetricEigenvalues(MatrixX<double> A);
+/// The eigenvalues alone, with an allocation. Not in the source, which is also compiled for other
+/// scalars: it would instantiate the double version there, with the options of those libraries.
+inline VectorX<double> SymmetricEigenvalues(MatrixX<double> A) {
+  MatrixX<double> U(A.rows(), A.rows());
+  VectorX<double> lambda(A.rows());
+  SymmetricEigen<double>(A, U, lambda);
+  return lambda;
+}
 
 }  // namespace loopbench

@@ -266,10 +266,10 @@ std::string CommandSection(const CLI::App& command, const std::string& name) {
 std::string ManualPage(const CLI::App& app, const CLI::App* command) {
   const std::string version = VersionText();
   const CLI::App& subject = command == nullptr ? app : *command;
-  std::string page = fmt::format(".TH LOOPBENCH 1 \"\" \"{}\" \"\"\n.SH NAME\nloopbench{} \\- {}\n",
-                                 Roff(version.substr(0, version.find('\n'))),
-                                 command == nullptr ? "" : "\\-" + Roff(command->get_name()),
-                                 Roff(subject.get_description()));
+  const std::string suffix = command == nullptr ? "" : "\\-" + Roff(command->get_name());
+  std::string page =
+      fmt::format(".TH LOOPBENCH{0} 1 \"\" \"{1}\" \"\"\n.SH NAME\nloopbench{0} \\- {2}\n", suffix,
+                  Roff(version.substr(0, version.find('\n'))), Roff(subject.get_description()));
   if (command != nullptr) {
     return page + ".SH DESCRIPTION\n" +
            CommandSection(*command, "loopbench " + command->get_name());

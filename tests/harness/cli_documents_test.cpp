@@ -122,6 +122,9 @@ TEST_F(CliDocumentsTest, TheManualPageHasEveryCommandAndOption) {
     EXPECT_NE(page.find(std::string(".SS loopbench ") + command), std::string::npos) << command;
   }
   EXPECT_NE(page.find("\\fB\\-\\-rerun\\fR"), std::string::npos);
+  const std::string own = Call("manual run").text;  // a part of it under a title of its own
+  EXPECT_TRUE(own.starts_with(".TH LOOPBENCH\\-run 1 ")) << own.substr(0, 80);
+  EXPECT_NE(page.find(own.substr(own.find(".SS loopbench run"))), std::string::npos);
   // nothing but macros of man(7) begins a line with a point, nothing at all with an apostrophe
   for (std::size_t at = page.find('\n'); at + 1 < page.size(); at = page.find('\n', at + 1)) {
     EXPECT_NE(page[at + 1], '\'');

@@ -1,6 +1,5 @@
 // Work in child processes: each way to end has its name, and the others go on.
 #include "harness/isolation/processes.h"
-#include "harness/text/run_program.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "harness/integrator/cpu_time.h"
+#include "harness/text/run_program.h"
 
 namespace loopbench::harness {
 namespace processes_test {
@@ -88,8 +88,10 @@ TEST(ProcessesTest, EachEndingHasItsName) {
 }
 
 TEST(ProcessesTest, WaitingForAProgramIsNoSleep) {
-  const auto results = RunAll({[] { return RunProgram({"sh", "-c", "sleep 2; echo x"}).output; }}, 1,
-                              {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
+  const auto results = RunAll({[] {
+                                return RunProgram({"sh", "-c", "sleep 2; echo x"}).output;
+                              }},
+                              1, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
   EXPECT_EQ(results.at(0).text, "x\n");
 }
 

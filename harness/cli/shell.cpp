@@ -340,9 +340,9 @@ std::shared_ptr<CLI::FormatterBase> HelpLayout() {
   class Layout final : public CLI::Formatter {
     std::string make_option_opts(const CLI::Option* option) const override {
       if (!TakesValue(*option)) return "";
+      const std::string value = Metavariable(*option);  // of an argument: its choices, if any
       const bool repeats = option->get_items_expected_max() > 1;
-      return (option->get_positional() ? "" : " " + Metavariable(*option)) +
-             (repeats ? " ..." : "");
+      return (value.empty() ? "" : " " + value) + (repeats ? " ..." : "");
     }
     std::string make_option_desc(const CLI::Option* option) const override {
       return DescriptionOf(*option);

@@ -60,6 +60,7 @@ ProgramResult RunProgram(std::vector<std::string> words, const std::string& inpu
   ProgramResult result;
   const pid_t parent = ::getpid(), child = ::fork();
   if (child == 0) {
+    std::signal(SIGTERM, SIG_DFL);  // processes of cases ignore it
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // the parent died before the line above
     ::dup2(in.descriptor(), STDIN_FILENO);

@@ -439,7 +439,7 @@ class Pilot {
   }
 
   /// Keeps the most promising trials. With a budget, methods with one integrator err alike at one
-  /// tolerance. Cheaper ones have time left: trials are ranked by the error with all of it.
+  /// tolerance. Cheaper ones have time left: trials are ranked by the error at full budget.
   void Shorten(std::vector<Trial>* trials, std::size_t count) const {
     Sort(trials);
     if (request_.budget) {
@@ -474,7 +474,7 @@ class Pilot {
 
   /// Finalists have the tolerance or step that suited the fastest formulation, or a search that was
   /// content with part of the budget; errors fall with a high power of the time. Brings one near
-  /// to all of it.
+  /// to the full budget.
   void SpendBudget(Trial* trial) {
     double order = kOrder;
     for (int i = 0; i < kSqueezes && !OutOfTime(); ++i) {

@@ -77,7 +77,7 @@ struct GrowthOptions {
   double late_window_start = 0.5;
 
   /// Number of times at which the running maximum is read, evenly spaced in log t for equal weight
-  /// per decade. The integrator's own samples would put nine tenths of it on the last decade.
+  /// per decade. The integrator's own samples would give the last decade nine tenths.
   int points = 64;
 
   /// Drift above this fraction of `length` is no longer small, and stops growing: cut off.

@@ -81,7 +81,7 @@ struct IntegratorOptions {
 inline constexpr double kLeastTolerance = std::numeric_limits<double>::epsilon();
 
 /// Tolerance of Newton's iteration for implicit profiles in runs with a fixed step. The iteration
-/// error is a hundredth of it, 1e-12: far below the error of useful steps, and a thousand times
+/// error is a hundredth, 1e-12: far below the error of useful steps, and a thousand times
 /// above round-off, where the iteration would not converge.
 inline constexpr double kToleranceOfFixedSteps = 1e-10;
 

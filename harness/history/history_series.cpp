@@ -22,7 +22,8 @@ namespace loopbench::harness {
 namespace {
 
 /// Returns the minimum change for each kind of measure, as in `compare` (compare.h). The assumed
-/// noise of constant series is a third of it, so that a single such value is just no outlier.
+/// noise of constant series is a third of this change, so that a single such value is just no
+/// outlier.
 /// @param most  largest value of the series
 Resolution ResolutionOf(Rule rule, double most, double places) {
   switch (rule) {

@@ -32,7 +32,7 @@
 #define LOOPBENCH_ARK_IMPLICIT(call, ...) ARKStep##call(__VA_ARGS__)
 #endif
 
-// The same for calls that can fail only by a programming error.
+// A call that can fail only by a programming error.
 #define LOOPBENCH_SET(implicit, call, ...) \
   ::loopbench::harness::Require(LOOPBENCH_ARK(implicit, call, __VA_ARGS__), #call)
 #define LOOPBENCH_SET_IMPLICIT(call, ...) \

@@ -60,7 +60,7 @@ class Observer {
   virtual void Trace(Traces& /*traces*/) const {}
 };
 
-/// Data available to observers before the run; all of it outlives them.
+/// Data available to observers before the run; it outlives them.
 template <class Space>
 struct Watched {
   const MechanismDescription& description;

@@ -66,10 +66,10 @@ Witness<Space, S> Follow(const MechanismDescription& description, const WitnessO
 // Certified error of a reference from its independent integrations (make_reference.h).
 
 /// The reference's tolerance in eps of the scalar: the round-off limit of the extrapolation
-/// (integrator.h), with a margin. At a tenth of it steps begin to be rejected for rounding alone.
-/// Near singular configurations rounding grows with the inverse square of the distance: no stage
-/// may come nearer than sqrt(eps / tolerance), 1e-6 in float128. Steps that shrink for truncation
-/// have stages as near as 1e-5; at 1e10 eps some crossings of a kite fail.
+/// (integrator.h), with a margin. At a tenth of this tolerance, steps begin to be rejected for
+/// rounding alone. Near singular configurations rounding grows with the inverse square of the
+/// distance: no stage may come nearer than sqrt(eps / tolerance), 1e-6 in float128. Steps that
+/// shrink for truncation have stages as near as 1e-5; at 1e10 eps some crossings of a kite fail.
 template <class S>
 constexpr double Tightest(PutBack put_back) {
   if (put_back == PutBack::kAtStages) return std::same_as<S, long double> ? 1e7 : 1e12;

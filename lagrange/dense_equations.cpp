@@ -98,7 +98,7 @@ Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kin
     SetScales(kinematics, Masses::kGeometric);
     FormResponse(kinematics, Masses::kGeometric);
     if (!response_.allFinite()) return Outcome::kNonFinite;
-    loop_.FactorGeometric(response_);
+    loop_.FactorGeometric(response_, kinematics.softening());
     found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
     found.smallest_weight = static_cast<double>(loop_.smallest_weight());
     FormResponse(kinematics, Masses::kPhysical);

@@ -71,6 +71,7 @@ Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
   // a loop looks degenerate: geometry gives the directions, then the physics is solved
   softened_ = true;
+  softening_ = kinematics.softening();
   AssembleAll(kinematics, Pass::kGeometric);
   if (AssembleAll(kinematics, Pass::kSoftened)) return Outcome::kFinished;
   return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;
@@ -259,7 +260,7 @@ bool Joins<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
     return ok;
   }
   if (pass == Pass::kGeometric) {
-    loop.FactorGeometric(X);
+    loop.FactorGeometric(X, softening_);
     dependent_rows_ += loop.size() - loop.rank();
     NoteDiagnostics(node, loop);
     return true;

@@ -164,6 +164,7 @@ class Joins {
   bool softened_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;
   S rcond_ = S(1), smallest_weight_ = S(1);
+  double softening_ = kSoftening;
   long operations_ = 0;
 };
 

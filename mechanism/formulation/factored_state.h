@@ -39,7 +39,7 @@ class FactoredState {
 
   /// The solver's, unless it has factored the current positions already.
   Outcome Factor();
-  /// The solver's mode has changed.
+  /// The solver's mode has changed, or it has factored other positions.
   void ForgetFactors() { factored_version_ = -1; }
 
   /// A change of speeds with J change = -violation at the current positions.

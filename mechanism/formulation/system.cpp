@@ -5,8 +5,20 @@
 
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/formulation/forward_jacobian.h"
+#include "mechanism/formulation/passage.h"
 
 namespace loopbench {
+
+namespace {
+
+template <class Space, class S>
+void SetSoftening(FactoredState<Space, S>& state, double share) {
+  if (state.kinematics().softening() == share) return;
+  state.kinematics().SetSoftening(share);
+  state.ForgetFactors();
+}
+
+}  // namespace
 
 template <class Space, class S>
 System<Space, S>::System(const Mechanism<Space, S>& mechanism,
@@ -25,7 +37,8 @@ System<Space, S>::System(const Mechanism<Space, S>& mechanism,
       lambda_change_(lambda_),
       A_(mechanism.released().empty() ? 0 : static_cast<std::size_t>(mechanism.num_bodies())),
       force_(udot_),
-      target_(lambda_) {}
+      target_(lambda_),
+      nothing_(lambda_) {}
 
 template <class Space, class S>
 System<Space, S>::~System() = default;
@@ -35,6 +48,7 @@ Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.SetTime(t);
   state_.ForgetReleased();
+  kinematics.SetSoftening(kSoftening);
   state_.SetPositions(q);
   state_.SetSpeeds(u);
   kinematics.AcceptStep();
@@ -61,7 +75,10 @@ Outcome System<Space, S>::FromState(S t, std::span<const S> y) {
                      std::equal(q.begin(), q.end(), this->q().begin());
   step_end_version_ = -1;
   kinematics.SetTime(t);
-  if (!known) state_.SetPositions(q);
+  if (!known) {
+    kinematics.SetSoftening(kSoftening);
+    state_.SetPositions(q);
+  }
   return level_->SetSpeeds(state_, speeds);
 }
 
@@ -80,6 +97,7 @@ Outcome System<Space, S>::Look(S t, std::span<const S> y) {
     return FromState(t, y);
   }
   step_end_version_ = -1;
+  state_.kinematics().SetSoftening(kSoftening);
   state_.SetPositions(Eigen::Map<const VectorX<S>>(y.data(), mechanism_.num_q()));
   state_.SetSpeeds(Eigen::Map<const VectorX<S>>(rates.data(), mechanism_.num_u()));
   return Outcome::kFinished;
@@ -98,6 +116,11 @@ template <class Space, class S>
 void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
   VectorX<S>* multipliers = shares_ && lambda == nullptr ? &lambda_change_ : lambda;
   if (!solver_->Accelerate(kinematics(), *feedback_, udot_, multipliers)) SolveFormed(multipliers);
+  if (carried_ != nullptr) {
+    solver_->Solve(*carried_, nothing_, change_, lambda != nullptr ? &lambda_change_ : nullptr);
+    udot_ += change_;
+    if (lambda != nullptr) *lambda += lambda_change_;
+  }
   if (!shares_) return;
   SelfStress<Space, S>& stress = *state_.stress();
   const VectorX<S>& force = stress.ForceOfStress(*multipliers);
@@ -106,6 +129,25 @@ void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
   solver_->Solve(force, share, change_, lambda != nullptr ? &lambda_change_ : nullptr);
   udot_ += change_;
   if (lambda != nullptr) *lambda += lambda_change_;
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::FactorBranch() {
+  carried_ = nullptr;
+  const Outcome outcome = state_.Factor();
+  const bool is_softened = solver_->conditioning().smallest_weight < 1.0;
+  // prescribed motions do not continue along the present speeds, and have rules of their own
+  if (!AtPassage() || drives_ != nullptr) return outcome;
+  if (outcome != Outcome::kFinished || !is_softened) return outcome;
+  if (passage_ == nullptr) passage_ = std::make_unique<Passage<Space, S>>(mechanism_, *solver_);
+  const Beside beside = passage_->Look(kinematics());
+  state_.ForgetFactors();
+  if (beside == Beside::kRegular) state_.kinematics().SetSoftening(kLeastSoftening);
+  if (beside == Beside::kOneBranch) {
+    carried_ = &passage_->Force();
+    state_.kinematics().SetSoftening(passage_->softening());
+  }
+  return state_.Factor();
 }
 
 template <class Space, class S>
@@ -119,7 +161,7 @@ Outcome System<Space, S>::Accelerate() {
   VectorX<S>* lambda = drives_ != nullptr && integrates_work() ? &lambda_ : nullptr;
   lambda_is_current_ = lambda != nullptr || !is_free;
   if (is_free) {
-    if (const Outcome outcome = state_.Factor(); outcome != Outcome::kFinished) return outcome;
+    if (const Outcome outcome = FactorBranch(); outcome != Outcome::kFinished) return outcome;
     SolveAccelerations(lambda);
     if (!udot_.allFinite()) return Outcome::kNonFinite;
     if (solver_->conditioning().smallest_weight < 1.0) ++softened_evaluations_;
@@ -197,6 +239,7 @@ Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u
   step_end_version_ = -1;
   derivative_version_ = -1;
   state_.kinematics().SetTime(t);
+  state_.kinematics().SetSoftening(kSoftening);
   state_.SetPositions(q);
   state_.SetSpeeds(u);
   outcome_ = Accelerate();
@@ -222,7 +265,13 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   step_end_version_ = kinematics().position_version();
   if (Look(t, y) != Outcome::kFinished) return false;  // the next evaluation gives the reason
   const S h = t - accepted_t_;
+  if (AtPassage() && !is_projected && mechanism_.num_u() > 0) {
+    FactorBranch();
+    // the remaining constraints of a passage must hold positions, too
+    SetSoftening(state_, std::min(kinematics().softening(), kSoftening));
+  }
   const Accepted accepted = is_projected ? Accepted::kProjected : level_->Accept(state_, h);
+  SetSoftening(state_, kSoftening);
   if (accepted == Accepted::kFailed) return false;  // as above
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();

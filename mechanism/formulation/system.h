@@ -32,6 +32,8 @@ struct Diagnostics : Conditioning {
 
 template <class Space>
 class ForwardJacobian;
+template <class Space, class S>
+class Passage;
 
 template <class Space, class S>
 class System final : public Ode<S> {
@@ -143,6 +145,10 @@ class System final : public Ode<S> {
   bool IsOffBranch() const;
   /// Rates of the works, if they are asked for, at the kinematics' speeds.
   void PutPower(std::span<S> rates);
+  /// Factors at the current positions; where directions are softened, looks at what is beside them
+  /// (passage.h), and softens less where they are regular.
+  Outcome FactorBranch();
+  bool AtPassage() const { return options_.enforcement == Enforcement::kPosition; }
   /// udot_ and, unless null, lambda at the current state, with the shares of released directions.
   void SolveAccelerations(VectorX<S>* lambda);
   /// Solves for accelerations from f and c, for solvers without a fast path.
@@ -160,11 +166,14 @@ class System final : public Ode<S> {
   FactoredState<Space, S> state_;
   TreeDynamics<Space, S> dynamics_;
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
+  std::unique_ptr<Passage<Space, S>> passage_;
+  const VectorX<S>* carried_ = nullptr;  ///< forces of softened constraints there, or null
 
   VectorX<S> udot_, lambda_;
   VectorX<S> change_, lambda_change_;  ///< shares of released directions
   std::vector<Acceleration<Space, S>> A_;
   VectorX<S> force_, target_;             ///< f and c of the accelerations
+  VectorX<S> nothing_;                    ///< zeros by row
   const VectorX<S>* feedback_ = nullptr;  ///< of the last evaluation, the level's
   bool lambda_is_current_ = false;
   bool shares_ = false;  ///< whether released directions drift unless self_stress.h corrects udot

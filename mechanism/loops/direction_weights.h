@@ -6,7 +6,8 @@
 //   w_i = 1 - exp(-r_i^2),      r_i = min(p_i / theta, (lambda_i / lambda_least)^2)
 //
 // with theta = (2e-4)^2 and lambda_least = (2e-6)^2 of the largest eigenvalue, which counts as 1e-2
-// at least because within a rigid part all of X_g is round-off.
+// at least because within a rigid part all of X_g is round-off. Both are smaller at positions that
+// are known to be regular (Kinematics::softening()).
 //
 // The p_1 <= p_2 <= ... are the responses left to each joint once the joints before it are closed:
 // the eigenvalues of its block in the block Cholesky factorisation. They fall with the square of
@@ -22,6 +23,7 @@
 #include <vector>
 
 #include "mechanism/algebra/space.h"
+#include "mechanism/model/kinematics.h"
 
 namespace loopbench {
 
@@ -30,8 +32,8 @@ class DirectionWeights {
  public:
   /// theta, or 64 eps if more: a narrow scalar's eigenvalues are round-off already above 4e-8.
   /// docs/theory/singular-configurations.md has the trials.
-  static constexpr double kTheta = 4e-8;
-  /// lambda_least, or 4 eps if more.
+  static constexpr double kTheta = kSoftening;
+  /// lambda_least, or 4 eps if more; at most a hundredth of theta.
   static constexpr double kLeastEigenvalue = 4e-12;
   /// Free bodies respond with one, and round-off of some 100 eps stays far below kTheta of this.
   static constexpr double kLeastResponse = 1e-2;
@@ -44,8 +46,8 @@ class DirectionWeights {
   /// Finds the p_i of the scaled geometric response in `X`, which is destroyed; `work` has its
   /// size. No allocation.
   void FindPivots(Eigen::Ref<MatrixX<S>> X, Eigen::Ref<MatrixX<S>> work);
-  /// The weights, after FindPivots; `lambda` ascends.
-  void Weigh(const VectorX<S>& lambda);
+  /// The weights for theta, a share of the largest eigenvalue, after FindPivots; `lambda` ascends.
+  void Weigh(const VectorX<S>& lambda, S share = S(kTheta));
 
   S operator[](Eigen::Index i) const { return weights_[i]; }
   bool IsLeftOut(Eigen::Index i) const { return !(weights_[i] >= S(kLeast)); }

@@ -97,7 +97,7 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
 /// "geometric": K_g^-1 X_g K_g^-T = U diag(lambda) U^T and the weights w_i; inverse_norms_ are
 /// sqrt(w_i / lambda_i), so that T = diag(inverse_norms_) U^T K_g^-1.
 template <class S>
-void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
+void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric, double softening) {
   using std::sqrt;
   form_ = Form::kGeometric;
   const auto scaled = Scaled(X_geometric);
@@ -105,7 +105,7 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric) {
   work = scaled;
   weights_.FindPivots(work, scratch_->rotated.topLeftCorner(size_, size_));
   SymmetricEigen<S>(scaled, directions_, eigenvalues_);
-  weights_.Weigh(eigenvalues_);
+  weights_.Weigh(eigenvalues_, S(softening));
   for (int i = 0; i < size_; ++i) {
     inverse_norms_[i] = weights_.IsLeftOut(i) ? S(0) : S(sqrt(weights_[i] / eigenvalues_[i]));
   }

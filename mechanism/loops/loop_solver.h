@@ -84,7 +84,7 @@ class LoopSolver {
   /// Scaled Cholesky. False when suspicious; nothing can be applied then.
   bool FactorScaled(const ConstRef& X);
   /// Eigen-decomposition of the geometric response; sets rank and weights.
-  void FactorGeometric(const ConstRef& X_geometric);
+  void FactorGeometric(const ConstRef& X_geometric, double softening = kSoftening);
   /// After FactorGeometric with the same scale. False when masses are so unequal that rounding
   /// leaves X without a Cholesky factor.
   bool FactorSoftened(const ConstRef& X);

@@ -14,6 +14,9 @@
 
 namespace loopbench {
 
+/// Eigenvalues of loops below this share of the largest are softened (direction_weights.h).
+inline constexpr double kSoftening = 4e-8;
+
 /// A joint at the current position and speed.
 template <class Space, class S>
 struct JointState {
@@ -63,6 +66,10 @@ class Kinematics {
   void UpdatePosition(const Eigen::Ref<const VectorX<S>>& q);
   /// Motions and g from u; positions must be current.
   void UpdateVelocity(const Eigen::Ref<const VectorX<S>>& u);
+
+  /// That share at these positions. Stands until it is set again.
+  void SetSoftening(double share) { softening_ = share; }
+  double softening() const { return softening_; }
 
   const VectorX<S>& q() const { return q_; }  ///< of the last UpdatePosition()
   const VectorX<S>& u() const { return u_; }  ///< of the last UpdateVelocity()
@@ -174,6 +181,7 @@ class Kinematics {
   std::vector<Released> released_;
   VectorX<S> q_, u_;
   S time_ = S(0);
+  double softening_ = kSoftening;
   long position_version_ = 0;
 };
 

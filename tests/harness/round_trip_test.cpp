@@ -25,7 +25,7 @@ Accelerations AtStart(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   const Start<double> start = Assemble<Space>(description, mechanism);
   EXPECT_EQ(start.outcome, Outcome::kFinished) << start.message;
-  const auto system = MakeFormulation<Space>("odca", mechanism, {Enforcement::kPosition});
+  const auto system = MakeFormulation<Space>("odca", mechanism, {Enforcement::kAcceleration});
   EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
   std::vector<double> y(static_cast<std::size_t>(system->state_size())), ydot(y.size());
   system->ToState(start.q, start.u, y);

@@ -1,0 +1,169 @@
+#include "mechanism/formulation/passage.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+namespace {
+
+/// Positions that show a passage at a distance are this far away [rad, or mechanism lengths, of the
+/// fastest body], ten widths of regularization.
+constexpr double kBeside = 2e-3;
+/// The nearest positions with forces, likewise: forces that are smooth on this scale have errors of
+/// 1e-9. Others use kBeside at least, and up to kFar where nearer positions are regularized.
+constexpr double kNear = 8e-3, kFar = 4e-2;
+/// Share of the force, or of applied forces if more, by which interpolations with all and with
+/// fewer pairs differ at most if it is smooth.
+constexpr double kRough = 1e-6;
+/// Weights of regular positions: regularization changes forces by a millionth at most.
+constexpr double kRegularWeight = 1.0 - 1e-6;
+/// Change of the direction of motion within 2 kBeside. On a smooth branch it is of the size of
+/// kBeside^2; beyond the turning point of a hyperbola it is of the size of one.
+constexpr double kTurned = 0.02;
+/// Least eigenvalue of regular positions, as a share of kSoftening. The parabola through three
+/// positions at a distance of kBeside has an error of some kBeside^3, 8e-9.
+constexpr double kPassed = 0.25;
+/// Eigenvalues up to six times this have weights below 1.
+constexpr double kProbe = 1e-4;
+
+/// Inverse of the weight in direction_weights.h.
+double EigenvalueOf(double weight, double share) {
+  return share * std::sqrt(-std::log1p(-std::min(weight, 1.0 - 1e-16)));
+}
+
+}  // namespace
+
+template <class Space, class S>
+Passage<Space, S>::Passage(const Mechanism<Space, S>& mechanism, ConstraintSolver<Space, S>& solver)
+    : solver_(solver),
+      state_(mechanism, solver),
+      projection_(MakeLevel(mechanism, FormulationOptions{.enforcement = Enforcement::kPosition})),
+      dynamics_(mechanism),
+      rates_(VectorX<S>::Zero(mechanism.num_q())),
+      curve_(rates_),
+      there_(rates_),
+      moved_(rates_),
+      udot_(VectorX<S>::Zero(mechanism.num_u())),
+      force_(udot_),
+      change_(udot_),
+      rows_(VectorX<S>::Zero(mechanism.num_rows())),
+      nothing_(rows_) {
+  means_.fill(udot_);
+}
+
+template <class Space, class S>
+bool Passage<Space, S>::Move(const Kinematics<Space, S>& at, S step) {
+  there_ = at.q() + step * (rates_ + step * curve_);
+  at.mechanism().Normalise(there_);
+  state_.kinematics().SetTime(at.time() + step);
+  state_.SetPositions(there_);
+  state_.SetSpeeds(at.u());
+  return projection_->Accept(state_, S(0)) != Accepted::kFailed &&
+         state_.Factor() == Outcome::kFinished;
+}
+
+template <class Space, class S>
+S Passage<Space, S>::LeastEigenvalue() {
+  state_.kinematics().SetSoftening(kProbe);
+  state_.ForgetFactors();
+  const bool known = state_.Factor() == Outcome::kFinished;
+  state_.kinematics().SetSoftening(kSoftening);
+  state_.ForgetFactors();
+  return known ? S(EigenvalueOf(solver_.conditioning().smallest_weight, kProbe)) : S(0);
+}
+
+template <class Space, class S>
+Beside Passage<Space, S>::Judge(const Kinematics<Space, S>& at, S least, S step) {
+  curve_.setZero();
+  const bool may_pass = least > S(kPassed * kSoftening);
+  if (!Move(at, -step)) return Beside::kUnknown;
+  moved_ = state_.q() - there_;
+  const S before = may_pass ? LeastEigenvalue() : S(0);
+  if (!Move(at, step)) return Beside::kUnknown;
+  curve_ = state_.q() - there_;
+  if ((curve_ - moved_).norm() > S(2 * kTurned) * step * rates_.norm()) return Beside::kRegular;
+  curve_ = (curve_ + moved_) / (S(2) * step * step);
+  if (!may_pass) return Beside::kOneBranch;
+  const S after = LeastEigenvalue();
+  // the lowest value of the parabola through the three
+  const S bend = (before + after) / S(2) - least, slope = (after - before) / S(2);
+  const S lowest = bend > S(0) ? least - slope * slope / (S(4) * bend) : least;
+  return lowest > S(kPassed * kSoftening) ? Beside::kRegular : Beside::kOneBranch;
+}
+
+/// M udot + h of the accelerations there.
+template <class Space, class S>
+bool Passage<Space, S>::FindForce(VectorX<S>& force) {
+  if (solver_.conditioning().smallest_weight < kRegularWeight) return false;
+  if (!solver_.Accelerate(state_.kinematics(), VectorX<S>(), udot_, nullptr)) {
+    dynamics_.Bias(state_.kinematics(), force);
+    dynamics_.JacobianBias(state_.kinematics(), rows_);
+    force = -force;
+    solver_.Solve(force, rows_, udot_, nullptr);
+  }
+  dynamics_.Residual(state_.kinematics(), udot_, nothing_, force, rows_);
+  return force.allFinite();
+}
+
+template <class Space, class S>
+bool Passage<Space, S>::Interpolate(const Kinematics<Space, S>& at, S step) {
+  constexpr double kParts[kPairs][kPairs] = {{1.0}, {4.0 / 3.0, -1.0 / 3.0}, {1.5, -0.6, 0.1}};
+  int pairs = 0;
+  for (; pairs < kPairs; ++pairs) {
+    const S far = S(pairs + 1) * step;
+    VectorX<S>& mean = means_[static_cast<std::size_t>(pairs)];
+    if (!Move(at, -far) || !FindForce(mean) || !Move(at, far) || !FindForce(change_)) break;
+    mean = (mean + change_) / S(2);
+  }
+  if (pairs == 0) return false;
+  const auto sum = [&](int count, VectorX<S>& force) {
+    force.setZero();
+    for (int k = 0; k < count; ++k) {
+      force += S(kParts[count - 1][k]) * means_[static_cast<std::size_t>(k)];
+    }
+  };
+  sum(pairs, force_);
+  sum(kPairs - 1, change_);
+  const S difference = (change_ - force_).norm();
+  dynamics_.Bias(state_.kinematics(), change_);
+  is_smooth_ = pairs == kPairs && difference < S(kRough) * std::max(force_.norm(), change_.norm());
+  return true;
+}
+
+template <class Space, class S>
+Beside Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
+  const Mechanism<Space, S>& mechanism = at.mechanism();
+  const S least = S(EigenvalueOf(solver_.conditioning().smallest_weight, at.softening()));
+  S speed = S(0);
+  for (const Velocity<Space, S>& V : at.motions()) {
+    speed = std::max({speed, S(V.angular.norm()), S(V.linear.norm() / mechanism.length())});
+  }
+  if (!(speed > S(0))) return Beside::kUnknown;
+  mechanism.Rates(at.q(), at.u(), rates_);
+  state_.kinematics() = at;  // measured angles continue from the same step
+  state_.kinematics().SetSoftening(kSoftening);
+  state_.ForgetFactors();
+  const Beside beside = Judge(at, least, S(kBeside) / speed);
+  if (beside != Beside::kOneBranch) return beside;
+  bool is_known = false;
+  for (double side = kNear; side >= kBeside; side /= 2.0) {
+    is_known = Interpolate(at, S(side) / speed) || is_known;
+    if (!is_known || !is_smooth_) continue;
+    is_smooth_ = side == kNear;
+    return beside;
+  }
+  for (double side = 2.0 * kNear; !is_known && side < kFar; side *= 2.0) {
+    is_known = Interpolate(at, S(side) / speed);
+  }
+  is_smooth_ = false;
+  return is_known ? beside : Beside::kUnknown;
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class Passage<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

@@ -6,6 +6,7 @@
 // a file with a wrong checksum, is rejected. If the folder cannot be made, nothing is kept.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -33,11 +34,13 @@ std::string RunCompiler(const std::vector<std::string>& arguments);
 
 /// The function that a text defines (print_c.h); it stays loaded until the process ends.
 struct CompiledBranch {
-  int (*function)(const double* x, double* y, double* w) = nullptr;
+  int (*function)(const double* x, const double* c, double* y, double* w) = nullptr;
   int room = 0;  ///< numbers that w has room for
 };
 
+/// Compiles the text that `print` returns; `key` names it within the process, which prints it once.
 /// Throws NotCovered (record.h) if there is no compiler, if it fails, or if the cache is rejected.
-CompiledBranch CompileBranch(const std::string& text, Contraction contraction = Contraction::kNone);
+CompiledBranch CompileBranch(const std::string& key, const std::function<std::string()>& print,
+                             Contraction contraction = Contraction::kNone);
 
 }  // namespace loopbench::generate

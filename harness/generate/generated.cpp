@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstring>
 
 #include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
@@ -33,6 +34,8 @@ class Timer {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
+using Constants = std::shared_ptr<const std::vector<double>>;
+
 /// Calls of compiled functions by runs of one thread, kLanes runs at once.
 class LaneCalls final : public Together {
  public:
@@ -55,15 +58,25 @@ class LaneCalls final : public Together {
   }
   void GiveBack(int lane) { taken_[lane] = false; }
 
-  void Want(int lane, const CompiledBranch& wanted, std::span<const double> x,
-            std::span<double> y) {
+  /// Returns equal constants that another run has given, or these. The bits of numbers decide.
+  Constants Shared(Constants own) {
+    const auto same = [&](const Constants& other) {
+      return own->size() == other->size() &&
+             std::memcmp(own->data(), other->data(), own->size() * sizeof(double)) == 0;
+    };
+    const auto known = std::ranges::find_if(constants_, same);
+    return known != constants_.end() ? *known : constants_.emplace_back(std::move(own));
+  }
+
+  void Want(int lane, const CompiledBranch& wanted, const double* constants,
+            std::span<const double> x, std::span<double> y) {
     const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
       if (numbers.size() < size) numbers.resize(size);
     };
     grow(x_, x.size());
     grow(y_, y.size());
     grow(w_, static_cast<std::size_t>(wanted.room));
-    calls_[lane] = {wanted.function, x, y};
+    calls_[lane] = {wanted.function, constants, x, y};
   }
   bool Held(int lane) const { return calls_[lane].held; }
 
@@ -71,16 +84,20 @@ class LaneCalls final : public Together {
     for (const Call& first : calls_) {
       const auto function = first.function;
       if (function == nullptr) continue;
+      const double* constants = first.constants;
+      const auto is_same = [&](const Call& call) {
+        return call.function == function && call.constants == constants;
+      };
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (calls_[lane].function != function) continue;
+        if (!is_same(calls_[lane])) continue;
         for (std::size_t i = 0; i < calls_[lane].x.size(); ++i) x_[i][lane] = calls_[lane].x[i];
       }
       const int held =
-          function(reinterpret_cast<const double*>(x_.data()), reinterpret_cast<double*>(y_.data()),
-                   reinterpret_cast<double*>(w_.data()));
+          function(reinterpret_cast<const double*>(x_.data()), constants,
+                   reinterpret_cast<double*>(y_.data()), reinterpret_cast<double*>(w_.data()));
       for (int lane = 0; lane < kLanes; ++lane) {
         Call& call = calls_[lane];
-        if (call.function != function) continue;
+        if (!is_same(call)) continue;
         call.function = nullptr;
         call.held = (held >> lane & 1) != 0;
         for (std::size_t i = 0; i < call.y.size(); ++i) call.y[i] = y_[i][lane];
@@ -91,6 +108,7 @@ class LaneCalls final : public Together {
  private:
   struct Call {
     decltype(CompiledBranch::function) function = nullptr;  ///< null if none waits
+    const double* constants = nullptr;
     std::span<const double> x;
     std::span<double> y;
     bool held = false;  ///< all comparisons, in the last call
@@ -98,6 +116,7 @@ class LaneCalls final : public Together {
   std::array<bool, kLanes> taken_{};
   std::array<Call, kLanes> calls_;
   std::vector<Lanes> x_, y_, w_;
+  std::vector<Constants> constants_;
 };
 
 }  // namespace
@@ -116,9 +135,12 @@ class Lane {
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
+  Constants Shared(Constants own) { return calls_.Shared(std::move(own)); }
+
   /// Returns false if a comparison differs from its recorded outcome.
-  bool Call(const CompiledBranch& function, std::span<const double> x, std::span<double> y) {
-    calls_.Want(lane_, function, x, y);
+  bool Call(const CompiledBranch& function, const Constants& constants, std::span<const double> x,
+            std::span<double> y) {
+    calls_.Want(lane_, function, constants->data(), x, y);
     beside_.Meet();
     return calls_.Held(lane_);
   }
@@ -143,6 +165,7 @@ GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
       contraction_(contraction),
       system_(system),
       lane_(Lane::Take(system.options().beside)) {
+  subject_.keeps_numbers = true;
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
   NoteStart();
@@ -171,19 +194,25 @@ void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) 
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
-  RequireShort(recorded);
-  const CompiledBranch derivative =
-      lane_ ? CompileBranch(PrintLanes(recorded, kLanes), contraction_) : Compile(recorded);
-  branches_.insert(branches_.begin(),
-                   Branch{std::make_unique<RecordedFunction>(std::move(recorded)), derivative});
+  Function derivative = Compile(recorded, lane_ != nullptr);
+  branches_.insert(
+      branches_.begin(),
+      Branch{std::make_unique<RecordedFunction>(std::move(recorded)), std::move(derivative)});
 }
 
 template <class Space>
-CompiledBranch GeneratedDerivative<Space>::Compile(const RecordedFunction& recorded) {
-  RequireShort(recorded);
-  const CompiledBranch function = CompileBranch(PrintLibrary(recorded), contraction_);
-  room_.resize(std::max(room_.size(), static_cast<std::size_t>(function.room)));
-  return function;
+auto GeneratedDerivative<Space>::Compile(const RecordedFunction& recorded, bool in_lanes)
+    -> Function {
+  const auto print = [&] {
+    RequireShort(recorded);
+    return in_lanes ? PrintLanes(recorded, kLanes) : PrintLibrary(recorded);
+  };
+  Function made = {
+      CompileBranch(recorded.structure + (in_lanes ? " in lanes" : ""), print, contraction_),
+      std::make_shared<std::vector<double>>(ConstantsOf(recorded))};
+  if (in_lanes) made.constants = lane_->Shared(std::move(made.constants));
+  if (!in_lanes) room_.resize(std::max(room_.size(), static_cast<std::size_t>(made.branch.room)));
+  return made;
 }
 
 template <class Space>
@@ -195,14 +224,15 @@ void GeneratedDerivative<Space>::ModeChanged() {
 }
 
 template <class Space>
-bool GeneratedDerivative<Space>::Call(const CompiledBranch& function, std::span<double> results) {
-  return function.function(x_.data(), results.data(), room_.data()) != 0;
+bool GeneratedDerivative<Space>::Call(const Function& function, std::span<double> results) {
+  return function.branch.function(x_.data(), function.constants->data(), results.data(),
+                                  room_.data()) != 0;
 }
 
 template <class Space>
-bool GeneratedDerivative<Space>::CallDerivative(const CompiledBranch& function,
-                                                std::span<double> ydot) {
-  return lane_ ? lane_->Call(function, x_, ydot.first(x_.size() - 1)) : Call(function, ydot);
+bool GeneratedDerivative<Space>::CallDerivative(const Function& function, std::span<double> ydot) {
+  if (!lane_) return Call(function, ydot);
+  return lane_->Call(function.branch, function.constants, x_, ydot.first(x_.size() - 1));
 }
 
 template <class Space>
@@ -239,7 +269,7 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
   if (y.size() + 1 != x_.size()) return false;
   SetInputs(t, y);
   for (Branch& branch : branches_) {
-    const bool is_known = branch.jacobian.function != nullptr || branch.has_no_jacobian;
+    const bool is_known = branch.jacobian.constants != nullptr || branch.has_no_jacobian;
     if (!is_known && branch.recorded->graph.Holds(branch.recorded->graph.Values(x_))) {
       const Timer timer(seconds_);
       const std::vector<int>& inputs = branch.recorded->inputs;
@@ -248,13 +278,14 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
       function.outputs = Differentiate(function.graph, branch.recorded->outputs,
                                        {inputs.begin() + 1, inputs.begin() + 1 + columns},
                                        function.graph.Values(x_));
+      function.structure = function.graph.Structure(function.outputs);
       try {
-        branch.jacobian = Compile(function);
+        branch.jacobian = Compile(function, false);
       } catch (const NotCovered&) {
         branch.has_no_jacobian = true;
       }
     }
-    if (branch.jacobian.function != nullptr && Call(branch.jacobian, jacobian)) return true;
+    if (branch.jacobian.constants != nullptr && Call(branch.jacobian, jacobian)) return true;
   }
   ++misses_;
   return false;

@@ -5,6 +5,11 @@
 // too. Compiled branches stay until the mode of the system changes. Batched runs (members of an
 // ensemble) call compiled code together, each in a lane of a function for kLanes states
 // (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a single run.
+//
+// Compiled code receives the recorded constants. Two recordings share it if they differ in the
+// numbers of constants alone: members of an ensemble, or cases of a sweep over lengths or masses. A
+// number that is 0 or 1 simplifies the graph of its own mechanism only, which then has its own
+// code.
 #pragma once
 
 #include <memory>
@@ -44,14 +49,19 @@ class GeneratedDerivative final : public CompiledDerivative {
   void AddBranch(double t, std::span<const double> y);
   /// Puts time and state where compiled functions read them.
   void SetInputs(double t, std::span<const double> y);
-  bool Call(const CompiledBranch& function, std::span<double> results);
-  bool CallDerivative(const CompiledBranch& function, std::span<double> ydot);
-  CompiledBranch Compile(const RecordedFunction& recorded);
+  /// A compiled text with the constants of this mechanism.
+  struct Function {
+    CompiledBranch branch = {};
+    std::shared_ptr<const std::vector<double>> constants = {};
+  };
+  bool Call(const Function& function, std::span<double> results);
+  bool CallDerivative(const Function& function, std::span<double> ydot);
+  Function Compile(const RecordedFunction& recorded, bool in_lanes);
 
   struct Branch {
     std::unique_ptr<const RecordedFunction> recorded;  ///< branches are swapped often
-    CompiledBranch derivative;                         ///< in lanes if the run has one
-    CompiledBranch jacobian = {};                      ///< compiled at its first use
+    Function derivative;                               ///< in lanes if the run has one
+    Function jacobian = {};                            ///< compiled at its first use
     bool has_no_jacobian = false;                      ///< it is too long
   };
 

@@ -14,8 +14,9 @@ namespace loopbench::generate {
 
 inline constexpr int kCompilerSeconds = 120;
 
+// Without -fno-tree-slp-vectorize, GCC 12 fuses multiply-add even with -ffp-contract=off.
 inline constexpr const char* kCompilerFlags[] = {
-    "-std=c99",         "-O2", "-fPIC", "-shared", "-fno-math-errno",
+    "-std=c99",         "-O2", "-fPIC", "-shared", "-fno-math-errno", "-fno-tree-slp-vectorize",
 #ifdef __AVX2__  // this program needs as much
     "-march=x86-64-v3",
 #endif

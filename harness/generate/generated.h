@@ -5,6 +5,8 @@
 // too. Compiled branches stay until the mode of the system changes. Batched runs (members of an
 // ensemble) call compiled code together, each in a lane of a function for kLanes states
 // (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a single run.
+// In each mode a member records its first branch. If another member has recorded an equal one, both
+// have the same mode and mechanism, and the member takes further branches from there.
 //
 // Compiled code receives the recorded constants. Two recordings share it if they differ in the
 // numbers of constants alone: members of an ensemble, or cases of a sweep over lengths or masses. A
@@ -24,6 +26,13 @@
 namespace loopbench::generate {
 
 class Lane;
+
+/// A recorded function and its compiled text, with the constants that the text receives.
+struct Code {
+  RecordedFunction recorded;
+  CompiledBranch compiled;
+  std::vector<double> constants;
+};
 
 template <class Space>
 class GeneratedDerivative final : public CompiledDerivative {
@@ -46,29 +55,25 @@ class GeneratedDerivative final : public CompiledDerivative {
  private:
   /// Notes time, positions and speeds of the system, which start the mode of recordings.
   void NoteStart();
-  void AddBranch(double t, std::span<const double> y);
+  /// Adds the branch at x_, of the batch or recorded.
+  void AddBranch();
   /// Puts time and state where compiled functions read them.
   void SetInputs(double t, std::span<const double> y);
-  /// A compiled text with the constants of this mechanism.
-  struct Function {
-    CompiledBranch branch = {};
-    std::shared_ptr<const std::vector<double>> constants = {};
-  };
-  bool Call(const Function& function, std::span<double> results);
-  bool CallDerivative(const Function& function, std::span<double> ydot);
-  Function Compile(const RecordedFunction& recorded, bool in_lanes);
+  bool Call(const Code& code, std::span<double> results);
+  bool CallDerivative(const Code& code, std::span<double> ydot);
+  std::shared_ptr<const Code> Compile(RecordedFunction recorded, bool in_lanes);
 
   struct Branch {
-    std::unique_ptr<const RecordedFunction> recorded;  ///< branches are swapped often
-    Function derivative;                               ///< in lanes if the run has one
-    Function jacobian = {};                            ///< compiled at its first use
-    bool has_no_jacobian = false;                      ///< it is too long
+    std::shared_ptr<const Code> derivative;     ///< in lanes if the run has one
+    std::shared_ptr<const Code> jacobian = {};  ///< compiled at its first use
+    bool has_no_jacobian = false;               ///< it is too long
   };
 
   RecordingSubject subject_;
   const Contraction contraction_;
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
+  std::vector<std::shared_ptr<const Code>>* shared_ = nullptr;  ///< by the batch, in this mode
   RecordingStart start_;
   std::vector<Branch> branches_;  ///< last used branch first
   std::vector<double> x_, room_;  ///< time and state; intermediate values

@@ -1,12 +1,11 @@
 #include "harness/generate/graph.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <initializer_list>
 #include <stdexcept>
-
-#include "harness/text/hash.h"
 
 namespace loopbench::generate {
 
@@ -243,17 +242,21 @@ int Graph::Depth(const std::vector<bool>& live, const std::vector<bool>& given) 
 }
 
 std::string Graph::Structure(const std::vector<int>& outputs) const {
-  std::string bytes;
-  const auto add = [&bytes](std::initializer_list<int> numbers) {
-    bytes.append(reinterpret_cast<const char*>(std::data(numbers)), numbers.size() * sizeof(int));
+  std::uint64_t first = 1, second = 2;
+  const auto add = [&](int a, int b) {
+    first = std::rotl(first ^ Pair(a, b), 31) * 0x9e3779b97f4a7c15u;
+    second = std::rotl(second ^ Pair(a, b), 27) * 0xc2b2ae3d27d4eb4fu;
   };
-  bytes.reserve(3 * sizeof(int) * nodes_.size());
-  for (const Node& node : nodes_) add({static_cast<int>(node.operation), node.a, node.b});
-  for (const auto& [relation, a, b, outcome] : comparisons_) {
-    add({static_cast<int>(relation), a, b, outcome});
+  for (const Node& node : nodes_) {
+    add(node.a, node.b);
+    add(static_cast<int>(node.operation), 0);
   }
-  for (const int output : outputs) add({output});
-  return harness::Digest(bytes);
+  for (const auto& [relation, a, b, outcome] : comparisons_) {
+    add(a, b);
+    add(static_cast<int>(relation), outcome ? 1 : 0);
+  }
+  for (const int output : outputs) add(output, -1);
+  return fmt::format("{:016x}{:016x}", first, second);
 }
 
 std::vector<int> Graph::Given(const std::vector<int>& outputs) const {

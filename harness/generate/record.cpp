@@ -80,6 +80,10 @@ class Recorder {
     }
     if (subject_.quantity == Quantity::kDerivative) AddStages(recorded);
     recorded.structure = graph.Structure(recorded.outputs);
+    const std::vector<double> constants = ConstantsOf(recorded);
+    recorded.key = harness::Digest(fmt::format("{} {} {:a} {}", recorded.structure, Space::kDim,
+                                               fmt::join(constants, " "),
+                                               fmt::join(mechanism_.body_names(), " ")));
     return recorded;
   }
 
@@ -200,13 +204,6 @@ class Recorder {
   VectorX<Recorded> q_, u_;
 };
 
-/// Graphs with equal keys are equal.
-std::string KeyOf(const RecordedFunction& recorded) {
-  const std::vector<double> constants = ConstantsOf(recorded);
-  return recorded.structure + harness::Digest({reinterpret_cast<const char*>(constants.data()),
-                                               constants.size() * sizeof(double)});
-}
-
 /// Comparisons behind casts are not recorded: casts to other numbers must lead to the same graph.
 void RequireNoCastDecides(const RecordedFunction& recorded, auto record_with) {
   for (const CastsAs casts : {CastsAs::kInfinity, CastsAs::kMinusInfinity}) {
@@ -215,7 +212,7 @@ void RequireNoCastDecides(const RecordedFunction& recorded, auto record_with) {
       other = record_with(casts);
     } catch (const std::exception&) {
     }
-    if (!other || KeyOf(recorded) != KeyOf(*other)) {
+    if (!other || recorded.key != other->key) {
       throw NotCovered("a number that was cast to double decides which operations follow");
     }
   }
@@ -250,12 +247,13 @@ RecordedFunction RecordAt(const RecordingSubject& subject, const RecordingStart&
   };
   RecordedFunction recorded = record(CastsAs::kNumber);
   // members of an ensemble record equal graphs, of which one is checked
+  constexpr std::size_t kMostChecked = 1000;
   thread_local std::set<std::string> checked;
-  const std::string key = fmt::format("{}{}", KeyOf(recorded), static_cast<int>(space));
-  if (checked.contains(key)) return recorded;
+  if (checked.contains(recorded.key)) return recorded;
   RequireNoCastDecides(recorded, record);
   RequireNoTurns(recorded, space);
-  checked.insert(key);
+  if (checked.size() >= kMostChecked) checked.clear();
+  checked.insert(recorded.key);
   return recorded;
 }
 

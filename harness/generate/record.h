@@ -65,6 +65,7 @@ struct RecordedFunction {
   std::vector<int> carried_speeds;   ///< of the state, indices into u
   Stages stages;                     ///< of dy/dt alone
   std::string structure;             ///< Graph::Structure() of the outputs
+  std::string key;                   ///< functions of a mechanism with equal keys are equal
 };
 
 /// Records the subject's quantity at time t and `state`: positions, then speeds, and works where

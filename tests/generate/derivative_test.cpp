@@ -114,8 +114,8 @@ class Library {
     return ydot;
   }
   /// A state near the start that is off the constraints, as a trial step is.
-  std::vector<double> Near(double size) const {
-    std::mt19937 numbers(1);
+  std::vector<double> Near(double size, unsigned seed = 1) const {
+    std::mt19937 numbers(seed);
     std::uniform_real_distribution<double> shift(-size, size);
     std::vector<double> y = y_;
     for (double& number : y) number += shift(numbers);
@@ -273,14 +273,17 @@ void ExpectBitsOfTheGraph(const std::string& name, const std::string& formulatio
   Library<Space> library(Shipped(name), formulation, level);
   const RecordedFunction recorded = RecordWith(library.subject(), library.start(), true);
   const CompiledBranch branch = CompileShared(recorded);
-  const std::vector<double> constants = ConstantsOf(recorded), y = library.Near(1e-6);
-  std::vector<double> x = {0.25};
-  x.insert(x.end(), y.begin(), y.end());
-  std::vector<double> ydot(y.size()), room(static_cast<std::size_t>(branch.room));
-  EXPECT_EQ(branch.function(x.data(), constants.data(), ydot.data(), room.data()), 1);
-  bool ok = true;
-  ExpectSameBits(ydot, Evaluate(recorded, x, &ok));
-  EXPECT_TRUE(ok);
+  const std::vector<double> constants = ConstantsOf(recorded);
+  std::vector<double> room(static_cast<std::size_t>(branch.room));
+  for (unsigned state = 0; state < 100; ++state) {
+    const std::vector<double> y = library.Near(1e-4, state);
+    std::vector<double> x = {0.25}, ydot(y.size());
+    x.insert(x.end(), y.begin(), y.end());
+    EXPECT_EQ(branch.function(x.data(), constants.data(), ydot.data(), room.data()), 1);
+    bool ok = true;
+    ExpectSameBits(ydot, Evaluate(recorded, x, &ok));
+    EXPECT_TRUE(ok);
+  }
 }
 
 /// Bennett's linkage: its sums and differences of products tempt compilers to fuse them.

@@ -186,8 +186,8 @@ CompiledBranch CompileBranch(const std::string& key, const std::function<std::st
   const std::string place = fmt::format("{}{}\n{}", how, cache ? cache->string() : "", key);
   const auto known = loaded.find(place);
   if (known != loaded.end()) return known->second;
-  const std::string text = print();
-  return loaded[place] = CompileOrFind(text, flags, harness::Digest(how + text), cache);
+  const std::string text = print(), all = how + text;
+  return loaded[place] = CompileOrFind(text, flags, Fnv1a(all) + Fnv1a(Fnv1a(all) + all), cache);
 }
 
 }  // namespace loopbench::generate

@@ -58,6 +58,8 @@ class LaneCalls final : public Together {
 
   /// Branches of one mode of one mechanism, by the key of the first.
   std::vector<std::shared_ptr<const Code>>& Shared(const std::string& key) { return shared_[key]; }
+  /// The code of equal recordings in all modes, which lanes evaluate together; null at first.
+  std::shared_ptr<const Code>& CodeOf(const std::string& key) { return codes_[key]; }
 
   void Want(int lane, const Code& wanted, std::span<const double> x, std::span<double> y) {
     const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
@@ -102,6 +104,7 @@ class LaneCalls final : public Together {
   std::array<Call, kLanes> calls_;
   std::vector<Lanes> x_, y_, w_;
   std::map<std::string, std::vector<std::shared_ptr<const Code>>> shared_;
+  std::map<std::string, std::shared_ptr<const Code>> codes_;
 };
 
 }  // namespace
@@ -188,12 +191,12 @@ void GeneratedDerivative<Space>::AddBranch() {
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
-  if (lane_ != nullptr && shared_ == nullptr) {
-    shared_ = &lane_->calls().Shared(recorded.key);
-    if (!shared_->empty()) return add(shared_->front());
-  }
-  add(Compile(std::move(recorded), lane_ != nullptr));
-  if (shared_ != nullptr) shared_->push_back(branches_.front().derivative);
+  if (lane_ == nullptr) return add(Compile(std::move(recorded), false));
+  if (shared_ == nullptr) shared_ = &lane_->calls().Shared(recorded.key);
+  std::shared_ptr<const Code>& code = lane_->calls().CodeOf(recorded.key);
+  if (code == nullptr) code = Compile(std::move(recorded), true);
+  if (std::ranges::find(*shared_, code) == shared_->end()) shared_->push_back(code);
+  add(code);
 }
 
 template <class Space>

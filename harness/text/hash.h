@@ -30,13 +30,4 @@ inline std::string Fnv1a(std::string_view bytes) {
   return hash.Text();
 }
 
-/// Returns 32 hexadecimal digits, for data that are never compared themselves.
-inline std::string Digest(std::string_view bytes) {
-  const std::string first = Fnv1a(bytes);
-  FnvHash second;
-  second.Add(first);
-  second.Add(bytes);
-  return first + second.Text();
-}
-
 }  // namespace loopbench::harness

@@ -171,7 +171,8 @@ CompiledBranch CompileOrFind(const std::string& text, const std::vector<std::str
 
 }  // namespace
 
-CompiledBranch CompileBranch(const std::string& text, Contraction contraction) {
+CompiledBranch CompileBranch(const std::string& key, const std::function<std::string()>& print,
+                             Contraction contraction) {
   static std::mutex mutex;
   static std::map<std::string, CompiledBranch> loaded;
   const std::lock_guard lock(mutex);
@@ -179,14 +180,14 @@ CompiledBranch CompileBranch(const std::string& text, Contraction contraction) {
   const std::string words = fmt::format("{}", fmt::join(Compiler(), " "));
   if (!versions.contains(words)) versions[words] = RunCompiler({"--version"});
   const std::vector<std::string> flags = Flags(contraction);
-  const std::string all =
-      fmt::format("{}\n{}\n{}\n{}", words, versions[words], fmt::join(flags, " "), text);
-  const std::string name = Fnv1a(all) + Fnv1a(Fnv1a(all) + all);
+  const std::string how =
+      fmt::format("{}\n{}\n{}\n", words, versions[words], fmt::join(flags, " "));
   const std::optional<fs::path> cache = CacheFolder();
-  const std::string place = cache ? (*cache / name).string() : name;
+  const std::string place = fmt::format("{}{}\n{}", how, cache ? cache->string() : "", key);
   const auto known = loaded.find(place);
   if (known != loaded.end()) return known->second;
-  return loaded[place] = CompileOrFind(text, flags, name, cache);
+  const std::string text = print(), all = how + text;
+  return loaded[place] = CompileOrFind(text, flags, Fnv1a(all) + Fnv1a(Fnv1a(all) + all), cache);
 }
 
 }  // namespace loopbench::generate

@@ -6,6 +6,7 @@
 // a file with a wrong checksum, is rejected. If the folder cannot be made, nothing is kept.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,9 @@ namespace loopbench::generate {
 
 inline constexpr int kCompilerSeconds = 120;
 
+// Without -fno-tree-slp-vectorize, GCC 12 fuses multiply-add even with -ffp-contract=off.
 inline constexpr const char* kCompilerFlags[] = {
-    "-std=c99",         "-O2", "-fPIC", "-shared", "-fno-math-errno",
+    "-std=c99",         "-O2", "-fPIC", "-shared", "-fno-math-errno", "-fno-tree-slp-vectorize",
 #ifdef __AVX2__  // this program needs as much
     "-march=x86-64-v3",
 #endif
@@ -33,11 +35,13 @@ std::string RunCompiler(const std::vector<std::string>& arguments);
 
 /// The function that a text defines (print_c.h); it stays loaded until the process ends.
 struct CompiledBranch {
-  int (*function)(const double* x, double* y, double* w) = nullptr;
+  int (*function)(const double* x, const double* c, double* y, double* w) = nullptr;
   int room = 0;  ///< numbers that w has room for
 };
 
+/// Compiles the text that `print` returns; `key` names it within the process, which prints it once.
 /// Throws NotCovered (record.h) if there is no compiler, if it fails, or if the cache is rejected.
-CompiledBranch CompileBranch(const std::string& text, Contraction contraction = Contraction::kNone);
+CompiledBranch CompileBranch(const std::string& key, const std::function<std::string()>& print,
+                             Contraction contraction = Contraction::kNone);
 
 }  // namespace loopbench::generate

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <map>
 
 #include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
@@ -55,33 +56,37 @@ class LaneCalls final : public Together {
   }
   void GiveBack(int lane) { taken_[lane] = false; }
 
-  void Want(int lane, const CompiledBranch& wanted, std::span<const double> x,
-            std::span<double> y) {
+  /// Branches of one mode of one mechanism, by the key of the first.
+  std::vector<std::shared_ptr<const Code>>& Shared(const std::string& key) { return shared_[key]; }
+  /// The code of equal recordings in all modes, which lanes evaluate together; null at first.
+  std::shared_ptr<const Code>& CodeOf(const std::string& key) { return codes_[key]; }
+
+  void Want(int lane, const Code& wanted, std::span<const double> x, std::span<double> y) {
     const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
       if (numbers.size() < size) numbers.resize(size);
     };
     grow(x_, x.size());
     grow(y_, y.size());
-    grow(w_, static_cast<std::size_t>(wanted.room));
-    calls_[lane] = {wanted.function, x, y};
+    grow(w_, static_cast<std::size_t>(wanted.compiled.room));
+    calls_[lane] = {&wanted, x, y};
   }
   bool Held(int lane) const { return calls_[lane].held; }
 
   void Do() noexcept override {
     for (const Call& first : calls_) {
-      const auto function = first.function;
-      if (function == nullptr) continue;
+      const Code* code = first.code;
+      if (code == nullptr) continue;
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (calls_[lane].function != function) continue;
+        if (calls_[lane].code != code) continue;
         for (std::size_t i = 0; i < calls_[lane].x.size(); ++i) x_[i][lane] = calls_[lane].x[i];
       }
-      const int held =
-          function(reinterpret_cast<const double*>(x_.data()), reinterpret_cast<double*>(y_.data()),
-                   reinterpret_cast<double*>(w_.data()));
+      const int held = code->compiled.function(
+          reinterpret_cast<const double*>(x_.data()), code->constants.data(),
+          reinterpret_cast<double*>(y_.data()), reinterpret_cast<double*>(w_.data()));
       for (int lane = 0; lane < kLanes; ++lane) {
         Call& call = calls_[lane];
-        if (call.function != function) continue;
-        call.function = nullptr;
+        if (call.code != code) continue;
+        call.code = nullptr;
         call.held = (held >> lane & 1) != 0;
         for (std::size_t i = 0; i < call.y.size(); ++i) call.y[i] = y_[i][lane];
       }
@@ -90,7 +95,7 @@ class LaneCalls final : public Together {
 
  private:
   struct Call {
-    decltype(CompiledBranch::function) function = nullptr;  ///< null if none waits
+    const Code* code = nullptr;  ///< null if none waits
     std::span<const double> x;
     std::span<double> y;
     bool held = false;  ///< all comparisons, in the last call
@@ -98,6 +103,8 @@ class LaneCalls final : public Together {
   std::array<bool, kLanes> taken_{};
   std::array<Call, kLanes> calls_;
   std::vector<Lanes> x_, y_, w_;
+  std::map<std::string, std::vector<std::shared_ptr<const Code>>> shared_;
+  std::map<std::string, std::shared_ptr<const Code>> codes_;
 };
 
 }  // namespace
@@ -116,9 +123,11 @@ class Lane {
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
+  LaneCalls& calls() { return calls_; }
+
   /// Returns false if a comparison differs from its recorded outcome.
-  bool Call(const CompiledBranch& function, std::span<const double> x, std::span<double> y) {
-    calls_.Want(lane_, function, x, y);
+  bool Call(const Code& code, std::span<const double> x, std::span<double> y) {
+    calls_.Want(lane_, code, x, y);
     beside_.Meet();
     return calls_.Held(lane_);
   }
@@ -143,14 +152,15 @@ GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
       contraction_(contraction),
       system_(system),
       lane_(Lane::Take(system.options().beside)) {
+  subject_.keeps_numbers = true;
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
   NoteStart();
   misses_left_ = kFirstMisses;
-  std::vector<double> y(x_.size() - 1);
-  system.ToState(start_.q, start_.u, y);
+  x_[0] = start_.t;
+  system.ToState(start_.q, start_.u, std::span(x_).subspan(1));
   const Timer timer(seconds_);
-  AddBranch(start_.t, y);
+  AddBranch();
 }
 
 template <class Space>
@@ -164,45 +174,63 @@ void GeneratedDerivative<Space>::NoteStart() {
 }
 
 template <class Space>
-void GeneratedDerivative<Space>::AddBranch(double t, std::span<const double> y) {
-  RecordedFunction recorded = RecordFunction(subject_, start_, t, {y.begin(), y.end()});
+void GeneratedDerivative<Space>::AddBranch() {
+  const auto holds = [&](const std::shared_ptr<const Code>& code) {
+    return code->recorded.graph.Holds(code->recorded.graph.Values(x_));
+  };
+  const auto add = [&](std::shared_ptr<const Code> code) {
+    branches_.insert(branches_.begin(), Branch{std::move(code)});
+  };
+  if (shared_ != nullptr) {
+    const auto known = std::ranges::find_if(*shared_, holds);
+    if (known != shared_->end()) return add(*known);
+  }
+  RecordedFunction recorded = RecordFunction(subject_, start_, x_[0], {x_.begin() + 1, x_.end()});
   for (int i = 0; i < system_.num_state_speeds(); ++i) {
     if (system_.state_speed(i) != recorded.carried_speeds[static_cast<std::size_t>(i)]) {
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
-  RequireShort(recorded);
-  const CompiledBranch derivative =
-      lane_ ? CompileBranch(PrintLanes(recorded, kLanes), contraction_) : Compile(recorded);
-  branches_.insert(branches_.begin(),
-                   Branch{std::make_unique<RecordedFunction>(std::move(recorded)), derivative});
+  if (lane_ == nullptr) return add(Compile(std::move(recorded), false));
+  if (shared_ == nullptr) shared_ = &lane_->calls().Shared(recorded.key);
+  std::shared_ptr<const Code>& code = lane_->calls().CodeOf(recorded.key);
+  if (code == nullptr) code = Compile(std::move(recorded), true);
+  if (std::ranges::find(*shared_, code) == shared_->end()) shared_->push_back(code);
+  add(code);
 }
 
 template <class Space>
-CompiledBranch GeneratedDerivative<Space>::Compile(const RecordedFunction& recorded) {
-  RequireShort(recorded);
-  const CompiledBranch function = CompileBranch(PrintLibrary(recorded), contraction_);
-  room_.resize(std::max(room_.size(), static_cast<std::size_t>(function.room)));
-  return function;
+std::shared_ptr<const Code> GeneratedDerivative<Space>::Compile(RecordedFunction recorded,
+                                                                bool in_lanes) {
+  const auto print = [&] {
+    RequireShort(recorded);
+    return in_lanes ? PrintLanes(recorded, kLanes) : PrintLibrary(recorded);
+  };
+  const CompiledBranch compiled =
+      CompileBranch(recorded.structure + (in_lanes ? " in lanes" : ""), print, contraction_);
+  room_.resize(std::max(room_.size(), static_cast<std::size_t>(compiled.room)));
+  std::vector<double> constants = ConstantsOf(recorded);
+  return std::make_shared<Code>(Code{std::move(recorded), compiled, std::move(constants)});
 }
 
 template <class Space>
 void GeneratedDerivative<Space>::ModeChanged() {
   const Timer timer(seconds_);  // graphs are large
   branches_.clear();
+  shared_ = nullptr;
   NoteStart();
   attempts_ = misses_left_ = 0;  // the next evaluation is recorded
 }
 
 template <class Space>
-bool GeneratedDerivative<Space>::Call(const CompiledBranch& function, std::span<double> results) {
-  return function.function(x_.data(), results.data(), room_.data()) != 0;
+bool GeneratedDerivative<Space>::Call(const Code& code, std::span<double> results) {
+  return code.compiled.function(x_.data(), code.constants.data(), results.data(), room_.data()) !=
+         0;
 }
 
 template <class Space>
-bool GeneratedDerivative<Space>::CallDerivative(const CompiledBranch& function,
-                                                std::span<double> ydot) {
-  return lane_ ? lane_->Call(function, x_, ydot.first(x_.size() - 1)) : Call(function, ydot);
+bool GeneratedDerivative<Space>::CallDerivative(const Code& code, std::span<double> ydot) {
+  return lane_ ? lane_->Call(code, x_, ydot.first(x_.size() - 1)) : Call(code, ydot);
 }
 
 template <class Space>
@@ -217,7 +245,7 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
   if (y.size() + 1 != x_.size() || ydot.size() < y.size()) return false;
   SetInputs(t, y);
   for (std::size_t i = 0; i < branches_.size(); ++i) {
-    if (!CallDerivative(branches_[i].derivative, ydot)) continue;
+    if (!CallDerivative(*branches_[i].derivative, ydot)) continue;
     if (i > 0) std::swap(branches_[0], branches_[i]);
     return true;
   }
@@ -226,7 +254,7 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
   misses_left_ = kFirstMisses << std::min(++attempts_, kMostDoublings);
   const Timer timer(seconds_);
   try {
-    AddBranch(t, y);
+    AddBranch();
   } catch (const NotCovered&) {
     return false;  // it counts as a miss
   }
@@ -239,22 +267,24 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
   if (y.size() + 1 != x_.size()) return false;
   SetInputs(t, y);
   for (Branch& branch : branches_) {
-    const bool is_known = branch.jacobian.function != nullptr || branch.has_no_jacobian;
-    if (!is_known && branch.recorded->graph.Holds(branch.recorded->graph.Values(x_))) {
+    const RecordedFunction& recorded = branch.derivative->recorded;
+    const bool is_known = branch.jacobian != nullptr || branch.has_no_jacobian;
+    if (!is_known && recorded.graph.Holds(recorded.graph.Values(x_))) {
       const Timer timer(seconds_);
-      const std::vector<int>& inputs = branch.recorded->inputs;
+      const std::vector<int>& inputs = recorded.inputs;
       const auto columns = static_cast<std::ptrdiff_t>(jacobian.size() / y.size());
-      RecordedFunction function = *branch.recorded;
-      function.outputs = Differentiate(function.graph, branch.recorded->outputs,
+      RecordedFunction function = recorded;
+      function.outputs = Differentiate(function.graph, recorded.outputs,
                                        {inputs.begin() + 1, inputs.begin() + 1 + columns},
                                        function.graph.Values(x_));
+      function.structure = function.graph.Structure(function.outputs);
       try {
-        branch.jacobian = Compile(function);
+        branch.jacobian = Compile(std::move(function), false);
       } catch (const NotCovered&) {
         branch.has_no_jacobian = true;
       }
     }
-    if (branch.jacobian.function != nullptr && Call(branch.jacobian, jacobian)) return true;
+    if (branch.jacobian != nullptr && Call(*branch.jacobian, jacobian)) return true;
   }
   ++misses_;
   return false;

@@ -5,6 +5,13 @@
 // too. Compiled branches stay until the mode of the system changes. Batched runs (members of an
 // ensemble) call compiled code together, each in a lane of a function for kLanes states
 // (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a single run.
+// In each mode a member records its first branch. If another member has recorded an equal one, both
+// have the same mode and mechanism, and the member takes further branches from there.
+//
+// Compiled code receives the recorded constants. Two recordings share it if they differ in the
+// numbers of constants alone: members of an ensemble, or cases of a sweep over lengths or masses. A
+// number that is 0 or 1 simplifies the graph of its own mechanism only, which then has its own
+// code.
 #pragma once
 
 #include <memory>
@@ -19,6 +26,13 @@
 namespace loopbench::generate {
 
 class Lane;
+
+/// A recorded function and its compiled text, with the constants that the text receives.
+struct Code {
+  RecordedFunction recorded;
+  CompiledBranch compiled;
+  std::vector<double> constants;
+};
 
 template <class Space>
 class GeneratedDerivative final : public CompiledDerivative {
@@ -41,24 +55,25 @@ class GeneratedDerivative final : public CompiledDerivative {
  private:
   /// Notes time, positions and speeds of the system, which start the mode of recordings.
   void NoteStart();
-  void AddBranch(double t, std::span<const double> y);
+  /// Adds the branch at x_, of the batch or recorded.
+  void AddBranch();
   /// Puts time and state where compiled functions read them.
   void SetInputs(double t, std::span<const double> y);
-  bool Call(const CompiledBranch& function, std::span<double> results);
-  bool CallDerivative(const CompiledBranch& function, std::span<double> ydot);
-  CompiledBranch Compile(const RecordedFunction& recorded);
+  bool Call(const Code& code, std::span<double> results);
+  bool CallDerivative(const Code& code, std::span<double> ydot);
+  std::shared_ptr<const Code> Compile(RecordedFunction recorded, bool in_lanes);
 
   struct Branch {
-    std::unique_ptr<const RecordedFunction> recorded;  ///< branches are swapped often
-    CompiledBranch derivative;                         ///< in lanes if the run has one
-    CompiledBranch jacobian = {};                      ///< compiled at its first use
-    bool has_no_jacobian = false;                      ///< it is too long
+    std::shared_ptr<const Code> derivative;     ///< in lanes if the run has one
+    std::shared_ptr<const Code> jacobian = {};  ///< compiled at its first use
+    bool has_no_jacobian = false;               ///< it is too long
   };
 
   RecordingSubject subject_;
   const Contraction contraction_;
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
+  std::vector<std::shared_ptr<const Code>>* shared_ = nullptr;  ///< by the batch, in this mode
   RecordingStart start_;
   std::vector<Branch> branches_;  ///< last used branch first
   std::vector<double> x_, room_;  ///< time and state; intermediate values

@@ -1,5 +1,7 @@
 #include "harness/generate/graph.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -124,7 +126,7 @@ int Graph::Input() {
 int Graph::Constant(double value) {
   const auto [at, is_new] =
       constants_.try_emplace(std::bit_cast<std::uint64_t>(value), static_cast<int>(nodes_.size()));
-  if (is_new) nodes_.push_back({Operation::kConstant, -1, -1, value});
+  if (is_new) nodes_.push_back({Operation::kConstant, -1, -1, value, true});
   return at->second;
 }
 
@@ -133,12 +135,17 @@ int Graph::Append(Operation operation, int a, int b) {
   if (commutes && a > b) std::swap(a, b);
   const auto [at, is_new] =
       seen_[static_cast<int>(operation)].try_emplace(Pair(a, b), static_cast<int>(nodes_.size()));
-  if (is_new) nodes_.push_back({operation, a, b});
+  if (!is_new) return at->second;
+  const bool is_known = IsKnown(a) && (b < 0 || IsKnown(b));
+  const double other = b < 0 ? 0.0 : nodes_[b].value;
+  nodes_.push_back(
+      {operation, a, b, is_known ? Value(operation, nodes_[a].value, other) : 0.0, is_known});
   return at->second;
 }
 
 int Graph::Make(Operation operation, int a, int b) {
-  if (IsConstant(a) && (b < 0 || IsConstant(b) || operation == Operation::kPoseCos)) {
+  const auto folds = [&](int node) { return IsConstant(node) && Folds(nodes_[node].value); };
+  if (folds(a) && (b < 0 || folds(b) || operation == Operation::kPoseCos)) {
     return Constant(Value(operation, nodes_[a].value, b < 0 ? 0.0 : nodes_[b].value));
   }
   const auto negated = [&](int node) { return nodes_[node].operation == Operation::kNegate; };
@@ -188,7 +195,7 @@ int Graph::Make(Operation operation, int a, int b) {
 }
 
 void Graph::Compare(Relation relation, int a, int b, bool outcome) {
-  if (IsConstant(a) && IsConstant(b)) return;
+  if (IsKnown(a) && IsKnown(b)) return;
   if (a == b && relation == Relation::kLess) return;  // false of any number
   std::uint8_t& known = compared_[Pair(a, b)][static_cast<std::size_t>(relation)];
   if (known != 0) return;  // recorded before
@@ -223,7 +230,7 @@ int Graph::Depth(const std::vector<bool>& live, const std::vector<bool>& given) 
   std::vector<int> depth(nodes_.size());
   int deepest = 0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
-    const auto& [operation, a, b, value] = nodes_[node];
+    const auto& [operation, a, b, value, is_known] = nodes_[node];
     // a cosine waits for the angle, not for the paired sine
     const int before =
         std::max(a >= 0 ? depth[a] : 0, b >= 0 && operation != Operation::kPoseCos ? depth[b] : 0);
@@ -232,6 +239,40 @@ int Graph::Depth(const std::vector<bool>& live, const std::vector<bool>& given) 
     if (live[node]) deepest = std::max(deepest, depth[node]);
   }
   return deepest;
+}
+
+std::string Graph::Structure(const std::vector<int>& outputs) const {
+  std::uint64_t first = 1, second = 2;
+  const auto add = [&](int a, int b) {
+    first = std::rotl(first ^ Pair(a, b), 31) * 0x9e3779b97f4a7c15u;
+    second = std::rotl(second ^ Pair(a, b), 27) * 0xc2b2ae3d27d4eb4fu;
+  };
+  for (const Node& node : nodes_) {
+    add(node.a, node.b);
+    add(static_cast<int>(node.operation), 0);
+  }
+  for (const auto& [relation, a, b, outcome] : comparisons_) {
+    add(a, b);
+    add(static_cast<int>(relation), outcome ? 1 : 0);
+  }
+  for (const int output : outputs) add(output, -1);
+  return fmt::format("{:016x}{:016x}", first, second);
+}
+
+std::vector<int> Graph::Given(const std::vector<int>& outputs) const {
+  std::vector<bool> used(nodes_.size());
+  for (const int node : outputs) used[node] = true;
+  for (const Comparison& comparison : comparisons_) used[comparison.a] = used[comparison.b] = true;
+  for (const Node& node : nodes_) {
+    if (node.is_known) continue;
+    if (node.a >= 0) used[node.a] = true;
+    if (node.b >= 0) used[node.b] = true;
+  }
+  std::vector<int> given;
+  for (int node = 0; node < std::ssize(nodes_); ++node) {
+    if (used[node] && IsKnown(node)) given.push_back(node);
+  }
+  return given;
 }
 
 void Graph::ForgetZeroTests() {
@@ -245,10 +286,10 @@ std::vector<double> Graph::Values(const std::vector<double>& inputs) const {
   std::vector<double> values(nodes_.size());
   std::size_t input = 0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
-    const auto& [operation, a, b, value] = nodes_[node];
+    const auto& [operation, a, b, value, is_known] = nodes_[node];
     if (operation == Operation::kInput) {
       values[node] = inputs[input++];
-    } else if (operation == Operation::kConstant) {
+    } else if (is_known) {
       values[node] = value;
     } else {
       values[node] = Value(operation, values[a], b >= 0 ? values[b] : 0.0);

@@ -40,6 +40,10 @@ inline void PoseLaneSines(const double* angles, double* sines, double* cosines) 
 // constants are folded, x + 0, x * 1 and x / 1 are x, x * 0 is 0, negations move outwards, equal
 // operations on equal operands are one node. No division becomes a multiplication and no sum is
 // reordered. x - x stays: it tests whether x is finite.
+//
+// A graph that keeps its numbers folds constants only if they are 0, 1 or -1. Operations on other
+// constants remain nodes, known at the recording. Rounding then decides no operation: mechanisms
+// with other masses or lengths have the same graph with other numbers.
 
 enum class Operation : std::uint8_t {
   kInput,
@@ -72,8 +76,9 @@ enum class Relation : std::uint8_t { kLess, kLessEqual, kEqual };
 
 struct Node {
   Operation operation;
-  int a = -1, b = -1;  ///< operands, earlier nodes; -1: none
-  double value = 0.0;  ///< of a constant
+  int a = -1, b = -1;     ///< operands, earlier nodes; -1: none
+  double value = 0.0;     ///< if known
+  bool is_known = false;  ///< a constant, or an operation on known nodes
 };
 
 /// A comparison of nodes, with its recorded outcome.
@@ -106,6 +111,8 @@ struct OperationCounts {
 
 class Graph {
  public:
+  explicit Graph(bool keeps_numbers = false) : keeps_numbers_(keeps_numbers) {}
+
   int Input();
   int Constant(double value);
   /// The node of an operation after simplification; `b` is -1 for functions of one operand.
@@ -114,6 +121,8 @@ class Graph {
 
   /// Returns true if the node's value is constant.
   bool IsConstant(int node) const { return nodes_[node].operation == Operation::kConstant; }
+  /// Returns true if an operation on constants with this value among others is folded.
+  bool Folds(double value) const { return !keeps_numbers_ || value == 0 || std::abs(value) == 1; }
   bool Is(int node, double value) const { return IsConstant(node) && nodes_[node].value == value; }
 
   const std::vector<Node>& nodes() const { return nodes_; }
@@ -125,6 +134,12 @@ class Graph {
   OperationCounts Count(const std::vector<bool>& live) const;
   /// Operations on the longest path to one of the nodes, from inputs or `given` nodes on.
   int Depth(const std::vector<bool>& live, const std::vector<bool>& given = {}) const;
+
+  /// Returns a digest of operations, comparisons and `outputs`, without the numbers of constants.
+  /// Graphs of equal structure have one text of code (print_c.h) and the same Given() nodes.
+  std::string Structure(const std::vector<int>& outputs) const;
+  /// Known nodes that outputs, comparisons or nodes with unknown values use, ascending.
+  std::vector<int> Given(const std::vector<int>& outputs) const;
 
   /// Forgets tests for exactly zero that found another number. Texts skip work or a division there.
   /// Without the test the result is equal except for rounding, or not finite.
@@ -139,8 +154,10 @@ class Graph {
   OperationCounts as_run;
 
  private:
+  bool IsKnown(int node) const { return nodes_[node].is_known; }
   int Append(Operation operation, int a, int b);
 
+  bool keeps_numbers_;
   std::vector<Node> nodes_;
   std::vector<Comparison> comparisons_;
   int num_inputs_ = 0;

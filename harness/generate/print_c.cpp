@@ -92,21 +92,32 @@ const char* FunctionName(Operation operation) {
   }
 }
 
+enum class Form { kLiterals, kConstants, kLanes };  // the last two receive constants
+
 class Printer {
  public:
-  Printer(const RecordedFunction& recorded, const std::string& name, bool has_lanes = false)
-      : has_lanes_(has_lanes),
-        number_(has_lanes ? "number" : "double"),
+  Printer(const RecordedFunction& recorded, const std::string& name, Form form)
+      : form_(form),
+        has_lanes_(form == Form::kLanes),
+        number_(has_lanes_ ? "number" : "double"),
+        parameters_(fmt::format("const {0}* x, {1}{0}* y, {0}* w", number_,
+                                form == Form::kLiterals ? "" : "const double* c, ")),
+        arguments_(form == Form::kLiterals ? "x, y, w" : "x, c, y, w"),
         graph_(recorded.graph),
         outputs_(recorded.outputs),
         name_(name),
-        function_(graph_.nodes().size(), 0) {
+        function_(graph_.nodes().size(), 0),
+        places_(graph_.nodes().size(), -1) {
     live_ = graph_.Live(outputs_, true);
     results_.resize(graph_.nodes().size());
     tests_.resize(graph_.nodes().size());
     for (std::size_t i = 0; i < outputs_.size(); ++i) results_[outputs_[i]].push_back(i);
     for (const Comparison& comparison : graph_.comparisons()) {
       tests_[std::max(comparison.a, comparison.b)].push_back(&comparison);
+    }
+    if (form != Form::kLiterals) {
+      const std::vector<int> given = graph_.Given(outputs_);
+      for (std::size_t i = 0; i < given.size(); ++i) places_[given[i]] = static_cast<int>(i);
     }
     AssignFunctions();
     AssignRoom();
@@ -123,15 +134,14 @@ class Printer {
       }
       text_ += "  return ok;\n}\n";
     }
-    fmt::format_to(std::back_inserter(text_),
-                   "static {0} {1}(const {2}* x, {2}* y, {2}* w) {{\n  {3}", Truth(), name_,
-                   number_, has_lanes_ ? "holds ok = " : "return ");
+    fmt::format_to(std::back_inserter(text_), "static {0} {1}({2}) {{\n  {3}", Truth(), name_,
+                   parameters_, has_lanes_ ? "holds ok = " : "return ");
     for (int function = 0; function < num_functions_; ++function) {
-      fmt::format_to(std::back_inserter(text_), "{}{}_part{}(x, y, w)",
+      fmt::format_to(std::back_inserter(text_), "{}{}_part{}({})",
                      function == 0 ? ""
                      : has_lanes_  ? ";\n  ok &= "
                                    : " &&\n         ",
-                     name_, function);
+                     name_, function, arguments_);
     }
     text_ += has_lanes_ ? ";\n  return ok;\n}\n" : ";\n}\n";
     return std::move(text_);
@@ -147,13 +157,16 @@ class Printer {
         operations = 0;
         ++function;
       }
-      if (live_[node] && operation > Operation::kConstant) ++operations;
+      if (live_[node] && IsVariable(static_cast<int>(node))) ++operations;
       function_[node] = function;
     }
     num_functions_ = function + 1;
   }
 
-  bool IsVariable(int node) const { return graph_.nodes()[node].operation > Operation::kConstant; }
+  bool IsVariable(int node) const {
+    const Node& of = graph_.nodes()[node];
+    return of.operation > Operation::kConstant && !of.is_known;
+  }
 
   /// A place in w for each value that another function uses.
   void AssignRoom() {
@@ -171,10 +184,10 @@ class Printer {
   }
 
   void Open(int function) {
-    fmt::format_to(std::back_inserter(text_),
-                   "static {0} {1}_part{2}(const {3}* x, {3}* y, {3}* w) {{\n"
-                   "  {0} ok = {4};\n  (void)x, (void)y, (void)w;\n",
-                   Truth(), name_, function, number_, has_lanes_ ? "~(holds){0}" : "1");
+    fmt::format_to(
+        std::back_inserter(text_),
+        "static {0} {1}_part{2}({3}) {{\n  {0} ok = {4};\n  (void)x, (void)y, (void)w;\n", Truth(),
+        name_, function, parameters_, has_lanes_ ? "~(holds){0}" : "1");
   }
 
   const char* Truth() const { return has_lanes_ ? "holds" : "int"; }
@@ -182,28 +195,28 @@ class Printer {
   /// Returns the name of a node in a function.
   std::string Name(int node, int function) const {
     const Node& of = graph_.nodes()[node];
-    if (of.operation == Operation::kConstant) return Literal(of.value);
-    if (of.operation == Operation::kInput) return fmt::format("x[{}]", inputs_[node]);
+    if (of.is_known) {
+      return form_ == Form::kLiterals ? Literal(of.value) : fmt::format("c[{}]", places_[node]);
+    }
+    if (of.operation == Operation::kInput) return fmt::format("x[{}]", places_[node]);
     if (function_[node] != function) return fmt::format("w[{}]", room_[node]);
     return fmt::format("v{}", node);
   }
 
   /// Does the same for constants without a number.
   std::string Whole(int node, int function) const {
-    const bool is_constant = graph_.nodes()[node].operation == Operation::kConstant;
     const std::string name = Name(node, function);
-    return has_lanes_ && is_constant ? fmt::format("ALL({})", name) : name;
+    return has_lanes_ && graph_.nodes()[node].is_known ? fmt::format("ALL({})", name) : name;
   }
 
   void Print(int node, int function, int* input) {
     const auto out = std::back_inserter(text_);
     const Node& of = graph_.nodes()[node];
-    inputs_.resize(static_cast<std::size_t>(node) + 1, -1);
-    if (of.operation == Operation::kInput) inputs_[node] = (*input)++;
+    if (of.operation == Operation::kInput) places_[node] = (*input)++;
     if (!live_[node]) return;
     const auto a = [&] { return Name(of.a, function); };
     const auto b = [&] { return Name(of.b, function); };
-    switch (of.operation) {
+    switch (of.is_known ? Operation::kConstant : of.operation) {
       case Operation::kInput:
       case Operation::kConstant:
         break;
@@ -246,15 +259,17 @@ class Printer {
     }
   }
 
+  const Form form_;
   const bool has_lanes_;
   const char* const number_;  ///< its type in C
+  const std::string parameters_, arguments_;
   const Graph& graph_;
   const std::vector<int>& outputs_;
   const std::string name_;
   std::vector<bool> live_;
   std::vector<std::vector<std::size_t>> results_;      ///< indices of outputs, by node
   std::vector<std::vector<const Comparison*>> tests_;  ///< by their later node
-  std::vector<int> function_, room_, inputs_;          ///< by node
+  std::vector<int> function_, room_, places_;          ///< by node
   int num_functions_ = 0, num_room_ = 0;
   std::string text_;
 };
@@ -262,29 +277,38 @@ class Printer {
 }  // namespace
 
 std::string PrintFunction(const RecordedFunction& recorded, const std::string& name, int* room) {
-  Printer printer(recorded, name);
+  Printer printer(recorded, name, Form::kLiterals);
   *room = printer.room();
   return printer.Text();
 }
 
 std::string PrintLibrary(const RecordedFunction& recorded) {
-  int room = 0;
-  const std::string function = PrintFunction(recorded, "function", &room);
+  Printer printer(recorded, "function", Form::kConstants);
   return fmt::format(R"(#include <math.h>
 static void (*sines)(double, double*, double*);
 void loopbench_use_sines(void (*of_pose)(double, double*, double*)) {{ sines = of_pose; }}
 {}{}const int loopbench_room = {};
-int loopbench_function(const double* x, double* y, double* w) {{ return function(x, y, w); }}
+int loopbench_function(const double* x, const double* c, double* y, double* w) {{
+  return function(x, c, y, w);
+}}
 )",
-                     kPrintedHelpers, function, room);
+                     kPrintedHelpers, printer.Text(), printer.room());
+}
+
+std::vector<double> ConstantsOf(const RecordedFunction& recorded) {
+  std::vector<double> constants;
+  for (const int node : recorded.graph.Given(recorded.outputs)) {
+    constants.push_back(recorded.graph.nodes()[node].value);
+  }
+  return constants;
 }
 
 std::string PrintLanes(const RecordedFunction& recorded, int lanes) {
-  Printer printer(recorded, "function", true);
+  Printer printer(recorded, "function", Form::kLanes);
   return fmt::format(R"(#define LANES {}
 {}{}const int loopbench_room = {};
-int loopbench_function(const double* x, double* y, double* w) {{
-  const holds ok = function((const number*)x, (number*)y, (number*)w);
+int loopbench_function(const double* x, const double* c, double* y, double* w) {{
+  const holds ok = function((const number*)x, c, (number*)y, (number*)w);
   int bits = 0;
   for (int i = 0; i < LANES; ++i) bits |= ok[i] != 0 ? 1 << i : 0;
   return bits;

@@ -24,17 +24,23 @@ std::string PrintFunction(const RecordedFunction& recorded, const std::string& n
 /// PrintFunction() as a translation unit for CompileBranch() (compile.h), which defines
 ///
 ///   void loopbench_use_sines(void (*sines)(double, double*, double*))   to be called first
-///   int loopbench_function(const double* x, double* y, double* w)
+///   int loopbench_function(const double* x, const double* c, double* y, double* w)
 ///   const int loopbench_room
+///
+/// c holds ConstantsOf() the function. The text contains no number, so mechanisms with other masses
+/// or lengths share it.
 std::string PrintLibrary(const RecordedFunction& recorded);
+/// Values of Graph::Given().
+std::vector<double> ConstantsOf(const RecordedFunction& recorded);
 
 /// Prints the same function for `lanes` states at once, in vector types of GCC and clang:
 ///
 ///   void loopbench_use_lane_sines(void (*sines)(const double*, double*, double*))
 ///
 /// receives sines and cosines of as many angles. x, y and w are arrays of vectors: the numbers of a
-/// quantity in all lanes follow each other. Bit i of the result is set if all comparisons come out
-/// as recorded in lane i. Without fused multiply-add, lanes have PrintLibrary()'s bits.
+/// quantity in all lanes follow each other. All lanes have the same c. Bit i of the result is set
+/// if all comparisons come out as recorded in lane i. Without fused multiply-add, lanes have
+/// PrintLibrary()'s bits.
 std::string PrintLanes(const RecordedFunction& recorded, int lanes);
 
 }  // namespace loopbench::generate

@@ -35,7 +35,8 @@ struct RecordingSubject {
   Coordinates coordinates = Coordinates::kJoint;
   std::string formulation = "odca";
   FormulationOptions options = {};
-  bool with_work = false;  ///< System::IntegrateWork()
+  bool with_work = false;      ///< System::IntegrateWork()
+  bool keeps_numbers = false;  ///< in the graph (graph.h)
   Quantity quantity = Quantity::kDerivative;
   /// Longest recording, in nodes. Equations of shipped mechanisms have some ten thousand,
   /// factorisations that iterate more.
@@ -63,6 +64,8 @@ struct RecordedFunction {
   std::vector<double> numbers;       ///< the recorded values of the outputs
   std::vector<int> carried_speeds;   ///< of the state, indices into u
   Stages stages;                     ///< of dy/dt alone
+  std::string structure;             ///< Graph::Structure() of the outputs
+  std::string key;                   ///< functions of a mechanism with equal keys are equal
 };
 
 /// Records the subject's quantity at time t and `state`: positions, then speeds, and works where

@@ -22,6 +22,8 @@ void RequireRoom() {
 
 int NodeOf(const Recorded& x) { return x.node >= 0 ? x.node : current->Constant(x.number); }
 
+bool Folds(const Recorded& x) { return x.node < 0 && current->Folds(x.number); }
+
 /// A node that turned out to be a constant is a constant.
 Recorded At(int node, double number) {
   return current->IsConstant(node) ? Recorded(current->nodes()[node].value)
@@ -44,7 +46,8 @@ Recording::~Recording() {
 Recorded Recorded::Input(double number) { return {number, current->Input()}; }
 
 double Recorded::Cast() const {
-  if (node < 0 || casts_as == CastsAs::kNumber) return number;
+  const bool is_known = node < 0 || (current != nullptr && current->nodes()[node].is_known);
+  if (is_known || casts_as == CastsAs::kNumber) return number;
   const double infinity = std::numeric_limits<double>::infinity();
   return casts_as == CastsAs::kInfinity ? infinity : -infinity;
 }
@@ -53,15 +56,15 @@ Recorded Recorded::Make(Operation operation, const Recorded& a) {
   const double number = Value(operation, a.number, 0.0);
   if (current == nullptr) return number;
   current->as_run.Add(operation);
-  if (a.node < 0) return number;
-  return At(current->Make(operation, a.node), number);
+  if (Folds(a)) return number;
+  return At(current->Make(operation, NodeOf(a)), number);
 }
 
 Recorded Recorded::Make(Operation operation, const Recorded& a, const Recorded& b) {
   const double number = Value(operation, a.number, b.number);
   if (current == nullptr) return number;
   current->as_run.Add(operation);
-  if (a.node < 0 && b.node < 0) return number;
+  if (Folds(a) && Folds(b)) return number;
   RequireRoom();
   return At(current->Make(operation, NodeOf(a), NodeOf(b)), number);
 }
@@ -82,9 +85,10 @@ void Recorded::PoseSines(const Recorded& angle, Recorded& sine, Recorded& cosine
   if (current == nullptr) return;
   current->as_run.Add(Operation::kPoseSin);
   current->as_run.Add(Operation::kPoseCos);
-  if (angle.node < 0) return;
-  sine.node = current->Make(Operation::kPoseSin, angle.node);
-  cosine.node = current->Make(Operation::kPoseCos, angle.node, sine.node);
+  if (Folds(angle)) return;
+  const int node = NodeOf(angle);
+  sine.node = current->Make(Operation::kPoseSin, node);
+  cosine.node = current->Make(Operation::kPoseCos, node, sine.node);
 }
 
 }  // namespace loopbench::generate

@@ -20,8 +20,12 @@ std::string Text(int number) {
   return "void loopbench_use_sines(void (*s)(double, double*, double*)) { (void)s; }\n"
          "const int loopbench_room = " +
          std::to_string(number) +
-         ";\nint loopbench_function(const double* x, double* y, double* w) {\n"
-         "  (void)w;\n  y[0] = 2 * x[0];\n  return 1;\n}\n";
+         ";\nint loopbench_function(const double* x, const double* c, double* y, double* w) "
+         "{\n  (void)c, (void)w;\n  y[0] = 2 * x[0];\n  return 1;\n}\n";
+}
+
+CompiledBranch CompileText(const std::string& text) {
+  return CompileBranch(text, [&] { return text; });
 }
 
 class CacheTest : public ::testing::Test {
@@ -42,7 +46,7 @@ class CacheTest : public ::testing::Test {
   }
   static std::string Refusal(const std::string& text) {
     try {
-      CompileBranch(text);
+      CompileText(text);
     } catch (const NotCovered& why) {
       return why.what();
     }
@@ -54,7 +58,7 @@ class CacheTest : public ::testing::Test {
 };
 
 TEST_F(CacheTest, KeepsOneFileOfTheUserAlone) {
-  EXPECT_EQ(CompileBranch(Text(1)).room, 1);
+  EXPECT_EQ(CompileText(Text(1)).room, 1);
   ASSERT_EQ(Kept().size(), 1u);
   struct stat of = {};
   ASSERT_EQ(::stat(cache_.c_str(), &of), 0);
@@ -73,14 +77,14 @@ TEST_F(CacheTest, AFolderThatOthersMayWriteIsRefused) {
 }
 
 TEST_F(CacheTest, TheCompilerIsPartOfTheName) {
-  CompileBranch(Text(3));
+  CompileText(Text(3));
   ::setenv("CC", "cc -O1", 1);
-  CompileBranch(Text(3));
+  CompileText(Text(3));
   EXPECT_EQ(Kept().size(), 2u);
 }
 
 TEST_F(CacheTest, AFileThatOthersMayWriteOrThatIsNoLibraryIsRefused) {
-  CompileBranch(Text(6));
+  CompileText(Text(6));
   const fs::path name = Kept().front().filename();
   const fs::path other = folder_.path() / "other";
   fs::create_directories(other / "loopbench");
@@ -98,7 +102,7 @@ TEST_F(CacheTest, AFileThatOthersMayWriteOrThatIsNoLibraryIsRefused) {
 }
 
 TEST_F(CacheTest, AChangedByteIsRefused) {
-  CompileBranch(Text(7));
+  CompileText(Text(7));
   const fs::path name = Kept().front().filename(), changed = folder_.path() / "changed";
   fs::create_directories(changed / "loopbench");
   fs::permissions(changed / "loopbench", fs::perms::owner_all);
@@ -114,10 +118,10 @@ TEST_F(CacheTest, WithoutAFolderNothingIsKeptAndTheCodeRuns) {
   std::ofstream(cache_) << "a file in the place of the folder";
   EXPECT_NE(Refusal(Text(4)).find("expected a folder"), std::string::npos);
   ::setenv("XDG_CACHE_HOME", "/proc/none", 1);
-  const CompiledBranch branch = CompileBranch(Text(4));
+  const CompiledBranch branch = CompileText(Text(4));
   const double x = 3.0;
   double y = 0.0;
-  EXPECT_EQ(branch.function(&x, &y, nullptr), 1);
+  EXPECT_EQ(branch.function(&x, nullptr, &y, nullptr), 1);
   EXPECT_EQ(y, 6.0);
 }
 

@@ -1,9 +1,12 @@
 // Recorded right-hand sides: their numbers are those of the library's text, whatever the state, and
 // compiled code has the bits of the graph.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <random>
 
 #include "harness/config/formulations.h"
@@ -12,6 +15,7 @@
 #include "harness/generate/print_c.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/side_by_side.h"
+#include "harness/text/files.h"
 #include "harness/timing/subject.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/description/library.h"
@@ -45,6 +49,42 @@ std::vector<double> Evaluate(const RecordedFunction& recorded, const std::vector
   return result;
 }
 
+/// A mechanism of equal topology with other masses, inertias, gravity and one other length. The
+/// factors have many digits, so that no two numbers are equal by chance.
+MechanismDescription Varied(MechanismDescription description, int k) {
+  description.gravity *= 1.0 + 0.0112353 * k;
+  for (std::size_t i = 1; i < description.bodies.size(); ++i) {
+    description.bodies[i].mass *= 1.0 + 0.0313717 * k * static_cast<double>(i);
+    description.bodies[i].inertia *= 1.0 + 0.0523771 * k * static_cast<double>(i);
+  }
+  description.joints[1].from.position *= 1.0 + 0.00712347 * k;
+  return description;
+}
+
+/// Records with numbers as constants of the text, or as its inputs.
+RecordedFunction RecordWith(RecordingSubject subject, const RecordingStart& start, bool keeps) {
+  subject.keeps_numbers = keeps;
+  return RecordFunction(subject, start);
+}
+
+/// The literal text of a function as a library.
+CompiledBranch CompileOwn(const RecordedFunction& recorded) {
+  int room = 0;
+  const std::string function = PrintFunction(recorded, "own", &room);
+  return CompileBranch("own " + function, [&] {
+    return fmt::format(
+        "#include <math.h>\nstatic void (*sines)(double, double*, double*);\n"
+        "void loopbench_use_sines(void (*s)(double, double*, double*)) {{ sines = s; }}\n{}{}"
+        "const int loopbench_room = {};\nint loopbench_function(const double* x, const double* c, "
+        "double* y, double* w) {{ return (void)c, own(x, y, w); }}\n",
+        kPrintedHelpers, function, room);
+  });
+}
+
+CompiledBranch CompileShared(const RecordedFunction& recorded) {
+  return CompileBranch(recorded.structure, [&] { return PrintLibrary(recorded); });
+}
+
 /// Equal bits, except for the sign of zeros.
 void ExpectSameBits(const std::vector<double>& found, const std::vector<double>& expected) {
   ASSERT_EQ(found.size(), expected.size());
@@ -74,8 +114,8 @@ class Library {
     return ydot;
   }
   /// A state near the start that is off the constraints, as a trial step is.
-  std::vector<double> Near(double size) const {
-    std::mt19937 numbers(1);
+  std::vector<double> Near(double size, unsigned seed = 1) const {
+    std::mt19937 numbers(seed);
     std::uniform_real_distribution<double> shift(-size, size);
     std::vector<double> y = y_;
     for (double& number : y) number += shift(numbers);
@@ -173,6 +213,9 @@ void ExpectBitsOfTheText(Coordinates set) {
       const std::vector<double> found = Evaluate(recorded, x, &ok);
       ++(ok ? compared : branched);
       if (!ok) return;
+      const RecordedFunction keeping = RecordWith(library.subject(), library.start(), true);
+      ExpectSameBits(Evaluate(keeping, x, &ok), found);
+      EXPECT_TRUE(ok);
       ExpectSameBits(found, RecordFunction(library.subject(), library.start(), 0.01, y).numbers);
     } catch (const NotCovered& why) {
       EXPECT_NE(std::string(why.what()).find("factorisation that iterates"), std::string::npos);
@@ -223,20 +266,103 @@ TEST(RecordedFunctionTest, WhatIsNotCoveredIsRefusedByName) {
   EXPECT_NE(why(mine).find("formulation \"mine\""), std::string::npos);
 }
 
-TEST(GeneratedDerivativeTest, CompiledCodeHasTheBitsOfTheGraph) {
-  for (const std::string& formulation : kFormulations) {
-    Library<Planar> library(Shipped("four-bar"), formulation, Enforcement::kVelocity);
-    const RecordedFunction recorded = RecordFunction(library.subject(), library.start());
-    const CompiledBranch branch = CompileBranch(PrintLibrary(recorded));
-    std::vector<double> x = {0.25};
-    x.insert(x.end(), library.y().begin(), library.y().end());
-    x.back() += 1e-2;
-    std::vector<double> ydot(x.size() - 1), room(static_cast<std::size_t>(branch.room));
-    EXPECT_EQ(branch.function(x.data(), ydot.data(), room.data()), 1);
+template <class Space>
+void ExpectBitsOfTheGraph(const std::string& name, const std::string& formulation,
+                          Enforcement level) {
+  SCOPED_TRACE(name + " " + formulation);
+  Library<Space> library(Shipped(name), formulation, level);
+  const RecordedFunction recorded = RecordWith(library.subject(), library.start(), true);
+  const CompiledBranch branch = CompileShared(recorded);
+  const std::vector<double> constants = ConstantsOf(recorded);
+  std::vector<double> room(static_cast<std::size_t>(branch.room));
+  for (unsigned state = 0; state < 100; ++state) {
+    const std::vector<double> y = library.Near(1e-4, state);
+    std::vector<double> x = {0.25}, ydot(y.size());
+    x.insert(x.end(), y.begin(), y.end());
+    EXPECT_EQ(branch.function(x.data(), constants.data(), ydot.data(), room.data()), 1);
     bool ok = true;
     ExpectSameBits(ydot, Evaluate(recorded, x, &ok));
     EXPECT_TRUE(ok);
   }
+}
+
+/// Bennett's linkage: its sums and differences of products tempt compilers to fuse them.
+TEST(GeneratedDerivativeTest, CompiledCodeHasTheBitsOfTheGraph) {
+  for (const std::string& formulation : kFormulations) {
+    ExpectBitsOfTheGraph<Planar>("four-bar", formulation, Enforcement::kVelocity);
+  }
+  ExpectBitsOfTheGraph<Spatial>("bennett", "odca", Enforcement::kAcceleration);
+}
+
+template <class Space>
+void ExpectOneTextForOtherNumbers(const std::string& name, const std::string& formulation) {
+  SCOPED_TRACE(name + " " + formulation);
+  std::string first;
+  for (int k = 1; k <= 4; ++k) {
+    Library<Space> library(Varied(Shipped(name), k), formulation, Enforcement::kAcceleration);
+    const RecordedFunction literal = RecordWith(library.subject(), library.start(), false);
+    const RecordedFunction recorded = RecordWith(library.subject(), library.start(), true);
+    if (k == 1) first = PrintLibrary(recorded);
+    EXPECT_EQ(PrintLibrary(recorded), first) << k;
+    const CompiledBranch shared = CompileShared(recorded), own = CompileOwn(literal);
+    const std::vector<double> y = library.Near(1e-6), constants = ConstantsOf(recorded);
+    std::vector<double> x = {0.25}, found(y.size()), expected(y.size());
+    x.insert(x.end(), y.begin(), y.end());
+    std::vector<double> room(static_cast<std::size_t>(std::max(shared.room, own.room)));
+    EXPECT_EQ(shared.function(x.data(), constants.data(), found.data(), room.data()), 1);
+    EXPECT_EQ(own.function(x.data(), nullptr, expected.data(), room.data()), 1);
+    ExpectSameBits(found, expected);
+    bool ok = true;
+    ExpectSameBits(found, Evaluate(recorded, x, &ok));
+    ExpectSameBits(found, Evaluate(literal, x, &ok));
+    EXPECT_TRUE(ok);
+  }
+}
+
+TEST(SharedCodeTest, MechanismsOfOtherNumbersShareATextAndHaveTheBitsOfTheirOwn) {
+  for (const std::string& formulation : kFormulations) {
+    ExpectOneTextForOtherNumbers<Planar>("four-bar", formulation);
+    ExpectOneTextForOtherNumbers<Planar>("slider-crank", formulation);
+    ExpectOneTextForOtherNumbers<Planar>("seven-bar", formulation);
+  }
+  ExpectOneTextForOtherNumbers<Spatial>("spatial-four-bar", "odca");
+}
+
+/// Shipped bars have length and mass 1: their graph has fewer operations, of which nothing is
+/// assumed of other bars.
+TEST(SharedCodeTest, ANumberThatIsOneOrZeroInOneMechanismIsOneThereAlone) {
+  for (const std::string& formulation : kFormulations) {
+    std::vector<std::string> structures;
+    for (const auto& [k, gravity] : {std::pair(0, 1.0), std::pair(1, 1.0), std::pair(1, 0.0)}) {
+      MechanismDescription description = Varied(Shipped("four-bar"), k);
+      description.gravity *= gravity;
+      Library<Planar> library(description, formulation, Enforcement::kAcceleration);
+      const RecordedFunction recorded = RecordWith(library.subject(), library.start(), true);
+      structures.push_back(recorded.structure);
+      bool ok = true;
+      const std::vector<double> y = library.Near(1e-3);
+      std::vector<double> x = {0.25};
+      x.insert(x.end(), y.begin(), y.end());
+      const std::vector<double> found = Evaluate(recorded, x, &ok);
+      ExpectSameBits(found, RecordFunction(library.subject(), library.start(), 0.25, y).numbers);
+    }
+    EXPECT_NE(structures[0], structures[1]);
+    EXPECT_NE(structures[1], structures[2]);
+  }
+}
+
+TEST(SharedCodeTest, OneFileServesMechanismsOfOtherNumbers) {
+  const harness::TemporaryFolder folder("loopbench-shared-test");
+  ::setenv("XDG_CACHE_HOME", folder.path().c_str(), 1);
+  for (int k = 1; k <= 4; ++k) {
+    Library<Planar> library(Varied(Shipped("four-bar"), k), "odca", Enforcement::kAcceleration);
+    GeneratedDerivative<Planar> derivative(library.subject(), library.system());
+    std::vector<double> ydot(library.y().size());
+    EXPECT_TRUE(derivative.Evaluate(0.0, library.y(), ydot));
+    ExpectSameBits(ydot, library.Examine(0.0, library.y()));
+  }
+  ::unsetenv("XDG_CACHE_HOME");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path() / "loopbench"), {}), 1);
 }
 
 /// Some hundred roundings, each of half a unit in the last place: 1e-12 of the largest number.
@@ -244,15 +370,17 @@ TEST(GeneratedDerivativeTest, FusedMultiplyAddChangesRoundingAlone) {
   bool any = false;
   for (const std::string& formulation : kFormulations) {
     Library<Planar> library(Shipped("four-bar"), formulation, Enforcement::kVelocity);
-    const std::string text = PrintLibrary(RecordFunction(library.subject(), library.start()));
+    const RecordedFunction recorded = RecordFunction(library.subject(), library.start());
+    const std::vector<double> constants = ConstantsOf(recorded);
     std::vector<double> x = {0.25}, results[2];
     x.insert(x.end(), library.y().begin(), library.y().end());
     for (const Contraction contraction : {Contraction::kNone, Contraction::kFused}) {
-      const CompiledBranch branch = CompileBranch(text, contraction);
+      const CompiledBranch branch = CompileBranch(
+          recorded.structure, [&] { return PrintLibrary(recorded); }, contraction);
       std::vector<double>& ydot = results[contraction == Contraction::kFused ? 1 : 0];
       ydot.resize(x.size() - 1);
       std::vector<double> room(static_cast<std::size_t>(branch.room));
-      EXPECT_EQ(branch.function(x.data(), ydot.data(), room.data()), 1);
+      EXPECT_EQ(branch.function(x.data(), constants.data(), ydot.data(), room.data()), 1);
     }
     double largest = 0.0;
     for (const double number : results[0]) largest = std::max(largest, std::abs(number));
@@ -311,13 +439,13 @@ TEST(GeneratedDerivativeTest, WhereAComparisonFlipsTheLibraryEvaluatesWithEqualR
   EXPECT_EQ(system.compiled()->misses(), 1);
 }
 
-/// More runs than lanes, of which some take a branch that is not compiled.
+/// More runs than lanes, with two sets of masses. Some take a branch that is not compiled.
 TEST(LanesTest, RunsSideBySideHaveTheBitsThatTheyHaveAlone) {
-  const MechanismDescription description = Shipped("four-bar");
-  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   constexpr int kRuns = 2 * kLanes + 3;
   for (const std::string& formulation : kFormulations) {
     const auto derivatives = [&](int run, SideBySide* beside, std::int64_t* misses) {
+      const MechanismDescription description = Varied(Shipped("four-bar"), 1 + run % 2);
+      const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
       const harness::BenchmarkState state = harness::ComputeState(description, Coordinates::kJoint);
       const auto system = harness::MakeFormulation<Planar>(formulation, mechanism,
                                                            {.general = true, .beside = beside});

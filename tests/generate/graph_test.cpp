@@ -159,7 +159,9 @@ TEST(LanesTest, EachLaneHasTheBitsOfTheGraph) {
     }
     recorded.outputs.push_back(recorded.graph.Constant(-0.75));
   }
-  const CompiledBranch lanes = CompileBranch(PrintLanes(recorded, kLanes));
+  const CompiledBranch lanes =
+      CompileBranch("operations in lanes", [&] { return PrintLanes(recorded, kLanes); });
+  const std::vector<double> constants = ConstantsOf(recorded);
   std::mt19937 numbers(1);
   std::uniform_real_distribution<double> unit(0.1, 0.9);
   std::vector<Lanes> x(2), y(recorded.outputs.size()), w(static_cast<std::size_t>(lanes.room));
@@ -169,7 +171,7 @@ TEST(LanesTest, EachLaneHasTheBitsOfTheGraph) {
       x[0][lane] = unit(numbers), x[1][lane] = unit(numbers);
     if (round == 3) x[0][0] = 4e4;  // angles beyond the quick sines
     const int held =
-        lanes.function(reinterpret_cast<const double*>(x.data()),
+        lanes.function(reinterpret_cast<const double*>(x.data()), constants.data(),
                        reinterpret_cast<double*>(y.data()), reinterpret_cast<double*>(w.data()));
     for (int lane = 0; lane < kLanes; ++lane) {
       const std::vector<double> expected = recorded.graph.Values({x[0][lane], x[1][lane]});

@@ -98,11 +98,11 @@ Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kin
     SetScales(kinematics, Masses::kGeometric);
     FormResponse(kinematics, Masses::kGeometric);
     if (!response_.allFinite()) return Outcome::kNonFinite;
-    loop_.FactorGeometric(response_, kinematics.softening());
+    loop_.FactorGeometric(response_, kinematics.regularization());
     found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
     found.smallest_weight = static_cast<double>(loop_.smallest_weight());
     FormResponse(kinematics, Masses::kPhysical);
-    if (!loop_.FactorSoftened(response_)) return Outcome::kSingular;
+    if (!loop_.FactorRegularized(response_)) return Outcome::kSingular;
   }
   found.rcond = static_cast<double>(loop_.rcond());
   return Outcome::kFinished;

@@ -27,7 +27,7 @@ Lagrange<Space, S>::Lagrange(const Mechanism<Space, S>& mechanism,
     : mechanism_(mechanism), equations_(mechanism), change_(VectorX<S>::Zero(mechanism.num_u())) {
   if constexpr (std::is_same_v<S, double>) {
     if (options.solver == SolverKind::kRankRevealing && !options.general) {
-      joints_ = JointResponse<Space>::Make(mechanism, kMostOfResponse);
+      joints_ = JointResponse<Space>::Make(mechanism, kMaxOfResponse);
     }
     if (joints_ != nullptr && !IsLessWork(*joints_, mechanism)) joints_ = nullptr;
   }

@@ -248,7 +248,7 @@ std::optional<Correction<double>> ArmSweep::Project(std::span<double> q, std::sp
   std::optional<Correction<double>> now = Gap();
   if (!now) return std::nullopt;
   Correction<double> correction = *now;
-  for (int i = 0; i < kMostProjections && size(*now) > goal; ++i) {
+  for (int i = 0; i < kMaxProjections && size(*now) > goal; ++i) {
     if (!Solve<Sought::kPositions>() || !IsFinite()) return std::nullopt;
     const double before = size(*now);
     back_ = moved_;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kLandmarks = 4;
 /// Each side has at least this share of the bodies.
-constexpr double kLeastShare = 0.25;
+constexpr double kMinShare = 0.25;
 /// Fewer bodies are not worth a cut.
 constexpr std::size_t kFewBodies = 8;
 
@@ -71,7 +71,7 @@ class Cutter {
   /// Moves the bodies over to the other side one by one, and notes the best cut on the way.
   void Sweep(const std::vector<int>& order) {
     const int n = static_cast<int>(order.size());
-    const int least = std::max(1, static_cast<int>(kLeastShare * n));
+    const int least = std::max(1, static_cast<int>(kMinShare * n));
     std::vector<bool> over(n, false);
     int rows = 0, best = -1;  // rows across the cut
     for (int moved = 1; moved <= n - least; ++moved) {

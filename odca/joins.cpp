@@ -65,15 +65,15 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
 template <class Space, class S>
 Outcome Joins<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   operations_ = 0;
-  softened_ = false;
+  regularized_ = false;
   if (AssembleAll(kinematics, Pass::kPhysical)) return Outcome::kFinished;
   if (solver_ == SolverKind::kAsPublished) return Outcome::kSingular;
   if (!std::isfinite(static_cast<double>(rcond_))) return Outcome::kNonFinite;
   // a loop looks degenerate: geometry gives the directions, then the physics is solved
-  softened_ = true;
-  softening_ = kinematics.softening();
+  regularized_ = true;
+  regularization_ = kinematics.regularization();
   AssembleAll(kinematics, Pass::kGeometric);
-  if (AssembleAll(kinematics, Pass::kSoftened)) return Outcome::kFinished;
+  if (AssembleAll(kinematics, Pass::kRegularized)) return Outcome::kFinished;
   return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;
 }
 
@@ -81,7 +81,7 @@ template <class Space, class S>
 bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass) {
   const Masses masses = pass == Pass::kGeometric ? Masses::kGeometric : Masses::kPhysical;
   const std::vector<Inertia<Space, S>>& inertias = mechanism_.bodies(masses);
-  if (pass != Pass::kSoftened) {
+  if (pass != Pass::kRegularized) {
     dependent_rows_ = 0;
     worst_joint_ = -1;
     rcond_ = smallest_weight_ = S(1);
@@ -248,7 +248,7 @@ bool Joins<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
     NoteDiagnostics(node, loop);
     return ok;
   }
-  if (pass != Pass::kSoftened) {
+  if (pass != Pass::kRegularized) {
     for (int j = 0; j < static_cast<int>(node.joints.size()); ++j) {
       loop.SetScale(j, FreeResponseAt(node, node.joints[j]));
     }
@@ -260,12 +260,12 @@ bool Joins<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
     return ok;
   }
   if (pass == Pass::kGeometric) {
-    loop.FactorGeometric(X, softening_);
+    loop.FactorGeometric(X, regularization_);
     dependent_rows_ += loop.size() - loop.rank();
     NoteDiagnostics(node, loop);
     return true;
   }
-  return loop.FactorSoftened(X);
+  return loop.FactorRegularized(X);
 }
 
 template <class Space, class S>

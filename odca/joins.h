@@ -106,7 +106,7 @@ class Joins {
   }
 
   /// Returns true if Assemble() dropped or regularized a direction; solutions are then refined.
-  bool softened() const { return softened_; }
+  bool regularized() const { return regularized_; }
   int dependent_rows() const { return dependent_rows_; }
   S rcond() const { return rcond_; }
   S smallest_weight() const { return smallest_weight_; }
@@ -129,7 +129,7 @@ class Joins {
     int loop = -1;  ///< index of the loop solver
     int bodies = 1;
   };
-  enum class Pass { kPhysical, kGeometric, kSoftened };
+  enum class Pass { kPhysical, kGeometric, kRegularized };
 
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
   void FillLeaf(const Kinematics<Space, S>& kinematics, const Inertia<Space, S>& inertia, int n);
@@ -161,10 +161,10 @@ class Joins {
   MatrixX<S> columns_;
   std::vector<int> lone_leaves_;  ///< bodies that no joint touches
   int num_handles_ = 0, num_rows_ = 0, largest_matrix_ = 0;
-  bool softened_ = false;
+  bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;
   S rcond_ = S(1), smallest_weight_ = S(1);
-  double softening_ = kSoftening;
+  double regularization_ = kRegularization;
   long operations_ = 0;
 };
 

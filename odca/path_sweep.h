@@ -9,14 +9,14 @@
 //                                 another
 //   down                          the same the other way round
 //
-// A short path has no groups, a long one up to kMostGroups, which threads share. Results depend on
+// A short path has no groups, a long one up to kMaxGroups, which threads share. Results depend on
 // the mechanism alone, never on the number of threads. The depth is one piece plus the sequence of
 // pieces and left-over bodies: total work has priority over depth.
 //
 // Other mechanisms of the same shape can fill unused lanes. T = Lanes holds kLanes mechanisms, one
 // per lane; T = double holds one.
 //
-// Pins that close loops must not be degenerate: if FactorsOf() finds a doubtful one, Evaluate()
+// Pins that close loops must not be degenerate: if FactorsOf() finds a suspicious one, Evaluate()
 // stops, and the general pass decides. Its scale is the trace of the free response of the joint's
 // two bodies, which is at least the scale of loop_solver.h.
 #pragma once

@@ -13,7 +13,7 @@ namespace {
 constexpr int kShortestPiece = 2;
 
 /// Their pieces are joined one after another.
-constexpr int kMostGroups = 128;
+constexpr int kMaxGroups = 128;
 
 /// Returns true if points in each piece can be followed from its own first body: a pinned body
 /// precedes the first cut joint in it.
@@ -167,7 +167,7 @@ void PathSweepOf<T>::Add(const Mechanism<Planar, double>& mechanism, PathLinks l
                          int bodies_of_group) {
   PathPlaces path;
   path.bodies = static_cast<int>(links.links.size());
-  path.groups = std::clamp(path.bodies / bodies_of_group, 1, kMostGroups);
+  path.groups = std::clamp(path.bodies / bodies_of_group, 1, kMaxGroups);
   while (path.groups > 0) {
     path.packs = LengthOfPieces(links.closures, path.pieces());
     if (path.packs > 0) break;

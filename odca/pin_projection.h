@@ -24,7 +24,7 @@ struct PinProjection {
     if (!now) return std::nullopt;
     Correction<double> correction;
     correction.shift = *now;
-    for (int i = 0; i<kMostProjections&& * now> goal; ++i) {
+    for (int i = 0; i<kMaxProjections&& * now> goal; ++i) {
       if (!sweep.FindChange()) return std::nullopt;
       const double before = *now;
       sweep.back_ = moved;

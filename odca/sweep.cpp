@@ -32,7 +32,7 @@ void Sweep<Space, S>::Solve(std::span<const Acceleration<Space, S>> b,
   A[kGround].setZero();  // the inertial frame of (33-34)
   for (Components<Space, S>& phi : phi_) phi.setZero();
   Correct(c0, A);
-  if (!joins_.softened()) return;
+  if (!joins_.regularized()) return;
   Residual(c0, A);
   for (int n = 0; n < plan_.num_leaves(); ++n) b_[joins_.first_handle(n)].setZero();
   Correct(residual_, A);

@@ -101,7 +101,7 @@ std::unique_ptr<harness::Peer> MakeProgramPeer(const std::string& name, const Pr
   try {
     const exchange::Model model = exchange::MakeModel(description);
     return std::make_unique<ProgramPeer>(name, make(model), model);
-  } catch (const exchange::NotThere& missing) {
+  } catch (const exchange::Unsupported& missing) {
     throw harness::Inexpressible(fmt::format("{} does not have: {}", name, missing.what()));
   } catch (const std::exception& error) {
     throw harness::Inexpressible(

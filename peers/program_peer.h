@@ -12,8 +12,8 @@
 
 namespace loopbench::peers {
 
-/// Makes a program; throws exchange::NotThere, or errors of the peer's library for a model that it
-/// rejects.
+/// Makes a program; throws exchange::Unsupported, or errors of the peer's library for a model that
+/// it rejects.
 using ProgramFactory = std::function<std::unique_ptr<Program>(const exchange::Model&)>;
 
 /// Throws harness::Inexpressible with the peer's name and its unsupported parts.

@@ -57,7 +57,7 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
   weights_.FindPivots(response_, work_);
   lambda_.setZero();
   lambda_.tail(sigma.size()) = sigma.reverse().cwiseAbs2();
-  weights_.Weigh(lambda_, S(kinematics.softening()));
+  weights_.Weigh(lambda_, S(kinematics.regularization()));
   num_dependent_ = 0;
   for (Eigen::Index i = 0; i < sigma.size(); ++i) {
     if (S(1) - WeightOf(i) < S(kHard)) ++num_dependent_;

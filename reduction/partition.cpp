@@ -43,7 +43,7 @@ int GeometricRank(const Kinematics<Space, S>& kinematics, TreeDynamics<Space, S>
   MatrixX<S> M;
   dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
   const MatrixX<S> response = J * M.llt().solve(J.transpose());
-  loop.FactorGeometric(response, kinematics.softening());
+  loop.FactorGeometric(response, kinematics.regularization());
   return loop.rank();
 }
 

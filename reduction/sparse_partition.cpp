@@ -14,7 +14,7 @@ namespace loopbench::reduction {
 namespace {
 
 /// Entries of J beyond which it is not sparse: numbers and places take 2.4 GB.
-constexpr double kMostEntries = 2e8;
+constexpr double kMaxEntries = 2e8;
 
 /// Returns the number of speeds that move the two sides of a cut joint relative to each other.
 template <class Space>
@@ -82,11 +82,11 @@ std::unique_ptr<SparsePartition<Space>> SparsePartition<Space>::Make(
   if (m == 0 || f < 0) return nullptr;
   const Kinematics<Space, double> anywhere(mechanism);
   const double entries = EntriesOf(mechanism, anywhere), bodies = mechanism.num_bodies();
-  if (entries > kMostEntries) return nullptr;
+  if (entries > kMaxEntries) return nullptr;
   // no elimination is less than its entries
   const double least = SparseWork<Space>(entries, entries, entries, bodies, f);
   if (!anyway && least >= DenseWork(n, m)) return nullptr;
-  auto response = JointResponse<Space>::Make(mechanism, kMostOfResponse);
+  auto response = JointResponse<Space>::Make(mechanism, kMaxOfResponse);
   if (response == nullptr) return nullptr;
   RequireDense(mechanism.name() + ": reduction to " +
                    std::to_string(mechanism.num_u() - mechanism.num_rows()) +

@@ -26,7 +26,7 @@ using namespace loopbench;
 ///
 /// A^+ is Moore and Penrose's inverse, here by a complete orthogonal decomposition of A: redundant
 /// constraints need no care, and A A^T is never formed. Near singular positions, where the rank of
-/// A drops, x is not smooth: nothing is softened there.
+/// A drops, x is not smooth: nothing is regularized there.
 template <class Space, class S>
 class UdwadiaKalaba final : public ConstraintSolver<Space, S> {
  public:

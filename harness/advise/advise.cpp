@@ -13,7 +13,7 @@
 #include "harness/record/noise.h"
 #include "harness/reference/error_meter.h"
 #include "harness/run/run_case.h"
-#include "harness/timing/yardstick.h"
+#include "harness/timing/calibration.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -30,8 +30,8 @@ CompileOptions InOnePiece() { return {.islands = false}; }
 template <class Space>
 class BenchIn final : public TrialBench {
  public:
-  BenchIn(const TrialScene& scene, Compiled compiled)
-      : scene_(scene),
+  BenchIn(const TrialProblem& problem, Compiled compiled)
+      : problem_(problem),
         compiled_(std::move(compiled)),
         description_(compiled_.parts.front().description),
         joint_(description_, Coordinates::kJoint),
@@ -54,8 +54,8 @@ class BenchIn final : public TrialBench {
     trial.rhs_evaluations = bare.rhs_evaluations + bare.jacobian_rhs_evaluations;
     if (bare.outcome != Outcome::kFinished) return trial;
     // a short run is soon disturbed, and searches go by its time
-    if (bare.wall_s < kShortTrial_s) TimeAgain(&trial);
-    ErrorMeter meter({scene_.user, compiled_, scene_.points}, 0, scene_.reference);
+    if (bare.wall_s < kShortTrial_s) Remeasure(&trial);
+    ErrorMeter meter({problem_.user, compiled_, problem_.points}, 0, problem_.reference);
     // interpolation doubles the cost of a run
     if (Run(choice, 10 * cpu_s, &meter).outcome != Outcome::kFinished) return trial;
     Record record;
@@ -66,7 +66,7 @@ class BenchIn final : public TrialBench {
     return trial;
   }
 
-  void TimeAgain(Trial* trial) override {
+  void Remeasure(Trial* trial) override {
     const IntegratorResult again = RunBare(trial->choice, 1e9);
     if (again.outcome == Outcome::kFinished) trial->wall_s = std::min(trial->wall_s, again.wall_s);
   }
@@ -82,15 +82,15 @@ class BenchIn final : public TrialBench {
   /// A run at the speed that the machine has when it is alone, or the fastest of some that were all
   /// disturbed.
   IntegratorResult RunBare(const Choice& choice, double cpu_s) {
-    constexpr int kMostDisturbed = 6;
+    constexpr int kMaxDisturbed = 6;
     IntegratorResult fastest;
-    for (int i = 0; i < kMostDisturbed; ++i) {
-      const double before = YardstickNs();
+    for (int i = 0; i < kMaxDisturbed; ++i) {
+      const double before = CalibrationNs();
       const IntegratorResult one = Run(choice, cpu_s, nullptr);
-      const double slower = std::max(before, YardstickNs());
+      const double slower = std::max(before, CalibrationNs());
       if (i == 0 || one.wall_s < fastest.wall_s) fastest = one;
       if (one.outcome != Outcome::kFinished || one.wall_s > kLongTrial_s ||
-          slower < kOtherSpeed * YardstickAloneNs()) {
+          slower < kOtherSpeed * CalibrationBaselineNs()) {
         break;
       }
     }
@@ -98,20 +98,20 @@ class BenchIn final : public TrialBench {
   }
 
   IntegratorResult Run(const Choice& choice, double cpu_s, ErrorMeter* meter) {
-    Coordinated& in = choice.column.coordinates == Coordinates::kJoint ? joint_ : absolute_;
+    Coordinated& in = choice.method.coordinates == Coordinates::kJoint ? joint_ : absolute_;
     Case one;
-    one.column = choice.column;
+    one.method = choice.method;
     one.integrator = choice.integrator;
     one.rtol = one.atol = choice.rtol;
     one.limits.cpu_s = cpu_s;
     IntegratorOptions options = OptionsOf(one, in.mechanism.stop_times());
     options.fixed_step = choice.step;
-    const auto system = MakeFormulation<Space>(choice.column, in.mechanism);
+    const auto system = MakeFormulation<Space>(choice.method, in.mechanism);
     IntegratorResult result;
     result.outcome = system->Start(0.0, in.start.q, in.start.u);
     if (result.outcome != Outcome::kFinished) return result;
     GiveJacobian(choice.integrator, JacobianKind::kForward, description_, *system);
-    GiveExecution(choice.column, description_, *system, &result);
+    GiveExecution(choice.method, description_, *system, &result);
     if (result.outcome != Outcome::kFinished) return result;
     const auto compile_s = [&] {
       return system->compiled() != nullptr ? system->compiled()->seconds() : 0.0;
@@ -122,7 +122,7 @@ class BenchIn final : public TrialBench {
     const StepObserver observe = [&](double t, std::span<double> state) {
       return system->BeginStep(t, state) ? StepAction::kRestart : StepAction::kContinue;
     };
-    const Measured measured{scene_.user, compiled_, {}};
+    const Measured measured{problem_.user, compiled_, {}};
     DenseObserver dense;
     if (meter != nullptr) {
       dense.times = meter->times();
@@ -133,13 +133,13 @@ class BenchIn final : public TrialBench {
         meter->Add(k, snapshot, snapshot);
       };
     }
-    result = Integrate(*system, 0.0, scene_.horizon, y, options, observe,
+    result = Integrate(*system, 0.0, problem_.horizon, y, options, observe,
                        meter != nullptr ? &dense : nullptr);
     result.wall_s -= compile_s() - compiled_before;
     return result;
   }
 
-  const TrialScene& scene_;
+  const TrialProblem& problem_;
   Compiled compiled_;
   const MechanismDescription& description_;
   Coordinated joint_, absolute_;
@@ -150,11 +150,10 @@ class BenchIn final : public TrialBench {
 void TrialBench::Settle(Trial* trial) {
   // re-times runs up to this long: a disturbance may hide a shorter one
   constexpr double kMaybeShort_s = 2.5 * kShortTrial_s;
-  constexpr int kSame = 3, kMostTimings = 12;
-  for (int same = 0, i = 0; same < kSame && i < kMostTimings && trial->wall_s < kMaybeShort_s;
-       ++i) {
+  constexpr int kSame = 3, kMaxTimings = 12;
+  for (int same = 0, i = 0; same < kSame && i < kMaxTimings && trial->wall_s < kMaybeShort_s; ++i) {
     const double before = trial->wall_s;
-    TimeAgain(trial);
+    Remeasure(trial);
     same = trial->wall_s < 0.97 * before ? 0 : same + 1;
   }
 }
@@ -162,17 +161,17 @@ void TrialBench::Settle(Trial* trial) {
 std::string ToString(const Choice& choice) {
   const std::string how = choice.step > 0.0 ? fmt::format("in steps of {:.3g} s", choice.step)
                                             : fmt::format("at rtol {:.2g}", choice.rtol);
-  return fmt::format("{}/{}/{}, {} {}", choice.column.formulation,
-                     ToString(choice.column.enforcement), ToString(choice.column.coordinates),
+  return fmt::format("{}/{}/{}, {} {}", choice.method.formulation,
+                     ToString(choice.method.enforcement), ToString(choice.method.coordinates),
                      choice.integrator, how);
 }
 
-std::unique_ptr<TrialBench> MakeTrialBench(const TrialScene& scene) {
-  Compiled compiled = Compile(scene.user, InOnePiece());
+std::unique_ptr<TrialBench> MakeTrialBench(const TrialProblem& problem) {
+  Compiled compiled = Compile(problem.user, InOnePiece());
   if (compiled.parts.front().description.space == SpaceKind::kPlanar) {
-    return std::make_unique<BenchIn<Planar>>(scene, std::move(compiled));
+    return std::make_unique<BenchIn<Planar>>(problem, std::move(compiled));
   }
-  return std::make_unique<BenchIn<Spatial>>(scene, std::move(compiled));
+  return std::make_unique<BenchIn<Spatial>>(problem, std::move(compiled));
 }
 
 std::string WhatLimits(const Trial& trial, double reference_error) {
@@ -189,14 +188,14 @@ namespace {
 
 /// Tolerances that trials are made at. Below the least rounding rules, above the largest the error
 /// estimate means nothing.
-constexpr double kLeastRtol = 3e-15, kLargestRtol = 0.05;
+constexpr double kMinRtol = 3e-15, kLargestRtol = 0.05;
 /// For an error bound or a budget: target and lower limit of acceptance, as factors of the request.
 constexpr double kAim = 0.7, kContent = 0.4;
 /// Trials of one method and level. Errors follow tolerances by a power near one: three are enough
 /// in most cases.
-constexpr int kMostTrials = 5;
+constexpr int kMaxTrials = 5;
 /// A trial may cost so much more than the best, for timing's sake, and so much at least [s].
-constexpr double kRoom = 1.5, kLeastLimit_s = 2e-4;
+constexpr double kRoom = 1.5, kMinLimit_s = 2e-4;
 /// Limits of a sweep: trials beyond these are stopped.
 constexpr double kHopeless = 20.0, kHopelessLeast_s = 2e-3;
 /// Steps go with rtol^(-1/p) for a method of order p; p is near six.
@@ -211,7 +210,7 @@ constexpr int kRepeats = 7;
 /// With two digits, as people write tolerances, and within bounds.
 double Tolerance(double wanted) {
   const double unit = std::pow(10.0, std::floor(std::log10(wanted)) - 1);
-  return std::clamp(std::floor(wanted / unit) * unit, kLeastRtol, kLargestRtol);
+  return std::clamp(std::floor(wanted / unit) * unit, kMinRtol, kLargestRtol);
 }
 
 class Pilot {
@@ -258,7 +257,7 @@ class Pilot {
  private:
   Advice Decide(const std::function<void(Trial&)>& examine) {
     for (int i = 0; i < kRepeats; ++i) {
-      for (Trial& trial : advice_.finalists) bench_.TimeAgain(&trial);
+      for (Trial& trial : advice_.finalists) bench_.Remeasure(&trial);
     }
     Sort(&advice_.finalists);
     Examine(examine);
@@ -271,7 +270,7 @@ class Pilot {
   void TryAll(const std::string& formulation, const std::string& profile, Enforcement level) {
     for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
       Choice choice;
-      choice.column = {
+      choice.method = {
           .formulation = formulation, .enforcement = level, .coordinates = coordinates};
       choice.integrator = profile;
       std::optional<Trial> best;
@@ -321,9 +320,9 @@ class Pilot {
   /// Returns the CPU time limit of the next trial, from the remaining time and the best trial.
   double Limit() const {
     const double left = std::max(request_.cpu_s - Elapsed(), 1e-3) / 4;
-    if (request_.budget) return std::min(left, std::max(kLeastLimit_s, 4 * Budget()));
+    if (request_.budget) return std::min(left, std::max(kMinLimit_s, 4 * Budget()));
     if (!best_) return left;
-    return std::min(left, std::max(kLeastLimit_s, kRoom * best_->wall_s));
+    return std::min(left, std::max(kMinLimit_s, kRoom * best_->wall_s));
   }
 
   /// Returns the limit for trials of a sweep: twenty times the best or the budget. Low orders at
@@ -349,7 +348,7 @@ class Pilot {
     for (const FormulationRow& row : Formulations()) {
       if (row.is_peer() || !row.Has(Enforcement::kVelocity)) continue;
       Choice choice;
-      choice.column = {.formulation = row.name, .enforcement = Enforcement::kVelocity};
+      choice.method = {.formulation = row.name, .enforcement = Enforcement::kVelocity};
       choice.rtol = 1e-5;
       Trial trial = bench_.Try(choice, request_.cpu_s / 10);
       ++advice_.trials;
@@ -366,7 +365,7 @@ class Pilot {
   void Look(const std::string& profile, Enforcement level) {
     if (OutOfTime() || !FindFormulation(fastest_)->Has(level)) return;
     Choice choice;
-    choice.column = {.formulation = fastest_, .enforcement = level};
+    choice.method = {.formulation = fastest_, .enforcement = level};
     choice.integrator = profile;
     std::optional<Trial> best;
     const auto take = [&](const Trial& trial) {
@@ -386,7 +385,7 @@ class Pilot {
     const double asked = *request_.error;
     // a coarse trial is cheap and guides the search
     choice.rtol = Tolerance(10 * asked / length_);
-    for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
+    for (int i = 0; i < kMaxTrials && !OutOfTime(); ++i) {
       const Trial trial = Try(choice);
       take(trial);
       if (trial.outcome != Outcome::kFinished) {
@@ -406,7 +405,7 @@ class Pilot {
   template <class Take>
   void SearchBudget(Choice choice, Take take) {
     choice.rtol = 1e-8;
-    for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
+    for (int i = 0; i < kMaxTrials && !OutOfTime(); ++i) {
       const Trial trial = Try(choice);
       take(trial);
       if (trial.outcome != Outcome::kFinished && trial.outcome != Outcome::kTimeLimit) return;
@@ -423,7 +422,7 @@ class Pilot {
   template <class Take>
   void SearchSteps(Choice choice, Take take) {
     choice.step = horizon_ / 1000;
-    for (int i = 0; i < kMostTrials && !OutOfTime(); ++i) {
+    for (int i = 0; i < kMaxTrials && !OutOfTime(); ++i) {
       const Trial trial = Try(choice);
       take(trial);
       const double used = trial.wall_s / Budget();
@@ -457,11 +456,11 @@ class Pilot {
     std::vector<Trial> finalists = pairs;
     for (const Trial& pair : pairs) {
       for (const FormulationRow& row : Formulations()) {
-        if (row.is_peer() || !row.Has(pair.choice.column.enforcement)) continue;
+        if (row.is_peer() || !row.Has(pair.choice.method.enforcement)) continue;
         for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
           Choice choice = pair.choice;
-          choice.column.formulation = row.name;
-          choice.column.coordinates = coordinates;
+          choice.method.formulation = row.name;
+          choice.method.coordinates = coordinates;
           if (choice == pair.choice || OutOfTime()) continue;
           const Trial trial = Try(choice);
           if (trial.outcome == Outcome::kFinished) finalists.push_back(trial);
@@ -502,7 +501,7 @@ class Pilot {
     for (std::size_t i = 0; i < advice_.finalists.size(); ++i) {
       Trial& trial = advice_.finalists[i];
       examine(trial);
-      if (!trial.doubts.empty() || !Keeps(trial)) continue;
+      if (!trial.warnings.empty() || !Keeps(trial)) continue;
       std::rotate(advice_.finalists.begin(),
                   advice_.finalists.begin() + static_cast<std::ptrdiff_t>(i),
                   advice_.finalists.begin() + static_cast<std::ptrdiff_t>(i) + 1);

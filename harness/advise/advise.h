@@ -20,7 +20,7 @@ namespace loopbench::harness {
 
 /// A way of running a mechanism.
 struct Choice {
-  Column column;
+  Method method;
   std::string integrator = "ode45";
   double rtol = 1e-8;  ///< = atol; no effect with a fixed step
   double step = 0.0;   ///< [s], fixed; 0: adaptive
@@ -39,11 +39,11 @@ struct Trial {
   double late = 0.0, shape = 0.0;  ///< as error_phase_max [s] and error_path_max [m]
   double wall_s = 0.0;             ///< of the fastest bare run so far [s]
   std::int64_t steps = 0, rhs_evaluations = 0;
-  std::string doubts;  ///< warnings of a run with all observers, if one was made
+  std::string warnings;  ///< warnings of a run with all observers, if one was made
 };
 
 /// Inputs that all trials of a mechanism share.
-struct TrialScene {
+struct TrialProblem {
   const MechanismDescription& user;
   const Reference& reference;
   double horizon;                     ///< [s], not beyond the trust horizon
@@ -57,14 +57,14 @@ class TrialBench {
   /// with kTimeLimit and is not measured.
   virtual Trial Try(const Choice& choice, double cpu_s) = 0;
   /// Another bare run: lowers the trial's wall_s if it was faster.
-  virtual void TimeAgain(Trial* trial) = 0;
+  virtual void Remeasure(Trial* trial) = 0;
   /// The time of a short run is soon disturbed: it is timed again until it falls no more.
   void Settle(Trial* trial);
 };
 
-/// Returns the bench for the mechanism with default options, as one subsystem. `scene` and its
+/// Returns the bench for the mechanism with default options, as one subsystem. `problem` and its
 /// referents must outlive the bench. Throws std::runtime_error if the initial assembly fails.
-std::unique_ptr<TrialBench> MakeTrialBench(const TrialScene& scene);
+std::unique_ptr<TrialBench> MakeTrialBench(const TrialProblem& problem);
 
 /// Returns a sentence that names the main source of a trial's error.
 std::string WhatLimits(const Trial& trial, double reference_error);

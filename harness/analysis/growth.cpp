@@ -21,7 +21,7 @@ constexpr std::size_t kExponential = kExponents.size();
 constexpr std::size_t kHypotheses = kNames.size();
 
 // Residuals below this are a perfect fit; their logarithm would be minus infinity.
-constexpr double kLeastMeanSquare = 1e-20;
+constexpr double kMinMeanSquare = 1e-20;
 
 // Least squares of y over x with a free offset: slope and mean square residual.
 struct Line {
@@ -73,7 +73,7 @@ Scores ScoreMember(const DriftSeries& readings, const HypothesisOptions& options
     log_drift.push_back(std::log(readings.value[i]));
   }
   const double price = std::log(options.independent_readings) / options.independent_readings;
-  const auto log_of = [](double square) { return std::log(std::max(square, kLeastMeanSquare)); };
+  const auto log_of = [](double square) { return std::log(std::max(square, kMinMeanSquare)); };
   Scores scores{};
   for (std::size_t h = 0; h < kExponents.size(); ++h) {
     scores.log_mean_square[h] = log_of(MeanSquareAtSlope(log_t, log_drift, kExponents[h]));

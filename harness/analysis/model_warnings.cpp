@@ -34,14 +34,14 @@ double LinkLength(const MechanismDescription& description) {
 
 namespace {
 
-constexpr std::size_t kMostNames = 6;
+constexpr std::size_t kMaxNames = 6;
 
 std::string BodyNames(const MechanismDescription& description, const std::vector<int>& bodies) {
   std::string text;
-  for (std::size_t i = 0; i < bodies.size() && i < kMostNames; ++i) {
+  for (std::size_t i = 0; i < bodies.size() && i < kMaxNames; ++i) {
     text += (i == 0 ? "" : ", ") + description.bodies[bodies[i]].name;
   }
-  if (bodies.size() > kMostNames) text += fmt::format(" and {} more", bodies.size() - kMostNames);
+  if (bodies.size() > kMaxNames) text += fmt::format(" and {} more", bodies.size() - kMaxNames);
   return text;
 }
 
@@ -53,7 +53,7 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
          fmt::format(
              "rank is not analysed: sparse pivots leave it uncertain, and {} speeds are more "
              "than {}",
-             structure.joint_u, kMostAnalysedSpeeds)});
+             structure.joint_u, kMaxAnalysedSpeeds)});
     return;
   }
   if (structure.rounding > 0.0) {
@@ -105,12 +105,12 @@ class LargeAngles {
   void Add(const std::string& name, double angle) {
     if (std::abs(angle) <= 2 * std::numbers::pi) return;
     if (count_++ == 0) first_ = angle;
-    if (count_ > kMostNames) return;
+    if (count_ > kMaxNames) return;
     text_ += fmt::format("{}{} = {:g} rad", count_ == 1 ? "" : ", ", name, angle);
   }
   std::string Text() const {
     const std::string more =
-        count_ > kMostNames ? fmt::format(" and {} more", count_ - kMostNames) : "";
+        count_ > kMaxNames ? fmt::format(" and {} more", count_ - kMaxNames) : "";
     return fmt::format(
         "more than a turn: {}{}; angles are in rad, and {:g} degrees would be {:.6g} rad", text_,
         more, first_, first_ * std::numbers::pi / 180);

@@ -68,9 +68,9 @@ std::string WhatIsAsked(const AdviseCommand& command) {
 
 Record RowOf(const Trial& trial, const Trial& best, double horizon) {
   Record row;
-  row.Set("formulation", trial.choice.column.formulation);
-  row.Set("enforcement", std::string(ToString(trial.choice.column.enforcement)));
-  row.Set("coordinates", std::string(ToString(trial.choice.column.coordinates)));
+  row.Set("formulation", trial.choice.method.formulation);
+  row.Set("enforcement", std::string(ToString(trial.choice.method.enforcement)));
+  row.Set("coordinates", std::string(ToString(trial.choice.method.coordinates)));
   row.Set("integrator", trial.choice.integrator);
   if (trial.choice.step > 0.0) {
     row.Set("step", trial.choice.step);
@@ -78,7 +78,7 @@ Record RowOf(const Trial& trial, const Trial& best, double horizon) {
     row.Set("rtol", trial.choice.rtol);
   }
   row.Set("outcome", std::string(ToString(trial.outcome)));
-  row.Set("warnings", trial.doubts);
+  row.Set("warnings", trial.warnings);
   if (std::isfinite(trial.error)) row.Set("error_position_max", trial.error);
   row.Set("wall_s", trial.wall_s);
   row.Set("ratio", trial.wall_s / best.wall_s);
@@ -120,7 +120,7 @@ std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, dou
        .comment = "Asked for " + WhatIsAsked(command) + ".",
        .mechanism = std::filesystem::absolute(command.mechanism).lexically_relative(folder),
        .horizon = horizon,
-       .column = choice.column,
+       .method = choice.method,
        .integrator = choice.integrator,
        .rtol = choice.rtol,
        .step = choice.step,
@@ -130,11 +130,11 @@ std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, dou
 Experiment SingleOf(const MechanismFile& file, double horizon) {
   Experiment experiment;
   experiment.name = "advise";
-  experiment.scenes.push_back({.name = file.description.name,
-                               .path = {},
-                               .mechanism = file,
-                               .horizons = {horizon},
-                               .tags = {}});
+  experiment.problems.push_back({.name = file.description.name,
+                                 .path = {},
+                                 .mechanism = file,
+                                 .horizons = {horizon},
+                                 .tags = {}});
   return experiment;
 }
 
@@ -145,7 +145,7 @@ void Examine(const MechanismFile& file, double horizon, const Reference& referen
   const Choice& choice = trial.choice;
   Case one;
   one.mechanism = file.description.name;
-  one.column = choice.column;
+  one.method = choice.method;
   one.integrator = choice.integrator;
   one.rtol = one.atol = choice.step > 0.0 ? 0.0 : choice.rtol;
   one.step = choice.step;
@@ -154,7 +154,7 @@ void Examine(const MechanismFile& file, double horizon, const Reference& referen
   one.keys = CaseKeys(experiment, one);
   const Record record = RunCase(experiment, one, &reference);
   const bool finished = record.Text("outcome") == "finished";
-  trial.doubts = finished ? record.Text("warnings") : record.Text("outcome");
+  trial.warnings = finished ? record.Text("warnings") : record.Text("outcome");
   if (finished && has_all_points) trial.error = record.Number("error_position_max");
 }
 
@@ -201,22 +201,22 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
                              : fmt::format(" with a margin of {:.0f} %", 100 * (1 - kErrorShare)),
         ToString(best.choice), best.error, best.wall_s);
   }
-  if (!best.doubts.empty()) Print("  flagged: {}\n", best.doubts);
+  if (!best.warnings.empty()) Print("  flagged: {}\n", best.warnings);
   Print("Dominant error: {}.\n", WhatLimits(best, reference.Certified().position));
   const auto next = std::ranges::find_if(advice.finalists, [&](const Trial& trial) {
     return trial.choice.integrator != best.choice.integrator ||
-           trial.choice.column.formulation != best.choice.column.formulation;
+           trial.choice.method.formulation != best.choice.method.formulation;
   });
   if (next != advice.finalists.end()) {
     Print("Runner-up: {}, {:.2f} times the time, error {:.1e} m\n", ToString(next->choice),
           next->wall_s / best.wall_s, next->error);
   }
   if (advice.generated) {
-    const Column& column = advice.generated->choice.column;
+    const Method& method = advice.generated->choice.method;
     Print(
         "Generated code with the same integrator, level and tolerance: {}, {:.2f} times the time, "
         "error {:.1e} m\n",
-        column.formulation, advice.generated->wall_s / best.wall_s, advice.generated->error);
+        method.formulation, advice.generated->wall_s / best.wall_s, advice.generated->error);
   } else if (command.generated) {
     Print("Generated code: no formulation could be generated and finished\n");
   }
@@ -257,8 +257,8 @@ std::optional<Trial> FastestGenerated(TrialBench& bench, const Trial& best) {
   std::optional<Trial> fastest;
   for (const std::string& formulation : FormulationNamesWithoutPeers()) {
     Choice choice = best.choice;
-    choice.column.formulation = formulation;
-    choice.column.execution = Execution::kGenerated;
+    choice.method.formulation = formulation;
+    choice.method.execution = Execution::kGenerated;
     constexpr double kCpu_s = 60.0;
     Trial trial = bench.Try(choice, kCpu_s);
     if (!std::isfinite(trial.error)) continue;
@@ -271,11 +271,11 @@ std::optional<Trial> FastestGenerated(TrialBench& bench, const Trial& best) {
 Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
                  const CertainMotion& certain, const std::vector<MeasuredPoint>& points,
                  const AdviceRequest& request) {
-  const TrialScene scene{.user = file.description,
-                         .reference = certain.reference,
-                         .horizon = certain.horizon,
-                         .points = points};
-  const auto bench = MakeTrialBench(scene);
+  const TrialProblem problem{.user = file.description,
+                             .reference = certain.reference,
+                             .horizon = certain.horizon,
+                             .points = points};
+  const auto bench = MakeTrialBench(problem);
   const auto find = command.exhaustive ? &Sweep : static_cast<decltype(&Sweep)>(&Advise);
   Advice advice =
       find(request, *bench, certain.horizon, LinkLength(file.description), [&](Trial& trial) {
@@ -289,7 +289,7 @@ Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
 
 /// Returns a model's error and savings as a row; `whole` is the time of the full model [s].
 Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
-                  const CertainMotion& certain, const SceneModel& model, double whole) {
+                  const CertainMotion& certain, const ProblemModel& model, double whole) {
   Record row;
   row.Set("model", model.name);
   const auto refuse = [&](const std::string& why) {
@@ -328,12 +328,12 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
 
 void PrintModels(const AdviseCommand& command, const MechanismFile& file,
                  const CertainMotion& certain, double whole) {
-  std::vector<const Idea*> ideas;
-  for (const Idea& idea : Ideas()) ideas.push_back(&idea);
+  std::vector<const SimplificationRule*> ideas;
+  for (const SimplificationRule& idea : SimplificationRules()) ideas.push_back(&idea);
   constexpr double kShortRun_s = 1.0;
   const ShortRun run = MakeShortRun(file.description, std::min(kShortRun_s, certain.horizon),
                                     kWitnessShare * command.limits.cpu_s);
-  const SceneModels models = MakeModels(file, ideas, run, {});
+  const ProblemModels models = MakeModels(file, ideas, run, {});
   Table table;
   table.columns = {{"model", "model", Format::kText},
                    {"caused", "error it causes [m]", Format::kScientific},
@@ -342,7 +342,7 @@ void PrintModels(const AdviseCommand& command, const MechanismFile& file,
                    {"wall_s", "wall [s]", Format::kSeconds},
                    {"ratio", "of the whole's", Format::kExponent},
                    {"verdict", "", Format::kText}};
-  for (const SceneModel& model : models.models) {
+  for (const ProblemModel& model : models.models) {
     if (model.name == "full" || model.name.starts_with("islands")) continue;
     table.rows.push_back(RowOfModel(command, file, certain, model, whole));
   }

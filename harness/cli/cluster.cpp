@@ -354,9 +354,9 @@ void AddCluster(Commands& commands) {
                   "New folder on a file system that all machines share")
       ->required();
   app->add_option("--tasks", run.parts, "Number of parts, one array task each")
-      ->check(NumberFrom(1, kMostParts));
+      ->check(NumberFrom(1, kMaxParts));
   app->add_option("-j,--jobs", run.jobs, "Cases in parallel per part, and processors of its task")
-      ->check(NumberFrom(1, kMostJobs))
+      ->check(NumberFrom(1, kMaxJobs))
       ->capture_default_str();
   app->add_option("--time", typed.time, "Time limit of a part, in the format of sbatch");
   app->add_option("--partition", typed.partition, "Slurm partition");

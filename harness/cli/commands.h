@@ -34,7 +34,7 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store, const Select
                                 const ReadWatch& watch = {});
 
 /// Processes all records of some problems as LoadRecords() does.
-std::vector<Record> Prepared(std::vector<Record> records);
+std::vector<Record> LatestWithWarnings(std::vector<Record> records);
 
 /// Writes drift.csv, drift.md, precision and timing tables to the store's folder, or next to a
 /// store that is a file, named after it. Prints their short forms.
@@ -43,7 +43,7 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
 
 /// Returns 1 and prints the number if an accuracy run in `rows` failed or has warnings; else 0.
 /// @throws ConfigError if there is no accuracy run: the gate could not fail.
-int DoubtGate(const std::vector<Record>& rows);
+int WarningGate(const std::vector<Record>& rows);
 
 struct RunCommand {
   std::vector<std::filesystem::path> experiments;
@@ -95,19 +95,19 @@ int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path
 const std::map<std::string, FigureSize>& FigureSizes();
 
 /// Largest number of records held in memory: about 400 MB for runs of a few hundred steps.
-inline constexpr std::size_t kMostHeld = 50'000;
+inline constexpr std::size_t kMaxHeld = 50'000;
 
 /// Writes CSV or JSON to standard output or `command.out`. Problems have the order of the store,
 /// rows the usual order, and columns cover all records. Throws ConfigError for options that need
 /// all rows at once.
-int WriteLongTable(const TableCommand& command, const SceneReader& reader,
+int WriteLongTable(const TableCommand& command, const ProblemReader& reader,
                    const std::string& typed);
 
-/// Records of LoadRecords(), or the store problem by problem if there are more than kMostHeld
+/// Records of LoadRecords(), or the store problem by problem if there are more than kMaxHeld
 /// records or more than memory permits.
 struct Loaded {
   std::vector<Record> records;
-  std::optional<SceneReader> many;
+  std::optional<ProblemReader> many;
 };
 Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 
@@ -116,10 +116,10 @@ Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 double FreeMemory(bool with_own = false);
 
 /// Memory budget for the records of a store.
-class Room {
+class MemoryBudget {
  public:
   /// Takes the memory that is free now as budget.
-  explicit Room(std::filesystem::path store);
+  explicit MemoryBudget(std::filesystem::path store);
   bool Has(std::uint64_t bytes) const;  ///< true if records with `bytes` bytes of lines fit
   /// Throws ConfigError if they do not fit; `found` describes the records.
   void Require(const std::string& found, std::uint64_t bytes) const;

@@ -141,12 +141,12 @@ std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
 void NoteCases(const std::string& what, const std::vector<std::string>& cases,
                std::vector<std::string>& notes) {
   if (cases.empty()) return;
-  constexpr std::size_t kMostNamed = 20;
-  const bool all = cases.size() <= kMostNamed;
+  constexpr std::size_t kMaxNamed = 20;
+  const bool all = cases.size() <= kMaxNamed;
   notes.push_back(
       fmt::format("{} {}{}", cases.size(), what,
-                  all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMostNamed)));
-  for (const std::string& one : cases | std::views::take(kMostNamed)) notes.push_back("  " + one);
+                  all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMaxNamed)));
+  for (const std::string& one : cases | std::views::take(kMaxNamed)) notes.push_back("  " + one);
 }
 
 /// Adds a row for each case without counterpart.

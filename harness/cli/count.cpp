@@ -130,10 +130,10 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
 
 /// Runs in a child process and writes rows as lines of JSON.
 int CountHere(const CountCommand& command, const MechanismDescription& description,
-              const SceneObservation& observe, std::size_t most_nodes) {
-  const CompiledScene scene = CompileScene(description, observe, {});
+              const ObservedQuantities& observe, std::size_t most_nodes) {
+  const SimplifiedProblem problem = SimplifyProblem(description, observe, {});
   std::vector<Record> rows;
-  for (const auto& part : scene.compiled.parts) {
+  for (const auto& part : problem.compiled.parts) {
     for (const Coordinates set : ParseAll<Coordinates>(
              command.coordinates, {Coordinates::kJoint, Coordinates::kAbsolute})) {
       CountPart(command, part.description, set, most_nodes, rows);
@@ -254,7 +254,7 @@ Table CountTable(std::vector<Record> rows) {
 
 /// Prints one row per right-hand side. Returns 2 if none was recorded.
 int CountOperations(const CountCommand& command, const std::string& typed) {
-  constexpr std::size_t kMostOfFiles = 100'000, kMostOfFamilies = 1'000'000;
+  constexpr std::size_t kMaxOfFiles = 100'000, kMaxOfFamilies = 1'000'000;
   if (command.mechanisms.empty() && command.family.empty()) {
     throw ConfigError("count: found neither mechanisms nor --family, expected one of them");
   }
@@ -268,7 +268,7 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   for (const std::filesystem::path& path : command.mechanisms) {
     const int code = add(path.string(), [&] {
       const MechanismFile file = ReadMechanism(path);
-      return CountHere(command, file.description, file.observe, kMostOfFiles);
+      return CountHere(command, file.description, file.observe, kMaxOfFiles);
     });
     if (code != 0) return code;
   }
@@ -281,7 +281,7 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
       const int code = add(fmt::format("{} {}", family.name, size), [&] {
         MechanismDescription description = family.make(size);
         description.name = family.name;
-        return CountHere(command, description, {}, kMostOfFamilies);
+        return CountHere(command, description, {}, kMaxOfFamilies);
       });
       if (code != 0) return code;
     }

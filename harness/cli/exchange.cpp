@@ -191,7 +191,7 @@ int ConvertHere(const ConvertCommand& command) {
   exchange::ExportedFile file;
   try {
     file = exchange::Export(mechanism, format, command.options);
-  } catch (const exchange::NotThere& missing) {
+  } catch (const exchange::Unsupported& missing) {
     return Refuse(command, mechanism.name, missing.parts());
   } catch (const std::runtime_error& error) {
     throw ConfigError(command.mechanism.string() + ": " + error.what());

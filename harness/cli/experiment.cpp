@@ -11,7 +11,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims.h"
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/record/measures.h"
 #include "harness/record/record.h"
 #include "harness/run/run_case.h"
@@ -108,13 +108,13 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
     table.columns.push_back({name, name, format, {}});
   }
   const bool has_threads = std::ranges::any_of(experiments, [](const Experiment& experiment) {
-    return std::ranges::any_of(experiment.columns,
-                               [](const Column& column) { return column.threads > 1; });
+    return std::ranges::any_of(experiment.methods,
+                               [](const Method& method) { return method.threads > 1; });
   });
   if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger, {}});
   const bool has_executions = std::ranges::any_of(experiments, [](const Experiment& experiment) {
-    return std::ranges::any_of(experiment.columns, [](const Column& column) {
-      return column.execution != Execution::kLibrary;
+    return std::ranges::any_of(experiment.methods, [](const Method& method) {
+      return method.execution != Execution::kLibrary;
     });
   });
   if (has_executions) table.columns.push_back({"execution", "execution", Format::kText, {}});
@@ -181,8 +181,8 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
   const Overview overview = MakeOverview(path, {{path}, command.files.settings, {}});
   const std::vector<Experiment>& experiments = overview.experiments;
   Checked checked;
-  for (const ExperimentScene& scene : experiments.front().scenes) {
-    AddUnitWarnings(path, scene.mechanism.description, &checked);
+  for (const ExperimentProblem& problem : experiments.front().problems) {
+    AddUnitWarnings(path, problem.mechanism.description, &checked);
   }
   for (const Experiment& experiment : experiments) CheckLadders(experiment);
   if (command.assembly) AddStarts(path, CheckStarts(experiments), &checked);

@@ -39,12 +39,12 @@ void ExplainProblems(const Experiment& experiment) {
                    {"joints", "joints", Format::kInteger},
                    {"horizons", "horizon [s]"},
                    {"file", "file"}};
-  for (const ExperimentScene& scene : experiment.scenes) {
-    const MechanismDescription& description = scene.mechanism.description;
-    AddRow(
-        {scene.name, std::string(ToString(description.space)), Count(description.bodies.size() - 1),
-         Count(description.joints.size()), Numbers(scene.horizons), scene.path.string()},
-        &table);
+  for (const ExperimentProblem& problem : experiment.problems) {
+    const MechanismDescription& description = problem.mechanism.description;
+    AddRow({problem.name, std::string(ToString(description.space)),
+            Count(description.bodies.size() - 1), Count(description.joints.size()),
+            Numbers(problem.horizons), problem.path.string()},
+           &table);
   }
   PrintSection("Problems", table, ViewOfOutput(true));
 }
@@ -56,7 +56,7 @@ void ExplainMethods(const Experiment& experiment) {
                    {"enforcement", "enforcement"},
                    {"coordinates", "coordinates"},
                    {"solver", "solver"}};
-  for (const Column& method : experiment.columns) {
+  for (const Method& method : experiment.methods) {
     std::vector<Value> row;
     for (const std::string& word : CLI::detail::split(ToString(method), '/')) row.push_back(word);
     if (row.size() > table.columns.size()) {  // a peer's name contains a slash
@@ -67,32 +67,32 @@ void ExplainMethods(const Experiment& experiment) {
   }
   PrintSection("Methods", table, ViewOfOutput(true));
   const auto define = [&](std::string_view word, std::string_view sentence, auto is) {
-    if (std::ranges::any_of(experiment.columns, is)) Print("  {}: {}\n", word, sentence);
+    if (std::ranges::any_of(experiment.methods, is)) Print("  {}: {}\n", word, sentence);
   };
   for (const FormulationRow& row : Formulations()) {
-    define(row.name, row.sentence, [&](const Column& c) { return c.formulation == row.name; });
+    define(row.name, row.sentence, [&](const Method& c) { return c.formulation == row.name; });
   }
   for (const LevelTraits& level : Levels()) {
     define(level.name, level.sentence,
-           [&](const Column& c) { return ToString(c.enforcement) == level.name; });
+           [&](const Method& c) { return ToString(c.enforcement) == level.name; });
   }
   define("joint", "joint coordinates, without one cut joint per loop, where drift appears.",
-         [](const Column& c) { return c.coordinates == Coordinates::kJoint; });
+         [](const Method& c) { return c.coordinates == Coordinates::kJoint; });
   define("absolute", "position and orientation of each body; drift can appear at each joint.",
-         [](const Column& c) { return c.coordinates == Coordinates::kAbsolute; });
+         [](const Method& c) { return c.coordinates == Coordinates::kAbsolute; });
   define("plain",
          "plain factorisations (reduction: fixed independent speeds); they fail or lose accuracy "
          "if constraints lose rank.",
-         [](const Column& c) { return c.solver == SolverKind::kAsPublished; });
+         [](const Method& c) { return c.solver == SolverKind::kAsPublished; });
   define("rank-revealing",
          "solvers that detect rank loss (reduction: independent speeds are chosen anew).",
-         [](const Column& c) { return c.solver == SolverKind::kRankRevealing; });
+         [](const Method& c) { return c.solver == SolverKind::kRankRevealing; });
 }
 
 /// Returns the unit of a joint's coordinate, from the first problem with this joint.
 std::string_view UnitOf(const Experiment& experiment, const std::string& joint) {
-  for (const ExperimentScene& scene : experiment.scenes) {
-    const MechanismDescription& description = scene.mechanism.description;
+  for (const ExperimentProblem& problem : experiment.problems) {
+    const MechanismDescription& description = problem.mechanism.description;
     const auto found = std::ranges::find(description.joints, joint, &JointDescription::name);
     if (found == description.joints.end()) continue;
     const auto words = ValueWords(found->type, description.space, false);
@@ -174,10 +174,10 @@ void ExplainSweep(const Overview& overview) {
           WithCount(overview.combinations, "combination"));
     for (const auto& [name, number] : overview.axes) {
       std::vector<std::string> values = ValuesOf(name, overview.experiments);
-      constexpr std::size_t kMostShown = 12;
-      if (values.size() > kMostShown) {
+      constexpr std::size_t kMaxShown = 12;
+      if (values.size() > kMaxShown) {
         const std::string last = values.back();
-        values.resize(kMostShown - 2);
+        values.resize(kMaxShown - 2);
         values.push_back("...");
         values.push_back(last);
       }
@@ -218,17 +218,17 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
   }
   timings = timings * overview.combinations / overview.experiments.size();
   rungs = rungs * overview.combinations / overview.experiments.size();
-  std::vector<JsonObject> scenes, sweep;
-  for (const ExperimentScene& scene : first.scenes) {
-    const MechanismDescription& description = scene.mechanism.description;
+  std::vector<JsonObject> problems, sweep;
+  for (const ExperimentProblem& problem : first.problems) {
+    const MechanismDescription& description = problem.mechanism.description;
     const bool planar = description.space == SpaceKind::kPlanar;
-    scenes.push_back(JsonObject()
-                         .Add("name", scene.name)
-                         .Add("file", scene.path.string())
-                         .Add("space", std::string(planar ? "planar" : "spatial"))
-                         .Add("bodies", Count(description.bodies.size() - 1))
-                         .Add("joints", Count(description.joints.size()))
-                         .Add("horizons", scene.horizons));
+    problems.push_back(JsonObject()
+                           .Add("name", problem.name)
+                           .Add("file", problem.path.string())
+                           .Add("space", std::string(planar ? "planar" : "spatial"))
+                           .Add("bodies", Count(description.bodies.size() - 1))
+                           .Add("joints", Count(description.joints.size()))
+                           .Add("horizons", problem.horizons));
   }
   for (const auto& [name, number] : overview.axes) {
     sweep.push_back(JsonObject()
@@ -236,8 +236,8 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
                         .Add("count", Count(number))
                         .Add("values", ValuesOf(name, overview.experiments)));
   }
-  std::vector<std::string> columns;
-  for (const Column& column : first.columns) columns.push_back(ToString(column));
+  std::vector<std::string> methods;
+  for (const Method& method : first.methods) methods.push_back(ToString(method));
   return JsonObject()
       .Add("file", path.string())
       .Add("kind", std::string("experiment"))
@@ -249,8 +249,8 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
       .Add("precision_runs", Count(rungs))
       .Add("references", first.reference.has_value())
       .Add("sweep", sweep)
-      .Add("problems", scenes)
-      .Add("methods", columns)
+      .Add("problems", problems)
+      .Add("methods", methods)
       .Add("integrators", first.integrators)
       .Add("tolerances", first.tolerances)
       .Add("fixed_steps", first.fixed_steps)
@@ -316,7 +316,7 @@ int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimi
 
 namespace {
 
-constexpr std::size_t kMostRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
+constexpr std::size_t kMaxRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
 
 /// Removes columns without content.
 Table WithoutEmpty(Table table) {
@@ -382,7 +382,7 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
     return;
   }
   Table shown = table;
-  if (!view.all && table.rows.size() > kMostRows) shown.rows.resize(kFirstRows);
+  if (!view.all && table.rows.size() > kMaxRows) shown.rows.resize(kFirstRows);
   const std::string text = ToText(Fitted(WithoutEmpty(shown), view));
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());

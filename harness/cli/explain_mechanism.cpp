@@ -15,13 +15,13 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr std::size_t kMostNames = 12;
+constexpr std::size_t kMaxNames = 12;
 
 /// Returns the names in order; of many only the first and the last, unless all are requested.
 std::string Names(const std::vector<std::string>& names, const ExplainView& view) {
-  if (view.all || names.size() <= kMostNames) return fmt::format("{}", fmt::join(names, " "));
-  const std::vector<std::string> first(names.begin(), names.begin() + kMostNames - 2);
-  return fmt::format("{} ... ({} omitted) {}", fmt::join(first, " "), names.size() - kMostNames + 1,
+  if (view.all || names.size() <= kMaxNames) return fmt::format("{}", fmt::join(names, " "));
+  const std::vector<std::string> first(names.begin(), names.begin() + kMaxNames - 2);
+  return fmt::format("{} ... ({} omitted) {}", fmt::join(first, " "), names.size() - kMaxNames + 1,
                      names.back());
 }
 

@@ -36,7 +36,7 @@ struct GenerateCommand {
 // integrator of the motion along which branches are recorded
 constexpr const char* kProfile = "ode45";
 constexpr double kTolerance = 1e-6;
-constexpr std::size_t kLeastStates = 500, kMostStates = 2000;
+constexpr std::size_t kMinStates = 500, kMaxStates = 2000;
 
 struct Motion {
   generate::RecordingStart start;
@@ -75,7 +75,7 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
   IntegratorOptions options;
   options.profile = kProfile;
   options.stop_times = mechanism.stop_times();
-  options.max_step = command.horizon / kLeastStates;
+  options.max_step = command.horizon / kMinStates;
   options.rtol = options.atol = kTolerance;
   const auto note = [&](double t, std::span<double> state) {
     motion.states.push_back({t, {state.begin(), state.end()}});
@@ -85,7 +85,7 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
   motion.outcome = result.outcome;
   motion.t_reached = result.t_reached;
   motion.step = command.step > 0.0 ? command.step : StepOf(motion.states);
-  const std::size_t every = motion.states.size() / kMostStates + 1;
+  const std::size_t every = motion.states.size() / kMaxStates + 1;
   for (std::size_t i = 0; i * every < motion.states.size(); ++i) {
     std::swap(motion.states[i], motion.states[i * every]);
   }
@@ -96,8 +96,8 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
 int GenerateHere(const GenerateCommand& command) {
   if (!command.fmu.empty()) RequireOutput(command.fmu);
   const MechanismFile file = ReadMechanism(command.mechanism);
-  const CompiledScene scene = CompileScene(file.description, file.observe, {});
-  const MechanismDescription& description = scene.compiled.parts.front().description;
+  const SimplifiedProblem problem = SimplifyProblem(file.description, file.observe, {});
+  const MechanismDescription& description = problem.compiled.parts.front().description;
   std::vector<std::string> lines;
   std::istringstream version(VersionText());
   for (std::string line; std::getline(version, line);) lines.push_back(line);

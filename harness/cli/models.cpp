@@ -29,9 +29,9 @@ namespace fs = std::filesystem;
 
 /// Exact facts that remain valid: on bodies that still exist, and in an approximate model only its
 /// length.
-SceneObservation ObserveIn(const MechanismDescription& description, const SceneObservation& observe,
-                           bool keeps_facts) {
-  SceneObservation known = observe;
+ObservedQuantities ObserveIn(const MechanismDescription& description,
+                             const ObservedQuantities& observe, bool keeps_facts) {
+  ObservedQuantities known = observe;
   const auto is_there = [&](const std::string& body) {
     return std::ranges::find(description.bodies, body, &BodyDescription::name) !=
            description.bodies.end();
@@ -47,9 +47,9 @@ SceneObservation ObserveIn(const MechanismDescription& description, const SceneO
 }
 
 void AddModels(const MechanismFile& file, const std::string& name, bool is_exact,
-               const std::string& assumption, const Simplified& simplified, SceneModels* ladder) {
+               const std::string& assumption, const Simplified& simplified, ProblemModels* ladder) {
   for (std::size_t part = 0; part < simplified.parts.size(); ++part) {
-    SceneModel model;
+    ProblemModel model;
     model.name = simplified.parts.size() == 1 ? name : fmt::format("{}-{}", name, part + 1);
     model.is_exact = is_exact;
     model.description = simplified.parts[part];
@@ -70,7 +70,7 @@ std::string Sentence(std::string text) {
   return text;
 }
 
-std::string CommentOf(const SceneModel& model, const std::string& whole) {
+std::string CommentOf(const ProblemModel& model, const std::string& whole) {
   std::string text =
       fmt::format("{} of {}: {}", model.is_exact ? "Exact model" : "Simplified model", whole,
                   Sentence(fmt::format("{}", fmt::join(model.done, "; "))));
@@ -89,18 +89,18 @@ std::string List(const std::vector<std::string>& lines) {
 }
 
 /// Returns the name of the experiment.
-std::string LadderName(const SceneModels& ladder) {
+std::string LadderName(const ProblemModels& ladder) {
   return ladder.models.front().description.name + "-models";
 }
 
-std::string PageOf(const SceneModels& ladder, double horizon, const std::string& typed) {
+std::string PageOf(const ProblemModels& ladder, double horizon, const std::string& typed) {
   const MechanismDescription& whole = ladder.models.front().description;
   std::string page = fmt::format(
       "# Models of {}\n\nWritten by `{}`. `{}` runs all of them for {} s.\n\n"
       "| file | motion | bodies | joints | forces | model error [m] | evaluations |\n"
       "|---|---|---|---|---|---|---|\n",
       EscapeMarkdown(whole.name), EscapeMarkdown(typed), LadderFileName(ladder), horizon);
-  for (const SceneModel& model : ladder.models) {
+  for (const ProblemModel& model : ladder.models) {
     page +=
         fmt::format("| {}.json | {} | {} | {} | {} | {} | {} |\n", model.name,
                     model.is_exact ? "the same" : "changed", model.description.bodies.size() - 1,
@@ -115,13 +115,13 @@ std::string PageOf(const SceneModels& ladder, double horizon, const std::string&
         "*evaluations*: right-hand sides of that run.\n";
   }
   for (std::size_t i = 1; i < ladder.models.size(); ++i) {
-    const SceneModel& model = ladder.models[i];
+    const ProblemModel& model = ladder.models[i];
     page += fmt::format("\n## {}\n\n{}", model.name, List(model.done));
     if (!model.dropped.empty()) page += fmt::format("\nRemoved:\n\n{}", List(model.dropped));
     if (!model.assumption.empty()) {
       page += fmt::format("\nAssumption: {}\n", EscapeMarkdown(Sentence(model.assumption)));
     }
-    const std::vector<std::string> gone = Gone(whole, model.description);
+    const std::vector<std::string> gone = RemovedParts(whole, model.description);
     if (!gone.empty()) page += fmt::format("\nNames:\n\n{}", List(gone));
     if (!model.R_WC.isIdentity(0.0)) {
       const auto axis = [&](int i_axis) {
@@ -143,14 +143,15 @@ bool IsThere(const fs::path& folder) {
 
 }  // namespace
 
-SceneModels MakeModels(const MechanismFile& file, const std::vector<const Idea*>& ideas,
-                       const ShortRun& run, const SimplifyOptions& options) {
-  SceneModels ladder;
-  SceneModel& whole = ladder.models.emplace_back();
+ProblemModels MakeModels(const MechanismFile& file,
+                         const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
+                         const SimplifyOptions& options) {
+  ProblemModels ladder;
+  ProblemModel& whole = ladder.models.emplace_back();
   whole.name = "full";
   whole.description = file.description;
   whole.observe = file.observe;
-  for (const Idea* idea : ideas) {
+  for (const SimplificationRule* idea : ideas) {
     ladder.ideas.emplace_back(idea, idea->apply(file.description, run, options));
     const Simplified& simplified = ladder.ideas.back().second;
     if (!simplified.applies()) continue;
@@ -160,18 +161,18 @@ SceneModels MakeModels(const MechanismFile& file, const std::vector<const Idea*>
   const Simplified all = Combine(file.description, ideas, run, options);
   if (all.ideas.size() < 2) return ladder;  // it would equal that rule's model
   std::vector<std::string_view> assumptions;
-  for (const Idea* idea : all.ideas) {
+  for (const SimplificationRule* idea : all.ideas) {
     if (!idea->assumption.empty()) assumptions.push_back(idea->assumption);
   }
-  AddModels(file, "combined", std::ranges::all_of(all.ideas, &Idea::is_exact),
+  AddModels(file, "combined", std::ranges::all_of(all.ideas, &SimplificationRule::is_exact),
             fmt::format("{}", fmt::join(assumptions, "; ")), all, &ladder);
   return ladder;
 }
 
-void MeasureErrors(double horizon, double cpu_s, SceneModels* ladder) {
+void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder) {
   const MechanismDescription& whole = ladder->models.front().description;
   Track truth;
-  for (SceneModel& model : ladder->models) {
+  for (ProblemModel& model : ladder->models) {
     const bool is_whole = &model == &ladder->models.front();
     Track track = TrackOf(model.description, model.R_WC, whole, horizon, cpu_s);
     model.rhs_evaluations = track.rhs_evaluations;
@@ -188,12 +189,12 @@ void MeasureErrors(double horizon, double cpu_s, SceneModels* ladder) {
   }
 }
 
-std::string LadderFileName(const SceneModels& ladder) {
+std::string LadderFileName(const ProblemModels& ladder) {
   return FileName(LadderName(ladder)) + ".json";
 }
 
-std::vector<std::string> Gone(const MechanismDescription& whole,
-                              const MechanismDescription& simplified) {
+std::vector<std::string> RemovedParts(const MechanismDescription& whole,
+                                      const MechanismDescription& simplified) {
   std::vector<std::string> lines;
   for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
     const BodyDescription& body = whole.bodies[b];
@@ -218,7 +219,7 @@ std::vector<std::string> Gone(const MechanismDescription& whole,
   return lines;
 }
 
-void WriteModels(const SceneModels& ladder, double horizon, const std::string& typed,
+void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
                  const std::filesystem::path& folder, bool force) {
   const bool is_there = IsThere(folder);
   if (is_there && !force) {
@@ -232,7 +233,7 @@ void WriteModels(const SceneModels& ladder, double horizon, const std::string& t
                         fmt::format("Models of {}, the full model first (models.md).", whole),
                         {},
                         horizon};
-  for (const SceneModel& model : ladder.models) {
+  for (const ProblemModel& model : ladder.models) {
     const std::string file = model.name + ".json";
     const std::string comment =
         &model == &ladder.models.front() ? "The full model." : CommentOf(model, whole);
@@ -262,21 +263,21 @@ namespace {
 constexpr int kRepeats = 20;  ///< timed runs of each model; the fastest counts
 
 Choice Alike() {
-  return {.column = {.formulation = "odca", .enforcement = Enforcement::kPosition}, .rtol = 1e-8};
+  return {.method = {.formulation = "odca", .enforcement = Enforcement::kPosition}, .rtol = 1e-8};
 }
 
 /// Model with data on its motion, and its runs. Not movable: its parts refer to each other.
 struct JudgedModel {
-  const SceneModel& model;
+  const ProblemModel& model;
   CertainMotion certain;
-  std::unique_ptr<TrialScene> scene = nullptr;  ///< the bench refers to it
+  std::unique_ptr<TrialProblem> problem = nullptr;  ///< the bench refers to it
   std::unique_ptr<TrialBench> bench = nullptr;
   Trial trial = {};
   std::string fault = "";  ///< reason why there are no runs
 };
 
 /// Runs the model once if its motion is certified to the end.
-std::unique_ptr<JudgedModel> Examined(const SceneModel& model, double horizon,
+std::unique_ptr<JudgedModel> Examined(const ProblemModel& model, double horizon,
                                       const ModelQuestion& question) {
   auto judged = std::make_unique<JudgedModel>(JudgedModel{
       model, MakeCertainMotion(model.description, horizon, question.cpu_s, question.what)});
@@ -288,10 +289,10 @@ std::unique_ptr<JudgedModel> Examined(const SceneModel& model, double horizon,
             : reference.message;
     return judged;
   }
-  judged->scene = std::make_unique<TrialScene>(TrialScene{
+  judged->problem = std::make_unique<TrialProblem>(TrialProblem{
       .user = model.description, .reference = reference, .horizon = horizon, .points = {}});
   try {
-    judged->bench = MakeTrialBench(*judged->scene);
+    judged->bench = MakeTrialBench(*judged->problem);
     judged->trial = judged->bench->Try(Alike(), question.cpu_s);
   } catch (const std::runtime_error& error) {
     judged->fault = error.what();
@@ -300,15 +301,15 @@ std::unique_ptr<JudgedModel> Examined(const SceneModel& model, double horizon,
   return judged;
 }
 
-Record KeysOf(const MechanismFile& file, const SceneModel& model, const ModelQuestion& question) {
+Record KeysOf(const MechanismFile& file, const ProblemModel& model, const ModelQuestion& question) {
   const Choice alike = Alike();
   Record keys;
   keys.Set("kind", std::string("model"));
   keys.Set("mechanism", file.description.name);
   keys.Set("model", model.name);
-  keys.Set("formulation", alike.column.formulation);
-  keys.Set("enforcement", std::string(ToString(alike.column.enforcement)));
-  keys.Set("coordinates", std::string(ToString(alike.column.coordinates)));
+  keys.Set("formulation", alike.method.formulation);
+  keys.Set("enforcement", std::string(ToString(alike.method.enforcement)));
+  keys.Set("coordinates", std::string(ToString(alike.method.coordinates)));
   keys.Set("integrator", alike.integrator);
   keys.Set("rtol", alike.rtol);
   keys.Set("horizon", question.horizon);
@@ -364,7 +365,7 @@ void WriteRatios(const Trial& whole, const Trial& trial, Record& record) {
 
 }  // namespace
 
-std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels& models,
+std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemModels& models,
                                     const ModelQuestion& question) {
   std::vector<std::unique_ptr<JudgedModel>> all;
   all.push_back(Examined(models.models.front(), question.horizon, question));
@@ -382,9 +383,9 @@ std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels
   for (int i = 0; i < kRepeats; ++i) {
     for (const auto& judged : all) {
       const bool ran = judged->bench != nullptr && judged->trial.outcome == Outcome::kFinished;
-      if (ran) judged->bench->TimeAgain(&judged->trial);
+      if (ran) judged->bench->Remeasure(&judged->trial);
     }
-    if (all.front()->bench != nullptr) all.front()->bench->TimeAgain(&again);
+    if (all.front()->bench != nullptr) all.front()->bench->Remeasure(&again);
   }
   const Trial& whole = all.front()->trial;
   const double spread = AaSpread({whole.wall_s}, {again.wall_s});
@@ -428,9 +429,9 @@ CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon
     return certain.reference.trust_horizon;
   };
   // a reference is certified up to one of its output times, so the run needs the same times
-  constexpr int kFewest = 41, kMostEnds = 8;
+  constexpr int kFewest = 41, kMaxEnds = 8;
   double end = make();
-  for (int i = 0; i < kMostEnds && end > 0.0 && end < certain.horizon; ++i) {
+  for (int i = 0; i < kMaxEnds && end > 0.0 && end < certain.horizon; ++i) {
     const int trusted = static_cast<int>(certain.reference.NumTrusted());
     certain.options.points = trusted < kFewest ? all : trusted;
     certain.horizon = end;
@@ -453,7 +454,7 @@ CertainMotion MakeCertainMotion(const MechanismDescription&, double, double,
 #endif
 
 CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& whole_reference,
-                         const SceneModel& model, const Reference& reference,
+                         const ProblemModel& model, const Reference& reference,
                          const std::vector<std::string>& names) {
   CausedError error;
   const std::size_t count = std::min(whole_reference.NumTrusted(), reference.NumTrusted());

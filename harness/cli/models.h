@@ -19,11 +19,11 @@ namespace loopbench::harness {
 // Models of one problem: the full model, one per applicable rule, and all rules combined.
 
 /// A model in the form in which it is written.
-struct SceneModel {
+struct ProblemModel {
   std::string name;  ///< "full", a rule's name or "combined"; with a number if it has parts
   bool is_exact = true;
   MechanismDescription description;
-  SceneObservation observe;
+  ObservedQuantities observe;
   std::vector<std::string> done, dropped;
   std::string assumption;
   Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();
@@ -33,26 +33,27 @@ struct SceneModel {
 };
 
 /// Result of each simplification rule on the full model, applicable or not, in rule order.
-struct SceneModels {
-  std::vector<std::pair<const Idea*, Simplified>> ideas;
+struct ProblemModels {
+  std::vector<std::pair<const SimplificationRule*, Simplified>> ideas;
   /// Full model first, alone if no rule applies; last all rules combined, if several apply.
-  std::vector<SceneModel> models;
+  std::vector<ProblemModel> models;
 };
 
-SceneModels MakeModels(const MechanismFile& file, const std::vector<const Idea*>& ideas,
-                       const ShortRun& run, const SimplifyOptions& options);
+ProblemModels MakeModels(const MechanismFile& file,
+                         const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
+                         const SimplifyOptions& options);
 
 /// Runs all models for `horizon` seconds with small steps, each with at most `cpu_s`, and sets
 /// their errors.
-void MeasureErrors(double horizon, double cpu_s, SceneModels* ladder);
+void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder);
 
 /// Returns the bodies and named points of the full model that the other lacks. Each line has one
 /// body, the new places of its points, and the points that no longer exist.
-std::vector<std::string> Gone(const MechanismDescription& whole,
-                              const MechanismDescription& simplified);
+std::vector<std::string> RemovedParts(const MechanismDescription& whole,
+                                      const MechanismDescription& simplified);
 
 /// Name of the experiment file that runs all models: NAME-ladder.json.
-std::string LadderFileName(const SceneModels& ladder);
+std::string LadderFileName(const ProblemModels& ladder);
 
 /// Writes NAME.json of all models, the experiment and models.md. All files are written next to the
 /// folder and read back before it is renamed. With `force` they atomically replace files of these
@@ -60,7 +61,7 @@ std::string LadderFileName(const SceneModels& ladder);
 ///
 /// @throws ConfigError if the folder exists and is not empty, unless `force`; std::runtime_error if
 /// something cannot be written.
-void WriteModels(const SceneModels& ladder, double horizon, const std::string& typed,
+void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
                  const std::filesystem::path& folder, bool force);
 
 // Errors and costs of simpler models of one mechanism, as records of kind "model"
@@ -78,7 +79,7 @@ struct ModelQuestion {
 /// model is the largest distance of a named point between its certified motion and the full
 /// model's. Acceptance adds both certificates to the error. A model that cannot be judged is
 /// rejected with the reason.
-std::vector<Record> RecordsOfModels(const MechanismFile& file, const SceneModels& models,
+std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemModels& models,
                                     const ModelQuestion& question);
 
 // Certified motion of a mechanism: the reference for advice and models.
@@ -108,7 +109,7 @@ struct CausedError {
 /// Compares points in the full model's axes. `names` are BODY.POINT; empty: all named points of the
 /// full model that the other has.
 CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& whole_reference,
-                         const SceneModel& model, const Reference& reference,
+                         const ProblemModel& model, const Reference& reference,
                          const std::vector<std::string>& names);
 
 }  // namespace loopbench::harness

@@ -78,14 +78,14 @@ struct Plan {
 class Times {
  public:
   void Add(const Case& one, double seconds) {
-    Sum& sum = sums_[one.mechanism + "\n" + ToString(one.column)];
+    Sum& sum = sums_[one.mechanism + "\n" + ToString(one.method)];
     sum.seconds += seconds;
     ++sum.cases;
   }
 
   /// Returns the time of the whole line [s].
   double Of(const CaseLine& line) const {
-    const auto sum = sums_.find(line.mechanism + "\n" + line.column);
+    const auto sum = sums_.find(line.mechanism + "\n" + line.method);
     if (sum == sums_.end()) return 0.0;
     return sum->second.seconds * static_cast<double>(line.cases) /
            static_cast<double>(sum->second.cases);
@@ -116,7 +116,7 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
   for (std::size_t i = 0; i < experiments.size(); ++i) {
     const Experiment& experiment = experiments[i];
     for (const Case& one : SelectCases(experiment, command.files.filter)) {
-      add(fmt::format("{} {}", one.mechanism, ToString(one.column)), [&, i, one] {
+      add(fmt::format("{} {}", one.mechanism, ToString(one.method)), [&, i, one] {
         const auto known = earlier.find(SameRun(Identified(experiments[i], one).keys));
         plan.known += known != earlier.end() ? 1 : 0;
         const auto runs = static_cast<double>(RunsOf(one));
@@ -182,21 +182,21 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   const Experiment& first = overview.experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
   PrintAxes(overview);
-  Print("  {} problems, {} methods, {} tolerances", first.scenes.size(), first.columns.size(),
+  Print("  {} problems, {} methods, {} tolerances", first.problems.size(), first.methods.size(),
         first.tolerances.size());
   if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
   if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
   Print("\n\n");
   Table table;
   table.columns = {{"mechanism", "mechanism", Format::kText, {}},
-                   {"column", "method", Format::kText, {}},
+                   {"method", "method", Format::kText, {}},
                    {"cases", "cases", Format::kInteger, {}},
                    {"runs", "runs", Format::kInteger, {}},
                    {"seconds", "estimate [s]", Format::kShortest, {}}};
   for (const Line& line : plan.lines) {
     Record row;
     row.Set("mechanism", line.mechanism);
-    row.Set("column", line.column);
+    row.Set("method", line.method);
     row.Set("cases", static_cast<std::int64_t>(line.cases));
     row.Set("runs", static_cast<std::int64_t>(line.runs));
     row.Set("seconds", std::round(line.seconds * 100.0) / 100.0);
@@ -242,7 +242,7 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
   for (const Line& line : plan.lines) {
     lines.push_back(JsonObject()
                         .Add("mechanism", line.mechanism)
-                        .Add("method", line.column)
+                        .Add("method", line.method)
                         .Add("cases", Count(line.cases))
                         .Add("runs", Count(line.runs))
                         .Add("seconds", line.seconds));

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/cli/commands.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/free_figure.h"
@@ -36,7 +36,7 @@ namespace {
 
 using Write = std::function<void(std::string_view)>;
 
-void RefuseWhatNeedsAllRows(const TableCommand& command, const SceneReader& reader) {
+void RefuseWhatNeedsAllRows(const TableCommand& command, const ProblemReader& reader) {
   const TableView& view = command.view;
   const std::string found =
       fmt::format("{}: found {} records of {:.1f} GB", command.store.string(), reader.records(),
@@ -46,7 +46,7 @@ void RefuseWhatNeedsAllRows(const TableCommand& command, const SceneReader& read
     throw ConfigError(fmt::format(
         "{}, expected at most {} that fit into memory for a table that people read: choose some "
         "with --where PARAMETER=..., or write all with --format csv",
-        found, kMostHeld));
+        found, kMaxHeld));
   }
   const std::string needs_all = !view.sort.empty()         ? "--sort"
                                 : !view.group.empty()      ? "--group"
@@ -56,14 +56,14 @@ void RefuseWhatNeedsAllRows(const TableCommand& command, const SceneReader& read
   if (needs_all.empty()) return;
   throw ConfigError(
       fmt::format("{}, expected at most {} that fit into memory with {}: choose some with --where",
-                  found, kMostHeld, needs_all));
+                  found, kMaxHeld, needs_all));
 }
 
 /// Writer of the rows of one table, one by one.
-class SceneRows {
+class ProblemRows {
  public:
   /// `samples`: a record of each set of keys.
-  SceneRows(const TableCommand& command, const std::vector<Record>& samples, Write write)
+  ProblemRows(const TableCommand& command, const std::vector<Record>& samples, Write write)
       : view_(command.view), is_json_(command.format == "json"), write_(std::move(write)) {
     RequireConditions("--where", view_.where, samples);
     view_.kind = KindOf(view_, samples);
@@ -102,7 +102,7 @@ class SceneRows {
 
 }  // namespace
 
-int WriteLongTable(const TableCommand& command, const SceneReader& reader,
+int WriteLongTable(const TableCommand& command, const ProblemReader& reader,
                    const std::string& typed) {
   RefuseWhatNeedsAllRows(command, reader);
   std::vector<std::string> notes = Provenance(typed), warnings;
@@ -111,9 +111,11 @@ int WriteLongTable(const TableCommand& command, const SceneReader& reader,
   }
   struct NoRows {};  // leaves an existing file unchanged
   const auto fill = [&](const Write& write) {
-    SceneRows writer(command, reader.samples(), write);
+    ProblemRows writer(command, reader.samples(), write);
     reader.ForEach(
-        [&](std::vector<Record> records) { writer.Add(Prepared(std::move(records)), notes); },
+        [&](std::vector<Record> records) {
+          writer.Add(LatestWithWarnings(std::move(records)), notes);
+        },
         &warnings);
     if (writer.rows() == 0) throw NoRows();
     writer.End(notes);
@@ -135,21 +137,21 @@ int WriteLongTable(const TableCommand& command, const SceneReader& reader,
 
 Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where) {
   if (!IsLarge(StoreFile(store))) return {LoadRecords(store, where), {}};
-  const Room room(store);
+  const MemoryBudget room(store);
   struct TooMany {};
   if (ChoosesLines(where)) {
     try {
       return {LoadRecords(store, where,
                           [&room](std::size_t records, std::uint64_t bytes) {
-                            if (records > kMostHeld || !room.Has(bytes)) throw TooMany();
+                            if (records > kMaxHeld || !room.Has(bytes)) throw TooMany();
                           }),
               {}};
     } catch (const TooMany&) {
       // even the selection is too large
     }
   }
-  SceneReader reader(store, where);
-  if (reader.records() > kMostHeld || !room.Has(reader.bytes())) return {{}, std::move(reader)};
+  ProblemReader reader(store, where);
+  if (reader.records() > kMaxHeld || !room.Has(reader.bytes())) return {{}, std::move(reader)};
   return {LoadRecords(store, where), {}};
 }
 
@@ -168,17 +170,18 @@ double FreeMemory(bool with_own) {
   return free == 0.0 ? left : std::min(free, left);
 }
 
-Room::Room(std::filesystem::path store) : store_(std::move(store)), free_(FreeMemory()) {}
+MemoryBudget::MemoryBudget(std::filesystem::path store)
+    : store_(std::move(store)), free_(FreeMemory()) {}
 
 namespace {
 constexpr double kGrows = 4.0;  // memory of a record relative to its line, measured
 }  // namespace
 
-bool Room::Has(std::uint64_t bytes) const {
+bool MemoryBudget::Has(std::uint64_t bytes) const {
   return free_ == 0.0 || kGrows * static_cast<double>(bytes) < 0.9 * free_;
 }
 
-void Room::Require(const std::string& found, std::uint64_t bytes) const {
+void MemoryBudget::Require(const std::string& found, std::uint64_t bytes) const {
   if (Has(bytes)) return;
   throw ConfigError(fmt::format(
       "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
@@ -186,17 +189,17 @@ void Room::Require(const std::string& found, std::uint64_t bytes) const {
       store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9));
 }
 
-std::vector<Record> Prepared(std::vector<Record> records) {
+std::vector<Record> LatestWithWarnings(std::vector<Record> records) {
   records = LatestRecords(records, CodeVersion());
   SortRows(&records);  // the store has the order in which runs ended
-  SetDoubts(&records);
+  SetWarnings(&records);
   return records;
 }
 
 std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where,
                                 const ReadWatch& watch) {
   const std::filesystem::path file = StoreFile(store);
-  const Room room(store);
+  const MemoryBudget room(store);
   if (IsLarge(file) && !ChoosesLines(where)) {
     room.Require("all its records", std::filesystem::file_size(file));
   }
@@ -205,7 +208,7 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store, const Select
     if (watch) watch(records, bytes);
     room.Require(fmt::format("{} records and more", records), bytes);
   };
-  std::vector<Record> records = Prepared(ReadRecords(store, where, &warnings, look));
+  std::vector<Record> records = LatestWithWarnings(ReadRecords(store, where, &warnings, look));
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return records;
 }
@@ -260,21 +263,21 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
   for (const std::string& note : Provenance(typed)) Print("{}\n", note);
 }
 
-int DoubtGate(const std::vector<Record>& rows) {
-  std::size_t runs = 0, failed = 0, doubted = 0;
+int WarningGate(const std::vector<Record>& rows) {
+  std::size_t runs = 0, failed = 0, flagged = 0;
   for (const Record& row : rows) {
     if (row.Text("kind") != "accuracy") continue;
     ++runs;
     failed += HasFailed(row) ? 1 : 0;
-    doubted += HasDoubt(row) ? 1 : 0;
+    flagged += HasWarning(row) ? 1 : 0;
   }
   if (runs == 0) {
     throw ConfigError(
         "--fail-on warnings: found no accuracy run, expected one: such a gate cannot fail");
   }
-  if (failed + doubted == 0) return 0;
+  if (failed + flagged == 0) return 0;
   PrintError("--fail-on warnings: of {} runs {} did not finish and {} have warnings\n", runs,
-             failed, doubted);
+             failed, flagged);
   return 1;
 }
 

@@ -12,8 +12,8 @@
 #include "harness/figures/judge_figures.h"
 #include "harness/json/json_document.h"
 #include "harness/judge/claims.h"
-#include "harness/judge/failure_map.h"
 #include "harness/judge/reports.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/record/provenance.h"
 #include "harness/report/html.h"
 #include "harness/store/result_store.h"
@@ -88,14 +88,14 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
 }
 
 /// Draws a figure of a store that is too large for memory.
-int DrawMany(const SceneReader& reader, const PlotCommand& command) {
+int DrawMany(const ProblemReader& reader, const PlotCommand& command) {
   RequireConditions("--where", command.where, reader.samples());
   RequireKeys(command.free, reader.samples());
-  DistinctPoints points(command.free, kMostHeld);
+  DistinctPoints points(command.free, kMaxHeld);
   std::vector<std::string> warnings;
   reader.ForEach(
       [&](std::vector<Record> records) {
-        for (const Record& one : Filter(Prepared(std::move(records)), command.where)) {
+        for (const Record& one : Filter(LatestWithWarnings(std::move(records)), command.where)) {
           points.Add(one);
         }
       },
@@ -112,7 +112,7 @@ int DrawMany(const SceneReader& reader, const PlotCommand& command) {
 }
 
 /// Writes robustness-map.csv, .md and the picture; prints the reason if the picture fails.
-int WriteMap(const FailureMap& map, const MapCommand& command, const std::string& typed) {
+int WriteMap(const RobustnessMap& map, const MapCommand& command, const std::string& typed) {
   const std::filesystem::path stem = command.out / "robustness-map";
   Table cells = MapCellTable(map);
   AppendProvenance(cells, typed);
@@ -133,7 +133,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
                     "of it), or a store",
                     command.store.string()));
   }
-  const FailureMap map = MapFromCsv(rules, ReadTextFile(command.store), command.store.string());
+  const RobustnessMap map = MapFromCsv(rules, ReadTextFile(command.store), command.store.string());
   const std::string picture = (command.out / ("robustness-map." + command.format)).string();
   if (const auto error = WriteMapFigure(picture, map, FigureSizes().at(command.size))) {
     PrintError("{}\n", Lines{*error});
@@ -144,7 +144,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
 }
 
 /// Throws if there is no demand: the gate could not fail, and success would be meaningless.
-void RequireDemands(const FailureMap& map, const std::filesystem::path& rules) {
+void RequireDemands(const RobustnessMap& map, const std::filesystem::path& rules) {
   for (const auto& group : map.cells) {
     for (const auto& row : group) {
       if (std::ranges::any_of(row, &MapCell::demanded)) return;
@@ -178,7 +178,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
     WriteFileAtomically(command.out, RenderKept(table, command.format));
     Print("wrote {}\n", command.out.string());
   }
-  return command.gate.empty() ? 0 : DoubtGate(table.rows);
+  return command.gate.empty() ? 0 : WarningGate(table.rows);
 }
 
 int Plot(const PlotCommand& command) {
@@ -189,7 +189,7 @@ int Plot(const PlotCommand& command) {
     throw ConfigError(fmt::format(
         "{}: found {} records, expected at most {} that fit into memory for figures of runs: "
         "choose some with --where PARAMETER=..., or draw single values with --x KEY --y KEY",
-        command.store.string(), loaded.many->records(), kMostHeld));
+        command.store.string(), loaded.many->records(), kMaxHeld));
   }
   RequireConditions("--where", command.where, loaded.records);
   const std::vector<Record> records = Filter(loaded.records, command.where);
@@ -220,7 +220,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
     return 2;
   }
   RequireOneContent(records, command.store, "robustness");
-  const FailureMap map = MakeFailureMap(rules, records);
+  const RobustnessMap map = MakeRobustnessMap(rules, records);
   if (command.gate) RequireDemands(map, command.rules);
   Table table = MapTable(map);
   AppendProvenance(table, typed);
@@ -369,7 +369,7 @@ int WriteReport(const ReportCommand& command, const std::string& typed) {
   const std::string page = ToHtml(data);
   WriteFileAtomically(out, page);
   Print("wrote {}: {} runs, {} of them failed and {} flagged, {} kB\n", out.string(), data.runs,
-        data.failed, data.doubted, (page.size() + 999) / 1000);
+        data.failed, data.flagged, (page.size() + 999) / 1000);
   for (const std::string& remark : data.remarks) Print("  {}\n", remark);
   for (const std::string& file : data.changed) PrintError("{}\n", file);
   return data.changed.empty() ? 0 : 2;

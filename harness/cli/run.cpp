@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/isolation/processes.h"
@@ -98,14 +98,14 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
     Print(
         "results in {}\nNo tables were written: a long sweep's are chosen from it, as by\n"
         "  loopbench table {} --where mechanism={}\n",
-        out.string(), out.string(), workload.first().scenes.front().name);
+        out.string(), out.string(), workload.first().problems.front().name);
     return 0;
   }
   std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
-  SetDoubts(&records);
+  SetWarnings(&records);
   WriteTables(records, out, typed);
   Print("results in {}\n", out.string());
-  return command.gate.empty() ? 0 : DoubtGate(records);
+  return command.gate.empty() ? 0 : WarningGate(records);
 }
 
 int Merge(const MergeCommand& command) {
@@ -125,7 +125,7 @@ int Merge(const MergeCommand& command) {
   std::vector<std::filesystem::path> with_target = files;
   with_target.push_back(target.file());
   const MergedReferences references = MergeReferences(with_target);
-  std::set<std::string> scenes;
+  std::set<std::string> problems;
   for (std::size_t i = 0; i < merged.size(); ++i) {
     const Record record = merged[i];
     std::vector<std::filesystem::path> owners;
@@ -133,7 +133,7 @@ int Merge(const MergeCommand& command) {
     for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
       PrintError("warning: no store has trajectories/{} as the run that is kept wrote it\n", name);
     }
-    if (scenes.insert(record.Text("problem_id")).second) {
+    if (problems.insert(record.Text("problem_id")).second) {
       CopyMechanisms({record}, files, target.file());
     }
     target.Append(record);
@@ -192,7 +192,7 @@ void AddRun(Commands& commands) {
       ->capture_default_str();
   app->add_option("--threads", command.threads,
                   "Threads per right-hand side (O-DCA on long chains); same results")
-      ->check(NumberFrom(1, kMostThreads));
+      ->check(NumberFrom(1, kMaxThreads));
   AddFilter(app, &options.conditions);
   AddSettings(app, &options.settings);
   AddWide(app);

@@ -45,23 +45,23 @@ struct SimplifyCommand {
 /// Returns names of rules, and of the rules with a limit.
 std::vector<std::string> IdeaNames() {
   std::vector<std::string> names;
-  for (const Idea& idea : Ideas()) names.emplace_back(idea.name);
+  for (const SimplificationRule& idea : SimplificationRules()) names.emplace_back(idea.name);
   return names;
 }
 
-const Idea& IdeaNamed(const std::string& name, const std::string& option) {
-  const auto found = std::ranges::find(Ideas(), name, &Idea::name);
-  if (found != Ideas().end()) return *found;
+const SimplificationRule& IdeaNamed(const std::string& name, const std::string& option) {
+  const auto found = std::ranges::find(SimplificationRules(), name, &SimplificationRule::name);
+  if (found != SimplificationRules().end()) return *found;
   const std::string nearest = NearestSpelling(name, IdeaNames());
   throw ConfigError(fmt::format(
       "{} {}: found \"{}\", expected one of {}{}", option, name, name, fmt::join(IdeaNames(), ", "),
       nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest)));
 }
 
-std::vector<const Idea*> Chosen(const std::vector<std::string>& only) {
+std::vector<const SimplificationRule*> Chosen(const std::vector<std::string>& only) {
   for (const std::string& name : only) IdeaNamed(name, "--only");
-  std::vector<const Idea*> chosen;
-  for (const Idea& idea : Ideas()) {
+  std::vector<const SimplificationRule*> chosen;
+  for (const SimplificationRule& idea : SimplificationRules()) {
     const bool wanted = only.empty() || std::ranges::find(only, idea.name) != only.end();
     if (wanted) chosen.push_back(&idea);
   }
@@ -76,7 +76,7 @@ SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
     if (equals == std::string::npos) {
       throw ConfigError(fmt::format("--threshold {}: found no \"=\", expected NAME=VALUE", text));
     }
-    const Idea& idea = IdeaNamed(text.substr(0, equals), "--threshold");
+    const SimplificationRule& idea = IdeaNamed(text.substr(0, equals), "--threshold");
     if (idea.limit == nullptr) {
       throw ConfigError(fmt::format("--threshold {}: found a limit, expected none: {} has none",
                                     text, idea.name));
@@ -94,7 +94,7 @@ SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
   return options;
 }
 
-Table CandidateTable(const Idea& idea, const Simplified& simplified) {
+Table CandidateTable(const SimplificationRule& idea, const Simplified& simplified) {
   Table table;
   table.columns = {{"what", "candidate", Format::kText, {}},
                    {"number", "number", Format::kText, {}},
@@ -110,8 +110,8 @@ Table CandidateTable(const Idea& idea, const Simplified& simplified) {
   return table;
 }
 
-void PrintIdea(const Idea& idea, const Simplified& simplified, const SimplifyOptions& options,
-               const ExplainView& view) {
+void PrintIdea(const SimplificationRule& idea, const Simplified& simplified,
+               const SimplifyOptions& options, const ExplainView& view) {
   const std::string title = fmt::format("{}: {}{}", idea.name, idea.sentence,
                                         idea.is_exact ? "" : " (changes the motion)");
   if (simplified.candidates.empty()) {
@@ -136,7 +136,7 @@ int SpeedsOf(const MechanismDescription& description) {
              : Mechanism<Spatial, double>(description, Coordinates::kJoint).num_u();
 }
 
-void PrintModels(const SceneModels& ladder, const ExplainView& view) {
+void PrintModels(const ProblemModels& ladder, const ExplainView& view) {
   Table table;
   table.columns = {{"name", "model", Format::kText, {}},
                    {"motion", "motion", Format::kText, {}},
@@ -149,7 +149,7 @@ void PrintModels(const SceneModels& ladder, const ExplainView& view) {
                    {"evaluations", "evaluations", Format::kInteger, {}},
                    {"removed", "removed", Format::kText, {}}};
   const MechanismDescription& whole = ladder.models.front().description;
-  for (const SceneModel& model : ladder.models) {
+  for (const ProblemModel& model : ladder.models) {
     Record& row = table.rows.emplace_back();
     row.Set("name", model.name);
     row.Set("motion", std::string(model.is_exact ? "the same" : "changed"));
@@ -199,9 +199,10 @@ double PartOfTime(const SimplifyCommand& command, double part) {
 }
 
 /// Returns motion data of the full model for the rules that need it.
-ShortRun LookAt(const MechanismDescription& whole, const std::vector<const Idea*>& ideas,
+ShortRun LookAt(const MechanismDescription& whole,
+                const std::vector<const SimplificationRule*>& ideas,
                 const SimplifyCommand& command) {
-  const bool looks = std::ranges::any_of(ideas, [](const Idea* idea) {
+  const bool looks = std::ranges::any_of(ideas, [](const SimplificationRule* idea) {
     return idea->name == "constant-parts" || idea->name == "stiff-springs";
   });
   if (!looks || !(command.short_run > 0.0)) return {};
@@ -212,7 +213,7 @@ ShortRun LookAt(const MechanismDescription& whole, const std::vector<const Idea*
   return run;
 }
 
-void PrintIdeas(const SceneModels& ladder, const SimplifyOptions& options,
+void PrintIdeas(const ProblemModels& ladder, const SimplifyOptions& options,
                 const ExplainView& view) {
   std::vector<std::string_view> idle;
   for (const auto& [idea, simplified] : ladder.ideas) {
@@ -227,7 +228,7 @@ void PrintIdeas(const SceneModels& ladder, const SimplifyOptions& options,
 
 /// Stores and prints the error and cost of each model.
 void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
-                   const SceneModels& ladder, const ExplainView& view) {
+                   const ProblemModels& ladder, const ExplainView& view) {
   const std::vector<Record> records = RecordsOfModels(
       file, ladder,
       {.horizon = command.errors,
@@ -245,12 +246,12 @@ void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
 /// Runs in the child process.
 int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
                  const std::string& typed) {
-  const std::vector<const Idea*> ideas = Chosen(command.only);
+  const std::vector<const SimplificationRule*> ideas = Chosen(command.only);
   const SimplifyOptions options = LimitsSaid(command);
   const MechanismFile file = ReadWhole(command);
   Print("{} ({})\n", file.description.name, command.mechanism.string());
   const ShortRun run = LookAt(file.description, ideas, command);
-  SceneModels ladder = MakeModels(file, ideas, run, options);
+  ProblemModels ladder = MakeModels(file, ideas, run, options);
   PrintIdeas(ladder, options, view);
   const bool any = ladder.models.size() > 1;
   if (!command.store.empty()) {
@@ -278,7 +279,7 @@ int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
 /// Returns the default limits: "light-links 0.01, ...".
 std::string LimitsText() {
   std::string text;
-  for (const Idea& idea : Ideas()) {
+  for (const SimplificationRule& idea : SimplificationRules()) {
     if (idea.limit == nullptr) continue;
     text +=
         fmt::format("{}{}={}", text.empty() ? "" : ", ", idea.name, SimplifyOptions{}.*idea.limit);
@@ -306,7 +307,7 @@ int Simplify(const SimplifyCommand& command, bool all, const std::string& typed)
 /// Returns a table of the rules with their thresholds.
 std::string RuleList() {
   std::string rules = "Rules; only those with a threshold change the motion:\n";
-  for (const Idea& rule : Ideas()) {
+  for (const SimplificationRule& rule : SimplificationRules()) {
     rules += fmt::format("  {:16} {}\n", rule.name, rule.sentence);
     if (rule.limit != nullptr) rules += fmt::format("  {:16} threshold: {}\n", "", rule.number);
   }

@@ -148,8 +148,8 @@ ClusterRun ToClusterRun(const Record& record) {
   }
   run.settings = Unlisted(Text(record, "settings"));
   run.conditions = Unlisted(Text(record, "conditions"));
-  run.parts = static_cast<int>(Whole(record, "parts", 1, kMostParts));
-  run.jobs = static_cast<int>(Whole(record, "jobs", 1, kMostJobs));
+  run.parts = static_cast<int>(Whole(record, "parts", 1, kMaxParts));
+  run.jobs = static_cast<int>(Whole(record, "jobs", 1, kMaxJobs));
   run.timing = Flag(record, "with_timing");
   run.isolate = Flag(record, "isolate");
   run.batch_options = Unlisted(Text(record, "batch_options"));

@@ -33,7 +33,7 @@ std::optional<std::map<int, std::string>> QueuedTasks(const std::string& job, st
 //   DIR/logs/          output of the jobs
 //   DIR/whole/         all parts in one store
 
-inline constexpr int kMostParts = 100'000, kMostJobs = 1024;
+inline constexpr int kMaxParts = 100'000, kMaxJobs = 1024;
 
 /// Content and number of parts of a run, with its known jobs.
 struct ClusterRun {

@@ -73,9 +73,9 @@ MechanismDescription BenchmarkMember::Make() const {
   return family.empty() ? description : SizedFamilyOf(family).make(size);
 }
 
-std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Column& column) {
+std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Method& method) {
   return std::string(kNames<BenchmarkKind>[static_cast<std::size_t>(kind)]) + "/" + member.name +
-         "/" + ToString(column);
+         "/" + ToString(method);
 }
 namespace {
 
@@ -190,16 +190,16 @@ const Fields<GroupInFile>& GroupFields() {
        {"", By(Json::object(), ChangeMembers)},
        {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
         "Right-hand sides, integrator steps, or both.", "\"rhs\", \"step\" or both"},
-       {"methods", Columns(&BenchmarkGroup::columns), "Methods that impose the loop constraints.",
+       {"methods", Methods(&BenchmarkGroup::methods), "Methods that impose the loop constraints.",
         "an array of methods"}});
   return fields;
 }
 
 /// Reports peers, which are timed over whole runs only.
 void ReportPeer(const JsonNode& node, const BenchmarkGroup& group) {
-  for (const Column& column : group.columns) {
-    if (!FindFormulation(column.formulation)->is_peer()) continue;
-    node.FailAs(fmt::format("\"{}\"", column.formulation),
+  for (const Method& method : group.methods) {
+    if (!FindFormulation(method.formulation)->is_peer()) continue;
+    node.FailAs(fmt::format("\"{}\"", method.formulation),
                 "a formulation: peers are timed by experiments");
     return;
   }
@@ -210,8 +210,8 @@ void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
                              std::set<std::string>* taken) {
   for (const BenchmarkMember& member : group.members) {
     for (const BenchmarkKind kind : group.kinds) {
-      for (const Column& column : group.columns) {
-        const std::string name = BenchmarkName(kind, member, column);
+      for (const Method& method : group.methods) {
+        const std::string name = BenchmarkName(kind, member, method);
         if (taken->insert(name).second) continue;
         node.FailAs(fmt::format("benchmark \"{}\" again", name), "each benchmark once");
         return;

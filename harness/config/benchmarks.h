@@ -56,7 +56,7 @@ struct BenchmarkMember {
 struct BenchmarkGroup {
   std::vector<BenchmarkMember> members;
   std::vector<BenchmarkKind> kinds;
-  std::vector<Column> columns;
+  std::vector<Method> methods;
 };
 
 /// Hashes of states by "<member>/<coordinates>", such as "chain/10/joint".
@@ -73,7 +73,7 @@ struct BenchmarkSet {
 };
 
 /// "rhs/chain/10/odca/acceleration/joint/rank-revealing".
-std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Column& column);
+std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Method& method);
 
 // Reads benchmarks (configs/benchmarks/default.json):
 //   {"name", "comment", "states", "integrator", "step",

@@ -30,18 +30,18 @@ std::vector<StepChoice> StepChoices(const Experiment& experiment) {
 
 /// Returns the integrators of a method: all of the experiment; for a peer, which has its own, only
 /// one placeholder.
-std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Column& column) {
-  const FormulationRow* row = FindFormulation(column.formulation);
+std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Method& method) {
+  const FormulationRow* row = FindFormulation(method.formulation);
   std::vector<std::string> integrators = experiment.integrators;
   if (row != nullptr && row->is_peer() && integrators.size() > 1) integrators.resize(1);
   return integrators;
 }
 
-Case MakeCase(const Experiment& experiment, std::size_t scene, const Column& column,
+Case MakeCase(const Experiment& experiment, std::size_t problem, const Method& method,
               const StepChoice& choice, double horizon, const std::string& integrator) {
-  Case one{.scene = scene,
-           .mechanism = experiment.scenes[scene].name,
-           .column = column,
+  Case one{.problem = problem,
+           .mechanism = experiment.problems[problem].name,
+           .method = method,
            .integrator = integrator,
            .jacobian = experiment.jacobian,
            .rtol = choice.tolerance,
@@ -68,14 +68,14 @@ void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
 
 }  // namespace
 
-std::string ToString(const Column& column) {
+std::string ToString(const Method& method) {
   const std::string gains =
-      column.gains ? fmt::format("({}, {})", column.gains->alpha, column.gains->beta) : "";
-  const std::string threads = column.threads > 1 ? fmt::format("/{}-threads", column.threads) : "";
-  const bool is_library = column.execution == Execution::kLibrary;
-  const std::string execution = is_library ? "" : fmt::format("/{}", ToString(column.execution));
-  return fmt::format("{}/{}{}/{}/{}{}{}", column.formulation, ToString(column.enforcement), gains,
-                     ToString(column.coordinates), ToString(column.solver), threads, execution);
+      method.gains ? fmt::format("({}, {})", method.gains->alpha, method.gains->beta) : "";
+  const std::string threads = method.threads > 1 ? fmt::format("/{}-threads", method.threads) : "";
+  const bool is_library = method.execution == Execution::kLibrary;
+  const std::string execution = is_library ? "" : fmt::format("/{}", ToString(method.execution));
+  return fmt::format("{}/{}{}/{}/{}{}{}", method.formulation, ToString(method.enforcement), gains,
+                     ToString(method.coordinates), ToString(method.solver), threads, execution);
 }
 
 Record CaseKeys(const Experiment& experiment, const Case& one) {
@@ -83,11 +83,11 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("kind", std::string("accuracy"));
   keys.Set("experiment", experiment.name);
   keys.Set("mechanism", one.mechanism);
-  keys.Set("formulation", one.column.formulation);
-  keys.Set("enforcement", std::string(ToString(one.column.enforcement)));
-  keys.Set("coordinates", std::string(ToString(one.column.coordinates)));
-  keys.Set("solver", std::string(ToString(one.column.solver)));
-  const FormulationRow* row = FindFormulation(one.column.formulation);
+  keys.Set("formulation", one.method.formulation);
+  keys.Set("enforcement", std::string(ToString(one.method.enforcement)));
+  keys.Set("coordinates", std::string(ToString(one.method.coordinates)));
+  keys.Set("solver", std::string(ToString(one.method.solver)));
+  const FormulationRow* row = FindFormulation(one.method.formulation);
   const bool is_peer = row != nullptr && row->is_peer();
   keys.Set("integrator", is_peer ? row->integrator : one.integrator);
   const Profile* profile = FindProfile(one.integrator);
@@ -100,13 +100,13 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("atol", is_fixed ? Value() : Value(one.atol));
   if (is_fixed) keys.Set("step", one.step);
   keys.Set("horizon", one.horizon);
-  if (one.column.gains) {
-    keys.Set("alpha", one.column.gains->alpha);
-    keys.Set("beta", one.column.gains->beta);
+  if (one.method.gains) {
+    keys.Set("alpha", one.method.gains->alpha);
+    keys.Set("beta", one.method.gains->beta);
   }
-  if (one.column.threads > 1) keys.Set("threads", std::int64_t{one.column.threads});
-  if (one.column.execution != Execution::kLibrary) {
-    keys.Set("execution", std::string(ToString(one.column.execution)));
+  if (one.method.threads > 1) keys.Set("threads", std::int64_t{one.method.threads});
+  if (one.method.execution != Execution::kLibrary) {
+    keys.Set("execution", std::string(ToString(one.method.execution)));
   }
   for (const auto& [name, value] : experiment.parameters.items()) keys.Set(name, value);
   return keys;
@@ -122,27 +122,27 @@ double ExpectedSteps(const Case& one) {
 }
 
 void UseThreads(int threads, Experiment& experiment) {
-  const auto use = [threads](std::vector<Column>& columns) {
-    std::vector<Column> all;
-    for (Column& column : columns) {
-      if (!FindFormulation(column.formulation)->is_peer()) column.threads = threads;
-      if (std::ranges::find(all, column) == all.end()) all.push_back(column);
+  const auto use = [threads](std::vector<Method>& methods) {
+    std::vector<Method> all;
+    for (Method& method : methods) {
+      if (!FindFormulation(method.formulation)->is_peer()) method.threads = threads;
+      if (std::ranges::find(all, method) == all.end()) all.push_back(method);
     }
-    columns = std::move(all);
+    methods = std::move(all);
   };
-  use(experiment.columns);
-  use(experiment.timing.columns);
-  for (TimingFamily& family : experiment.timing.families) use(family.columns);
+  use(experiment.methods);
+  use(experiment.timing.methods);
+  for (TimingFamily& family : experiment.timing.families) use(family.methods);
 }
 
 bool Matches(const EnsembleRule& rule, const Case& one) {
-  return EmptyOrContains(rule.scenes, one.mechanism) &&
+  return EmptyOrContains(rule.problems, one.mechanism) &&
          EmptyOrContains(rule.horizons, one.horizon) &&
          EmptyOrContains(rule.tolerances, one.rtol) &&
-         EmptyOrContains(rule.formulations, one.column.formulation) &&
-         EmptyOrContains(rule.enforcements, one.column.enforcement) &&
-         EmptyOrContains(rule.coordinates, one.column.coordinates) &&
-         EmptyOrContains(rule.solvers, one.column.solver);
+         EmptyOrContains(rule.formulations, one.method.formulation) &&
+         EmptyOrContains(rule.enforcements, one.method.enforcement) &&
+         EmptyOrContains(rule.coordinates, one.method.coordinates) &&
+         EmptyOrContains(rule.solvers, one.method.solver);
 }
 
 namespace {
@@ -151,12 +151,12 @@ namespace {
 std::vector<Case> ExpandRuns(const Experiment& experiment) {
   std::vector<Case> cases;
   const std::vector<StepChoice> choices = StepChoices(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    for (const double horizon : experiment.scenes[scene].horizons) {
-      for (const Column& column : experiment.columns) {
-        for (const std::string& integrator : IntegratorsOf(experiment, column)) {
+  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
+    for (const double horizon : experiment.problems[problem].horizons) {
+      for (const Method& method : experiment.methods) {
+        for (const std::string& integrator : IntegratorsOf(experiment, method)) {
           for (const StepChoice& choice : choices) {
-            cases.push_back(MakeCase(experiment, scene, column, choice, horizon, integrator));
+            cases.push_back(MakeCase(experiment, problem, method, choice, horizon, integrator));
           }
         }
       }
@@ -188,13 +188,13 @@ std::vector<Case> ExpandLadders(const Experiment& experiment) {
   std::vector<Case> cases;
   const Precision& precision = experiment.precision;
   if (precision.scalars.empty() || precision.tolerances.empty()) return cases;
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    const std::vector<double>& horizons = experiment.scenes[scene].horizons;
+  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
+    const std::vector<double>& horizons = experiment.problems[problem].horizons;
     if (horizons.empty()) continue;
     const double horizon = HorizonOr(precision.horizon, horizons);
-    for (const Column& column : experiment.columns) {
+    for (const Method& method : experiment.methods) {
       // the only integrator available in every scalar
-      cases.push_back(MakeCase(experiment, scene, column,
+      cases.push_back(MakeCase(experiment, problem, method,
                                {.tolerance = precision.tolerances.front()}, horizon, "ode45"));
     }
   }
@@ -207,13 +207,13 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
   const Timing& timing = experiment.timing;
   if (timing.repeats == 0) return cases;
   if (timing.cases) return ExpandRuns(experiment);
-  for (std::size_t scene = 0; scene < experiment.scenes.size(); ++scene) {
-    const std::vector<double>& horizons = experiment.scenes[scene].horizons;
+  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
+    const std::vector<double>& horizons = experiment.problems[problem].horizons;
     if (horizons.empty()) continue;
     const double horizon = HorizonOr(timing.horizon, horizons);
-    for (const Column& column : timing.columns) {
-      for (const std::string& integrator : IntegratorsOf(experiment, column)) {
-        cases.push_back(MakeCase(experiment, scene, column, {.tolerance = timing.tolerance},
+    for (const Method& method : timing.methods) {
+      for (const std::string& integrator : IntegratorsOf(experiment, method)) {
+        cases.push_back(MakeCase(experiment, problem, method, {.tolerance = timing.tolerance},
                                  horizon, integrator));
       }
     }

@@ -72,7 +72,7 @@ inline std::optional<Enforcement> Parse<Enforcement>(std::string_view name) {
 
 /// Method that imposes the loop constraints. For reduction, the plain solver uses the mechanism's
 /// fixed independent set, the rank-revealing solver the automatic partition.
-struct Column {
+struct Method {
   std::string formulation = "odca";  ///< registered name (formulations.h)
   Enforcement enforcement = Enforcement::kAcceleration;
   Coordinates coordinates = Coordinates::kJoint;
@@ -82,18 +82,18 @@ struct Column {
   int threads = 1;  ///< threads for one right-hand side
   Execution execution = Execution::kLibrary;
 
-  friend bool operator==(const Column&, const Column&) = default;
+  friend bool operator==(const Method&, const Method&) = default;
 };
 
 /// Maximum number of threads in files; more than processors have.
-inline constexpr int kMostThreads = 256;
+inline constexpr int kMaxThreads = 256;
 
 /// "odca/acceleration/joint/plain", "odca/baumgarte(5, 5)/joint/rank-revealing",
 /// "odca/velocity/joint/rank-revealing/2-threads".
-std::string ToString(const Column& column);
+std::string ToString(const Method& method);
 
 /// Problem: a mechanism and its simulated times.
-struct ExperimentScene {
+struct ExperimentProblem {
   std::string name;  ///< the mechanism's name unless overridden; unique
   /// Mechanism file, resolved against the experiment's folder; empty for a mechanism in the
   /// experiment file or a member of a family.
@@ -118,7 +118,7 @@ struct EnsembleRule {
   double perturb = 0.02;                 ///< amplitude on the fixed coordinates [rad or m]; or
   std::vector<DrawnCoordinate> between;  ///< drawn coordinates; others are unchanged
   double branch_bound = 1e-6;            ///< branch error beyond which a run has left it [rad]
-  std::vector<std::string> scenes;
+  std::vector<std::string> problems;
   std::vector<double> horizons;
   std::vector<double> tolerances;
   std::vector<std::string> formulations;
@@ -139,7 +139,7 @@ struct Limits {
 struct TimingFamily {
   std::string family;      ///< a SizedFamily (harness/config/benchmarks.h)
   std::vector<int> sizes;  ///< sizes of its members
-  std::vector<Column> columns;
+  std::vector<Method> methods;
 };
 
 /// Timing runs, separate from accuracy runs.
@@ -147,7 +147,7 @@ struct Timing {
   int repeats = 5;              ///< 0: no timing; 5 give a median with a spread
   double tolerance = 1e-8;      ///< rtol = atol
   double horizon = 0.0;         ///< [s]; 0: the shortest of each problem
-  std::vector<Column> columns;  ///< default: as in the experiment
+  std::vector<Method> methods;  ///< default: as in the experiment
   /// If true, every accuracy case is timed with its own integrator, tolerance or step, and horizon,
   /// so that each accuracy row has a timing row with the same keys.
   bool cases = false;
@@ -206,8 +206,8 @@ struct Experiment {
   std::string name;
   std::string comment;
   std::filesystem::path path;
-  std::vector<ExperimentScene> scenes;
-  std::vector<Column> columns;
+  std::vector<ExperimentProblem> problems;
+  std::vector<Method> methods;
   std::vector<double> tolerances;   ///< rtol = atol; may be empty if there are fixed_steps
   std::vector<double> fixed_steps;  ///< [s]; additional cases without error test
   std::vector<std::string> integrators = {"ode45"};  ///< profiles, crossed with all steps
@@ -229,9 +229,9 @@ struct Experiment {
 
 /// Case: all settings that determine a run, except the mechanism.
 struct Case {
-  std::size_t scene = 0;  ///< index in Experiment::scenes
-  std::string mechanism;  ///< the problem's name
-  Column column;
+  std::size_t problem = 0;  ///< index in Experiment::problems
+  std::string mechanism;    ///< the problem's name
+  Method method;
   std::string integrator;
   JacobianKind jacobian = JacobianKind::kForward;
   double rtol = 0.0;       ///< 0 if the step is fixed

@@ -125,8 +125,8 @@ class ExperimentSource::Document {
       cases += CountCases(experiments.back());
       Refuse(cases > kMaxHeldCases, "", fmt::format("{} cases so far", cases),
              fmt::format("at most {} to be held at once", kMaxHeldCases));
-      for (const ExperimentScene& scene : experiments.back().scenes) {
-        bodies += scene.mechanism.description.bodies.size();
+      for (const ExperimentProblem& problem : experiments.back().problems) {
+        bodies += problem.mechanism.description.bodies.size();
       }
       constexpr std::size_t kMaxAllBodies = 2'000'000;  // about 1 GB
       Refuse(bodies > kMaxAllBodies, "", fmt::format("mechanisms with {} bodies so far", bodies),
@@ -231,8 +231,8 @@ class ExperimentSource::Document {
 
 std::size_t CountCases(const Experiment& experiment) {
   std::size_t horizons = 0;
-  for (const ExperimentScene& scene : experiment.scenes) horizons += scene.horizons.size();
-  return horizons * experiment.columns.size() * experiment.integrators.size() *
+  for (const ExperimentProblem& problem : experiment.problems) horizons += problem.horizons.size();
+  return horizons * experiment.methods.size() * experiment.integrators.size() *
          (experiment.tolerances.size() + experiment.fixed_steps.size());
 }
 
@@ -303,8 +303,8 @@ namespace {
 
 using File = ExperimentFile;
 
-void ReadAllColumns(const JsonNode& node, File& file) {
-  file.columns = file.timing.columns = ReadColumns(node);
+void ReadAllMethods(const JsonNode& node, File& file) {
+  file.methods = file.timing.methods = ReadMethods(node);
 }
 
 /// Reads tolerances. An empty list is equal to a missing key; see RequireSteps().
@@ -325,8 +325,8 @@ void RequireSteps(const JsonNode& node, File&) {
 void RequireNoPeerOfFixedSteps(const JsonNode& node, File& file) {
   const auto steps = node.Optional("fixed_steps");
   if (!steps) return;
-  for (const Column& column : file.columns) {
-    const FormulationRow* row = FindFormulation(column.formulation);
+  for (const Method& method : file.methods) {
+    const FormulationRow* row = FindFormulation(method.formulation);
     if (row == nullptr || !row->is_peer()) continue;
     steps->FailAs(fmt::format("fixed steps of \"{}\", which has its own integrator", row->name),
                   "\"tolerances\" alone, or an experiment of its own for peers");
@@ -361,9 +361,9 @@ void RequireDerivatives(const JsonNode& node, File& file) {
       file.integrators, [](const std::string& name) { return FindProfile(name)->is_implicit; });
   if (implicit == file.integrators.end()) return;
   const Profile* profile = FindProfile(*implicit);
-  for (const auto& columns : {file.columns, file.timing.columns}) {
-    for (const Column& column : columns) {
-      const LevelTraits& level = TraitsOf(column.enforcement);
+  for (const auto& methods : {file.methods, file.timing.methods}) {
+    for (const Method& method : methods) {
+      const LevelTraits& level = TraitsOf(method.enforcement);
       if (level.has_derivative) continue;
       integrator->FailAs(
           fmt::format("\"{}\" at level \"{}\", which has no derivative", profile->name, level.name),
@@ -391,9 +391,9 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
       DocumentRows<File>(
           {{"name", Text(&File::name), "Name of the experiment.", "a name"},
            {"comment", Text(&File::comment), "Free text for readers."},
-           {"problems", ScenesValue(), "Problems: a mechanism and a duration each.",
+           {"problems", ProblemsValue(), "Problems: a mechanism and a duration each.",
             "an array of problems"},
-           {"methods", By(ColumnsSchema(), ReadAllColumns),
+           {"methods", By(MethodsSchema(), ReadAllMethods),
             "Methods that impose the loop constraints.", "an array of methods"},
            {"tolerances", By(some_or_none, ReadAnyTolerances),
             "Tolerances rtol = atol of the integrator, above the spacing of doubles. Optional, "
@@ -436,15 +436,15 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
 Json ExperimentSchema() { return ExperimentFileFields().OwnSchema(); }
 
 std::string ExperimentText(const SingleRun& run) {
-  Json column = {{"formulation", run.column.formulation},
-                 {"enforcement", ToString(run.column.enforcement)},
-                 {"coordinates", ToString(run.column.coordinates)}};
+  Json method = {{"formulation", run.method.formulation},
+                 {"enforcement", ToString(run.method.enforcement)},
+                 {"coordinates", ToString(run.method.coordinates)}};
   Json experiment = {
       {"name", run.name},
       {"comment", run.comment},
       {"problems",
        Json::array({{{"mechanism", run.mechanism.generic_string()}, {"horizon", run.horizon}}})},
-      {"methods", Json::array({column})},
+      {"methods", Json::array({method})},
       {"integrator", run.integrator},
       {"timing", {{"cases", true}}},
       {"reference",
@@ -460,18 +460,18 @@ std::string ExperimentText(const SingleRun& run) {
 }
 
 std::string LadderText(const LadderFile& ladder) {
-  Json scenes = Json::array();
+  Json problems = Json::array();
   for (const std::string& mechanism : ladder.mechanisms) {
-    scenes.push_back({{"mechanism", mechanism}, {"horizon", ladder.horizon}});
+    problems.push_back({{"mechanism", mechanism}, {"horizon", ladder.horizon}});
   }
-  const Json columns = Json::array({{{"formulation", {"odca", "lagrange", "reduction"}},
+  const Json methods = Json::array({{{"formulation", {"odca", "lagrange", "reduction"}},
                                      {"enforcement", "projection"},
                                      {"coordinates", "joint"}}});
   const Json file = {
       {"name", ladder.name},
       {"comment", ladder.comment},
-      {"problems", scenes},
-      {"methods", columns},
+      {"problems", problems},
+      {"methods", methods},
       {"tolerances", {1e-6, 1e-9}},
       {"integrator", "dormand-prince"},
       {"preprocess",

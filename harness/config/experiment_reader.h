@@ -110,7 +110,7 @@ struct SingleRun {
   std::string name, comment;
   std::filesystem::path mechanism;  ///< relative to the experiment's folder
   double horizon = 1.0;             ///< [s]
-  Column column;
+  Method method;
   std::string integrator = "ode45";
   double rtol = 1e-8;
   double step = 0.0;  ///< fixed step [s] if positive

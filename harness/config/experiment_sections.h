@@ -22,12 +22,12 @@
 namespace loopbench::harness {
 
 inline constexpr Range kTolerances = {
-    .min = kLeastTolerance,
+    .min = kMinTolerance,
     .max = 0.1,
     .above_min = true,
     .why = " (the spacing of doubles, below which rounding decides)"};
 /// Maximum number of points of a time series: a record of about ten series stays below 2 MB.
-inline constexpr int kMostPoints = 10'000;
+inline constexpr int kMaxPoints = 10'000;
 inline constexpr int kMaxCount = 1'000'000;  ///< limit of counts; larger numbers are typing errors
 inline constexpr std::size_t kMaxRules = 1000;      ///< ensembles, exclusions
 inline constexpr std::size_t kMaxBodies = 200'000;  ///< all problems of one combination
@@ -70,7 +70,7 @@ struct ExperimentFile : Experiment {
 const Fields<ExperimentFile>& ExperimentFileFields();
 
 /// Reader of "problems" with their mechanisms; a family with several counts gives several problems.
-FieldValue<ExperimentFile> ScenesValue();
+FieldValue<ExperimentFile> ProblemsValue();
 /// Member of a family used as a mechanism, with its counts.
 struct FamilyMember {
   MechanismFile mechanism;
@@ -80,8 +80,8 @@ struct FamilyMember {
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room);
 Json FamilySchema();
 /// Returns a list of methods, each entry expanded.
-std::vector<Column> ReadColumns(const JsonNode& node);
-Json ColumnsSchema();
+std::vector<Method> ReadMethods(const JsonNode& node);
+Json MethodsSchema();
 /// Fields of the sections of the same names, and of "series".
 const Fields<Limits>& LimitsFields();
 const Fields<CompileOptions>& CompileFields();
@@ -137,9 +137,9 @@ FieldValue<T> LevelChoices(std::vector<Enforcement> T::*member) {
 }
 
 template <class T>
-FieldValue<T> Columns(std::vector<Column> T::*member) {
-  return {ColumnsSchema(),
-          [=](const JsonNode& node, T& owner) { owner.*member = ReadColumns(node); }};
+FieldValue<T> Methods(std::vector<Method> T::*member) {
+  return {MethodsSchema(),
+          [=](const JsonNode& node, T& owner) { owner.*member = ReadMethods(node); }};
 }
 
 // Fields of an experiment's document by JSON Pointer, for sweeps and --set.

@@ -74,7 +74,7 @@ const Fields<TimingFamily>& TimingFamilyFields() {
         "a family"},
        {"sizes", By(IntegerListSchema(1, kMaxCount), ReadSizes), TextOfSizedFamilies(),
         "a list of integers"},
-       {"methods", Columns(&TimingFamily::columns), "Methods to be timed.", "an array of methods"},
+       {"methods", Methods(&TimingFamily::methods), "Methods to be timed.", "an array of methods"},
        {"", Json::object({{"allOf", ranges}})}});
   return fields;
 }
@@ -126,7 +126,7 @@ const Fields<CompileOptions>& CompileFields() {
 const Fields<Experiment>& SeriesFields() {
   static const Fields<Experiment> fields(
       "series", "Time series in records.",
-      {{"points", Integer(&Experiment::series_points, 2, kMostPoints),
+      {{"points", Integer(&Experiment::series_points, 2, kMaxPoints),
         "Number of points of a time series, for figures."}});
   return fields;
 }
@@ -138,7 +138,7 @@ const Fields<Timing>& TimingFields() {
        {"tolerance", Number(&Timing::tolerance, kTolerances), "rtol = atol of the integrator."},
        {"horizon", Number(&Timing::horizon, kPositive),
         "Simulated time [s]; default: the shortest of each problem."},
-       {"methods", Columns(&Timing::columns), "Methods; default: as in the experiment."},
+       {"methods", Methods(&Timing::methods), "Methods; default: as in the experiment."},
        {"cases", Bool(&Timing::cases),
         "If true, every accuracy case is timed with its own integrator, tolerance or step, and "
         "horizon. Not together with tolerance, horizon or methods."},
@@ -166,7 +166,7 @@ const Fields<Precision>& PrecisionFields() {
 
 namespace {
 
-constexpr int kMostRows = 100'000'000;  // about 50 GB for a small mechanism
+constexpr int kMaxRows = 100'000'000;  // about 50 GB for a small mechanism
 constexpr const char* kOneWay =
     "one of \"step\", \"number\", \"times\" and \"accepted_steps\": true";
 
@@ -205,7 +205,7 @@ const Fields<OutputOptions>& OutputFields() {
       "Trajectory of each case, as a CSV file next to the store. One of step, number, times and "
       "accepted_steps sets the times of rows.",
       {{"step", Number(&OutputOptions::step, kPositive), "Time between rows [s], from 0."},
-       {"number", Integer(&OutputOptions::number, 2, kMostRows),
+       {"number", Integer(&OutputOptions::number, 2, kMaxRows),
         "Number of rows, evenly from the start to the end."},
        {"times", NumberList(&OutputOptions::times, {.min = 0.0}),
         "Ascending times [s]. Times beyond a horizon are left out."},
@@ -231,15 +231,15 @@ void RequireOutput(const JsonNode& node, ExperimentFile& file) {
                    "\"islands\": false in \"compile\": rows are of the whole mechanism");
   }
   double longest = 0.0;
-  for (const ExperimentScene& scene : file.scenes) {
-    for (const double horizon : scene.horizons) longest = std::max(longest, horizon);
+  for (const ExperimentProblem& problem : file.problems) {
+    for (const double horizon : problem.horizons) longest = std::max(longest, horizon);
   }
-  if (file.output->step > 0.0 && longest / file.output->step > kMostRows) {
+  if (file.output->step > 0.0 && longest / file.output->step > kMaxRows) {
     output->FailAs(fmt::format("{:.3g} rows", longest / file.output->step),
-                   fmt::format("at most {}", kMostRows));
+                   fmt::format("at most {}", kMaxRows));
   }
-  for (const Column& column : file.columns) {
-    const FormulationRow* row = FindFormulation(column.formulation);
+  for (const Method& method : file.methods) {
+    const FormulationRow* row = FindFormulation(method.formulation);
     if (row == nullptr || !row->is_peer() || file.output->accepted_steps) continue;
     return output->FailAs(
         fmt::format("output at given times of \"{}\", which has its own integrator", row->name),
@@ -287,27 +287,27 @@ namespace {
 constexpr std::array<const char*, 3> kOfCertified = {"scalar", "points", "cpu_s"};
 
 /// Reads published data of one problem; its errors are added to the experiment's errors.
-void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentScene* scene) {
+void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentProblem* problem) {
   const std::string named = node.Text();
   if (named.empty()) return;
   const std::filesystem::path path = files.Resolve(named);
   if (!ExpectFile(node, path, "a published series")) return;
   // names of an unreadable mechanism are unknown
-  const MechanismDescription& mechanism = scene->mechanism.description;
+  const MechanismDescription& mechanism = problem->mechanism.description;
   try {
-    scene->series = ReadPublishedSeries(path, mechanism.bodies.size() > 1 ? &mechanism : nullptr);
+    problem->series = ReadPublishedSeries(path, mechanism.bodies.size() > 1 ? &mechanism : nullptr);
   } catch (const ConfigError& mistakes) {
     node.errors().AddText(mistakes.what());
   }
 }
 
 void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
-  std::vector<ExperimentScene>& scenes = experiment.scenes;
+  std::vector<ExperimentProblem>& problems = experiment.problems;
   if (node.value().is_string()) {
-    if (scenes.size() == 1) {
-      ReadSeriesOf(node, *experiment.files, &scenes.front());
-    } else if (scenes.size() > 1) {
-      node.FailAs(fmt::format("one file for {} problems", scenes.size()),
+    if (problems.size() == 1) {
+      ReadSeriesOf(node, *experiment.files, &problems.front());
+    } else if (problems.size() > 1) {
+      node.FailAs(fmt::format("one file for {} problems", problems.size()),
                   "an object with the file of each problem that has one, by the problem's name");
     }
     return;
@@ -317,12 +317,12 @@ void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
     return;
   }
   NameList names;
-  for (const ExperimentScene& scene : scenes) names.Add(scene.name);
+  for (const ExperimentProblem& problem : problems) names.Add(problem.name);
   if (!node.ExpectObject(names)) return;
   if (node.value().empty()) node.Fail("at least one problem with its file");
-  for (ExperimentScene& scene : scenes) {
-    if (const auto file = node.Optional(scene.name)) {
-      ReadSeriesOf(*file, *experiment.files, &scene);
+  for (ExperimentProblem& problem : problems) {
+    if (const auto file = node.Optional(problem.name)) {
+      ReadSeriesOf(*file, *experiment.files, &problem);
     }
   }
 }
@@ -354,7 +354,7 @@ const Fields<ReferenceOptions>& ReferenceFields() {
       {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
         "Floating-point type. float128 has 33 digits, takes about 50 times as long, and is for "
         "planar mechanisms; as-needed adds it if long-double does not certify to the end."},
-       {"points", Integer(&ReferenceOptions::points, 2, kMostPoints),
+       {"points", Integer(&ReferenceOptions::points, 2, kMaxPoints),
         "Number of times with errors, evenly from the start to the end."},
        {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
         "CPU time of each integration [s]. If it is exceeded, only the completed part is "

@@ -302,18 +302,18 @@ void Sweep::Note(Origins* origins) const {
 namespace {
 
 /// Entry of "methods", expanded as a cross product.
-struct ColumnLists {
+struct MethodLists {
   std::vector<std::string> formulations;
   std::vector<Enforcement> enforcements;
-  std::vector<Coordinates> coordinates = {Column().coordinates};
-  std::vector<SolverKind> solvers = {Column().solver};
+  std::vector<Coordinates> coordinates = {Method().coordinates};
+  std::vector<SolverKind> solvers = {Method().solver};
   std::optional<BaumgarteGains> gains;
-  std::vector<std::int64_t> threads = {Column().threads};
-  std::vector<Execution> executions = {Column().execution};
+  std::vector<std::int64_t> threads = {Method().threads};
+  std::vector<Execution> executions = {Method().execution};
 };
 
 /// Reports a level that a formulation does not have.
-void RequireLevels(const JsonNode& node, ColumnLists& lists) {
+void RequireLevels(const JsonNode& node, MethodLists& lists) {
   for (const std::string& formulation : lists.formulations) {
     const FormulationRow& row = *FindFormulation(formulation);
     for (const Enforcement level : lists.enforcements) {
@@ -327,14 +327,14 @@ void RequireLevels(const JsonNode& node, ColumnLists& lists) {
 }
 
 /// Reports options that a peer does not have: it has its own coordinates and solver.
-void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
+void RequirePeersOwn(const JsonNode& node, MethodLists& lists) {
   for (const std::string& formulation : lists.formulations) {
     if (!FindFormulation(formulation)->is_peer()) continue;
     const auto refuse = [&](std::string_view key, std::string_view found, std::string_view only) {
       node.FailAs(fmt::format("\"{}\" with {} \"{}\"", formulation, key, found),
                   fmt::format("\"{}\", or nothing: a peer has its own", only));
     };
-    static const Column kOwn;
+    static const Method kOwn;
     for (const Coordinates set : lists.coordinates) {
       if (set != kOwn.coordinates) refuse("coordinates", ToString(set), ToString(kOwn.coordinates));
     }
@@ -354,7 +354,7 @@ void RequirePeersOwn(const JsonNode& node, ColumnLists& lists) {
 }
 
 /// Reads both gains of Baumgarte stabilisation, or none; other levels have no gains.
-void ReadGains(const JsonNode& node, ColumnLists& lists) {
+void ReadGains(const JsonNode& node, MethodLists& lists) {
   const auto alpha = node.Optional("alpha"), beta = node.Optional("beta");
   if (!alpha && !beta) return;
   const bool only = lists.enforcements == std::vector<Enforcement>{Enforcement::kBaumgarte};
@@ -369,22 +369,22 @@ void ReadGains(const JsonNode& node, ColumnLists& lists) {
   if (b) lists.gains->beta = b->Number(kNotNegative);
 }
 
-const Fields<ColumnLists>& ColumnFields() {
-  static const Fields<ColumnLists> fields(
-      "column", "Method that imposes the loop constraints. Lists expand as a cross product.",
-      {{"formulation", FormulationChoices(&ColumnLists::formulations),
+const Fields<MethodLists>& MethodFields() {
+  static const Fields<MethodLists> fields(
+      "method", "Method that imposes the loop constraints. Lists expand as a cross product.",
+      {{"formulation", FormulationChoices(&MethodLists::formulations),
         "Algorithm that imposes the constraints.", "a formulation"},
-       {"enforcement", LevelChoices(&ColumnLists::enforcements),
+       {"enforcement", LevelChoices(&MethodLists::enforcements),
         "Level at which constraints are enforced.", "a level of enforcement"},
        {"coordinates",
-        Choices(&ColumnLists::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
+        Choices(&MethodLists::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
         "Coordinates of the joints of a tree, or of every body."},
-       {"solver", Choices(&ColumnLists::solvers, NamesOf<SolverKind>(), "a solver"),
+       {"solver", Choices(&MethodLists::solvers, NamesOf<SolverKind>(), "a solver"),
         "Solver of the formulation. In reduction, plain uses the fixed independent set, "
         "rank-revealing the automatic partition."},
-       {"threads", IntegerList(&ColumnLists::threads, 1, kMostThreads),
+       {"threads", IntegerList(&MethodLists::threads, 1, kMaxThreads),
         "Threads for one right-hand side. Results are bitwise equal for any number."},
-       {"execution", Choices(&ColumnLists::executions, NamesOf<Execution>(), "an execution"),
+       {"execution", Choices(&MethodLists::executions, NamesOf<Execution>(), "an execution"),
         "Right-hand sides by the library, or by C code generated from it, without or with fused "
         "multiply-add (docs/generated-code.md)."},
        {"alpha", NumberSchema(kNotNegative),
@@ -398,17 +398,17 @@ const Fields<ColumnLists>& ColumnFields() {
 }
 
 /// Returns the cross product of an entry's lists, first key slowest.
-std::vector<Column> ReadColumnEntry(const JsonNode& node) {
-  std::vector<Column> columns;
-  ColumnLists lists;
-  if (!ColumnFields().Read(node, &lists)) return columns;
+std::vector<Method> ReadMethodEntry(const JsonNode& node) {
+  std::vector<Method> methods;
+  MethodLists lists;
+  if (!MethodFields().Read(node, &lists)) return methods;
   for (const std::string& formulation : lists.formulations) {
     for (const Enforcement enforcement : lists.enforcements) {
       for (const Coordinates set : lists.coordinates) {
         for (const SolverKind solver : lists.solvers) {
           for (const std::int64_t threads : lists.threads) {
             for (const Execution execution : lists.executions) {
-              columns.push_back({formulation, enforcement, set, solver, lists.gains,
+              methods.push_back({formulation, enforcement, set, solver, lists.gains,
                                  static_cast<int>(threads), execution});
             }
           }
@@ -416,26 +416,26 @@ std::vector<Column> ReadColumnEntry(const JsonNode& node) {
       }
     }
   }
-  return columns;
+  return methods;
 }
 
 }  // namespace
 
-Json ColumnsSchema() { return Named("methods", OneOrMoreSchema(ColumnFields().Schema())); }
+Json MethodsSchema() { return Named("methods", OneOrMoreSchema(MethodFields().Schema())); }
 
-std::vector<Column> ReadColumns(const JsonNode& node) {
-  std::vector<Column> columns;
+std::vector<Method> ReadMethods(const JsonNode& node) {
+  std::vector<Method> methods;
   for (const JsonNode& element : node.OneOrMore("methods")) {
-    for (const Column& column : ReadColumnEntry(element)) {
-      const bool again = std::find(columns.begin(), columns.end(), column) != columns.end();
+    for (const Method& method : ReadMethodEntry(element)) {
+      const bool again = std::find(methods.begin(), methods.end(), method) != methods.end();
       if (again) {
-        element.FailAs(ToString(column) + " again", "each column once");
+        element.FailAs(ToString(method) + " again", "each method once");
       } else {
-        columns.push_back(column);
+        methods.push_back(method);
       }
     }
   }
-  return columns;
+  return methods;
 }
 
 // "exclude" of an experiment file.

@@ -270,10 +270,10 @@ void ReadCoordinate(const JsonNode& node, MotionOfJoint& motion) {
 Json WriteCoordinate(const MotionOfJoint& motion) { return motion.coordinate; }
 
 const Fields<MotionOfJoint>& MotionFields() {
-  constexpr int kMostCoordinates = 3;  // prescribable coordinates of a planar joint
+  constexpr int kMaxCoordinates = 3;  // prescribable coordinates of a planar joint
   static const Fields<MotionOfJoint> fields(
       "motion", "Prescribed motion of one coordinate of a joint.",
-      {{"coordinate", By(IntegerSchema(0, kMostCoordinates - 1), ReadCoordinate, WriteCoordinate),
+      {{"coordinate", By(IntegerSchema(0, kMaxCoordinates - 1), ReadCoordinate, WriteCoordinate),
         "Index in the initial coordinates, from 0.", "the number of a coordinate"},
        {"value", TimeFunctionOf(&PrescribedMotion::value), "Value [rad or m].",
         "a number or a function of time"}});

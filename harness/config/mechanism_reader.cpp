@@ -158,8 +158,8 @@ void RefuseReleased(const MechanismDescription& description) {
 
 }  // namespace
 
-std::string MechanismText(const MechanismDescription& description, const SceneObservation& observe,
-                          const std::string& comment) {
+std::string MechanismText(const MechanismDescription& description,
+                          const ObservedQuantities& observe, const std::string& comment) {
   RefuseReleased(description);
   Draft draft;
   static_cast<MechanismDescription&>(draft) = description;
@@ -405,7 +405,7 @@ void ReadLength(const JsonNode& node, Draft& draft) {
 
 Json WriteLength(const Draft& draft) {
   const double length = draft.observe.length;
-  return length == SceneObservation{}.length ? Json() : Json(length);
+  return length == ObservedQuantities{}.length ? Json() : Json(length);
 }
 
 }  // namespace
@@ -415,10 +415,10 @@ FieldValue<Draft> IndependentValue() {
 }
 
 const Fields<Draft>& InitialFields() {
-  constexpr std::size_t kMostValues = 7;  // free joint in space
+  constexpr std::size_t kMaxValues = 7;  // free joint in space
   static const Json values =
       Named("jointValues",
-            MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMostValues)})));
+            MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMaxValues)})));
   static const Fields<Draft> fields(
       "initial", "Initial coordinates and speeds. Missing values are found by assembly.",
       {{"coordinates", By(values, ReadCoordinates, WriteCoordinates),

@@ -27,7 +27,7 @@ struct PendulumForm {
 };
 
 /// JSON "known_solution". Empty if a problem has no such properties.
-struct SceneObservation {
+struct ObservedQuantities {
   std::vector<AngleCombination> branch_invariants;  ///< JSON "branch"
   std::optional<PendulumForm> closed_form;
   double length = 1.0;  ///< characteristic bar length, the scale of "saturated" drift [m]
@@ -36,7 +36,7 @@ struct SceneObservation {
 /// Content of one mechanism file.
 struct MechanismFile {
   MechanismDescription description;
-  SceneObservation observe;
+  ObservedQuantities observe;
   std::string canonical;  ///< document without spaces; equal for equal mechanisms
 };
 
@@ -64,7 +64,7 @@ MechanismFile ParseMechanism(std::string_view text, const std::string& file);
 /// @throws ConfigError with the reader's messages, for a description that no file can represent:
 /// released directions of joints (redundancy.h), empty or repeated names, non-planar parts,
 /// impossible inertias.
-std::string MechanismText(const MechanismDescription& description, const SceneObservation& observe,
-                          const std::string& comment = "");
+std::string MechanismText(const MechanismDescription& description,
+                          const ObservedQuantities& observe, const std::string& comment = "");
 
 }  // namespace loopbench::harness

@@ -23,7 +23,7 @@ namespace loopbench::harness {
 struct Draft : MechanismDescription {
   NameList body_names;  ///< ground first
   NameList joint_names;
-  SceneObservation observe;
+  ObservedQuantities observe;
   std::string comment;
 };
 

@@ -68,9 +68,8 @@ std::string Validate(const IntegratorOptions& options) {
     return fmt::format("profile is \"{}\"; accepted: {}", options.profile,
                        fmt::join(ProfileNames(), ", "));
   }
-  if (!(options.rtol > kLeastTolerance && options.rtol < 1)) {
-    return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol,
-                       kLeastTolerance);
+  if (!(options.rtol > kMinTolerance && options.rtol < 1)) {
+    return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol, kMinTolerance);
   }
   if (!(options.atol > 0 && options.atol <= std::numeric_limits<double>::max())) {
     return fmt::format("atol is {}; it must be positive and finite", options.atol);

@@ -78,7 +78,7 @@ struct IntegratorOptions {
 
 /// Exclusive lower limit of the relative tolerance: at the spacing of doubles, errors are
 /// indistinguishable from rounding, and ARKODE takes no step (ARK_TOO_MUCH_ACC).
-inline constexpr double kLeastTolerance = std::numeric_limits<double>::epsilon();
+inline constexpr double kMinTolerance = std::numeric_limits<double>::epsilon();
 
 /// Tolerance of Newton's iteration for implicit profiles in runs with a fixed step. The iteration
 /// error is a hundredth, 1e-12: far below the error of useful steps, and a thousand times

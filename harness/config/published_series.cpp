@@ -12,7 +12,7 @@ namespace loopbench::harness {
 namespace {
 
 /// Limit above any printed table; dense output is evaluated at each time.
-constexpr std::size_t kMostTimes = 10'000;
+constexpr std::size_t kMaxTimes = 10'000;
 
 const NameList& Axes() {
   static const NameList axes({"x", "y", "z", "angle"});
@@ -34,8 +34,8 @@ struct QuantityDraft : PublishedQuantity {
 void ReadTimes(const JsonNode& node, SeriesDraft& draft) {
   const std::vector<JsonNode> elements = node.Elements("times");
   if (node.value().is_array() && elements.empty()) node.Fail("at least one time");
-  if (elements.size() > kMostTimes) {
-    node.FailAs(fmt::format("{} times", elements.size()), fmt::format("at most {}", kMostTimes));
+  if (elements.size() > kMaxTimes) {
+    node.FailAs(fmt::format("{} times", elements.size()), fmt::format("at most {}", kMaxTimes));
     return;
   }
   for (const JsonNode& element : elements) {
@@ -154,7 +154,7 @@ const Fields<QuantityDraft>& QuantityFields() {
        {"joint", By(TextSchema(), ReadJoint), "Name of a joint with one coordinate [rad or m]."},
        {"", By(OneThingSchema(), RequireOneThing)},
        {"speed", Bool(&QuantityDraft::is_speed), "If true, the values are rates, per second."},
-       {"values", By(ArraySchema(NumberSchema(), 1, kMostTimes), ReadValues), "One per time.",
+       {"values", By(ArraySchema(NumberSchema(), 1, kMaxTimes), ReadValues), "One per time.",
         "a list of numbers, one for each time"},
        {"uncertainty", Number(&QuantityDraft::accuracy, kPositive),
         "Absolute uncertainty of every value, in the unit of the values: at least half a unit of "
@@ -193,7 +193,7 @@ const Fields<SeriesDraft>& SeriesFileFields() {
            {"source", Text(&SeriesDraft::source), "Publication and origin of the values.",
             "where the numbers were published"},
            {"comment", Text(&SeriesDraft::comment), "Free text for readers."},
-           {"times", By(ArraySchema(NumberSchema(kNotNegative), 1, kMostTimes), ReadTimes),
+           {"times", By(ArraySchema(NumberSchema(kNotNegative), 1, kMaxTimes), ReadTimes),
             "Ascending times [s].", "a list of rising numbers >= 0 [s]"},
            {"quantities", By(ArraySchema(QuantityFields().Schema(), 1), ReadQuantities),
             "Quantities with values at these times.", "a list of quantities"}}));

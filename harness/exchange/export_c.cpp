@@ -73,7 +73,7 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
   for (const MotionState& state : request.motion) {
     const auto serves = [&](const RecordedFunction& branch) { return Serves(branch, state); };
     if (std::ranges::any_of(branches.recorded, serves)) continue;
-    if (std::ssize(branches.recorded) >= kMostCodeBranches) {
+    if (std::ssize(branches.recorded) >= kMaxCodeBranches) {
       ++branches.missed;
       continue;
     }

@@ -48,11 +48,11 @@ struct Code {
   std::vector<CodeFile> files;  ///< NAME.h, NAME.c, NAME_example.c, CMakeLists.txt
 };
 
-/// Records each function again wherever the motion enters a new branch, at most kMostCodeBranches +
+/// Records each function again wherever the motion enters a new branch, at most kMaxCodeBranches +
 /// 1 times. Throws generate::NotCovered.
 Code MakeCode(const CodeRequest& request);
 
-inline constexpr int kMostCodeBranches = 16;
+inline constexpr int kMaxCodeBranches = 16;
 
 /// Returns the text with each @WORD@ replaced by its value.
 std::string Fill(std::string text, const std::map<std::string, std::string>& words);

@@ -39,7 +39,7 @@ struct ExportFormat {
 
 const std::vector<ExportFormat>& ExportFormats();
 
-/// Exports the mechanism at its assembled start, byte-reproducibly. Throws NotThere with all
+/// Exports the mechanism at its assembled start, byte-reproducibly. Throws Unsupported with all
 /// unsupported parts, and std::runtime_error if assembly fails.
 ExportedFile Export(const MechanismDescription& description, const ExportFormat& format,
                     const ExportOptions& options = {});

@@ -23,9 +23,9 @@ using Eigen::Vector3d;
 /// MuJoCo's mjMAXIMP.
 constexpr double kHardest = 0.9999;
 /// MuJoCo rejects smaller masses and moments of moving bodies (its mjMINVAL).
-constexpr double kLeastMass = 1e-15;
+constexpr double kMinMass = 1e-15;
 /// MuJoCo's parser rejects deeper documents.
-constexpr int kMostNested = 90;
+constexpr int kMaxNested = 90;
 
 Vec ToVec(const Vector3d& v) { return {v[0], v[1], v[2]}; }
 Vector3d ToEigen(const Vec& v) { return {v[0], v[1], v[2]}; }
@@ -138,9 +138,9 @@ std::vector<std::string> MissingInMjcf(const Model& model) {
     if (PartsOf(joint) == nullptr) missing.push_back(ShownKind(joint));
     const int child = joint.child();
     depth[child] = depth[joint.parent()] + 1;
-    if (depth[child] == kMostNested + 1) {
+    if (depth[child] == kMaxNested + 1) {
       missing.push_back(fmt::format("body \"{}\": more than {} bodies between it and Ground",
-                                    model.bodies[child].name, kMostNested - 1));
+                                    model.bodies[child].name, kMaxNested - 1));
     }
   }
   for (const Joint& joint : model.cut) {
@@ -155,10 +155,10 @@ std::vector<std::string> MissingInMjcf(const Model& model) {
     if (!fault.empty()) missing.push_back(fault);
     const Vector3d moments = PrincipalInertiaOf(body, model.planar).moments;
     const double least = std::min(body.mass, moments.minCoeff());
-    if (least >= kLeastMass) continue;
+    if (least >= kMinMass) continue;
     missing.push_back(fmt::format(
         "body \"{}\": a mass [kg] or moment of inertia [kg m^2] of {:.3g}, below {:.0e}", body.name,
-        least, kLeastMass));
+        least, kMinMass));
   }
   return missing;
 }
@@ -541,7 +541,7 @@ class MjcfWriter {
 
 Mjcf MakeMjcf(const Model& model, const MjcfOptions& options) {
   std::vector<std::string> missing = MissingInMjcf(model);
-  if (!missing.empty()) throw NotThere(std::move(missing));
+  if (!missing.empty()) throw Unsupported(std::move(missing));
   return MjcfWriter(model, options).Write();
 }
 

@@ -45,8 +45,8 @@ struct Mjcf {
 };
 
 /// Makes the document at Model::q. Its closures hold there if they hold in the model. Throws
-/// NotThere for parts that MJCF does not have: Model::missing, helical joints, closures other than
-/// revolute, spherical, weld and rod, inertias that no body can have, masses and moments below
+/// Unsupported for parts that MJCF does not have: Model::missing, helical joints, closures other
+/// than revolute, spherical, weld and rod, inertias that no body can have, masses and moments below
 /// 1e-15.
 Mjcf MakeMjcf(const Model& model, const MjcfOptions& options = {});
 

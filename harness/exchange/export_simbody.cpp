@@ -179,7 +179,7 @@ SimbodyParts MakeSimbodyParts(const Model& model) {
     const std::string fault = FaultOfInertia(model.bodies[i], model.planar);
     if (!fault.empty()) missing.push_back(fault);
   }
-  if (!missing.empty()) throw NotThere(std::move(missing));
+  if (!missing.empty()) throw Unsupported(std::move(missing));
   AddForces(model, &parts.forces);
   return parts;
 }

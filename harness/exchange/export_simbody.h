@@ -66,8 +66,8 @@ struct SimbodyParts {
   std::vector<SimbodyForce> forces;  ///< without gravity
 };
 
-/// Throws NotThere for unsupported parts: Model::missing, helical cut joints, forces in body axes,
-/// inertias that no body can have.
+/// Throws Unsupported for unsupported parts: Model::missing, helical cut joints, forces in body
+/// axes, inertias that no body can have.
 SimbodyParts MakeSimbodyParts(const Model& model);
 
 // A Model as a standalone C++17 program for Simbody 3.7.
@@ -80,7 +80,7 @@ struct SimbodyProgramText {
 /// Without arguments the program prints the following as JSON at Model::q and Model::u:
 /// coordinates, speeds and accelerations of all joints, positions of all bodies and named points.
 /// With a time [s] and an accuracy it prints the same after integrating to that time. User names
-/// appear as string literals and comments, in ASCII or escaped. Throws NotThere for unsupported
+/// appear as string literals and comments, in ASCII or escaped. Throws Unsupported for unsupported
 /// parts (see above).
 SimbodyProgramText WriteSimbodyProgram(const Model& model);
 

@@ -164,7 +164,8 @@ void ImportDraft::MergeFixed(bool whole) {
   }
   if (std::ranges::none_of(attachments, &Attachment::attached)) return;
   Renumbering renumbering;
-  MechanismDescription merged_description = Attach(description, attachments, &renumbering);
+  MechanismDescription merged_description =
+      MergeRigidBodies(description, attachments, &renumbering);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
     if (renumbering.joints[j] >= 0 || joint.type == JointType::kWeld) continue;

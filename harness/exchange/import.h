@@ -26,7 +26,7 @@ struct ImportNote {
 struct Imported {
   std::string format;  ///< "mjcf", "urdf" or "sdf"
   MechanismDescription description;
-  SceneObservation observe;
+  ObservedQuantities observe;
   std::vector<ImportNote> notes;  ///< by line
 };
 

@@ -159,8 +159,8 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
 
 namespace {
 
-constexpr const char* kMain = "main";     // class of elements without one
-constexpr std::size_t kMostLayers = 100;  // each element searches all its defaults
+constexpr const char* kMain = "main";    // class of elements without one
+constexpr std::size_t kMaxLayers = 100;  // each element searches all its defaults
 
 /// Returns the element type of defaults: the tag, or "actuator".
 std::string DescribedBy(const std::string& tag) {
@@ -235,8 +235,8 @@ MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& child
     std::for_each(defaults->second.rbegin(), defaults->second.rend(),
                   [&made](const XmlElement& layer) { made.Add(layer); });
     if (uses) used_.emplace(found->first, wanted);
-    if (made.layers().size() > kMostLayers + 1) {
-      element.Fail(fmt::format("more than {} defaults of its kind", kMostLayers), "fewer");
+    if (made.layers().size() > kMaxLayers + 1) {
+      element.Fail(fmt::format("more than {} defaults of its kind", kMaxLayers), "fewer");
     }
   }
   return made;

@@ -101,9 +101,9 @@ struct Note {
 };
 
 /// Error for parts of a model that a format or peer does not support; what() lists all.
-class NotThere : public std::runtime_error {
+class Unsupported : public std::runtime_error {
  public:
-  explicit NotThere(std::vector<std::string> parts)
+  explicit Unsupported(std::vector<std::string> parts)
       : std::runtime_error(Joined(parts)), parts_(std::move(parts)) {}
 
   const std::vector<std::string>& parts() const { return parts_; }

@@ -307,7 +307,7 @@ std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
     std::size_t i = 0;
     for (; i < merged.size(); ++i) {
       const bool alike = MayMerge(curve) && MayMerge(merged[i]) && curve.line == merged[i].line &&
-                         curve.style.doubtful == merged[i].style.doubtful;
+                         curve.style.flagged == merged[i].style.flagged;
       if (alike && Coincide(area, own, points[i], curve.line)) break;
     }
     if (i == merged.size()) {

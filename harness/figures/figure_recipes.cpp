@@ -9,7 +9,7 @@
 #include <string_view>
 #include <tuple>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/config/experiment.h"
 #include "harness/figures/axis.h"
 #include "harness/figures/figures.h"
@@ -115,7 +115,7 @@ double Smallness(const Record& record, const char* key) {
 auto MotionRank(const Record& record) {
   const double energy = record.Number("energy_error_relative");
   constexpr double kTrusted = 1e-2;
-  return std::tuple(!Failed(record), !HasDoubt(record) && !(energy > kTrusted),
+  return std::tuple(!Failed(record), !HasWarning(record) && !(energy > kTrusted),
                     GrowthAt(record) == DriftGrowth::kNone, Smallness(record, "rtol"),
                     Smallness(record, "energy_error_relative"),
                     Smallness(record, "drift_position_max"));
@@ -164,7 +164,7 @@ Figure PanelOf(const Record& record, const CoordinateKind& kind, const std::vect
                 .y = record.Numbers(key),
                 .style = DistinctStyle(panel.curves.size())};
     curve.style.shape = Shape::kNone;
-    curve.style.doubtful = HasDoubt(record);
+    curve.style.flagged = HasWarning(record);
     curve.ends_early = Failed(record) && !opening;
     panel.curves.push_back(std::move(curve));
   }
@@ -211,19 +211,19 @@ std::vector<NamedFigure> AllFigures(std::span<const Record> records) {
   std::map<std::string, Record> motions;
   std::map<std::string, std::vector<Record>> drift;
   for (const Record& record : sorted) {
-    const std::string scene =
+    const std::string problem =
         fmt::format("{}-{}s", record.Text("mechanism"), record.Text("horizon"));
     const bool moves = std::ranges::any_of(
         kCoordinateKinds, [&](const auto& kind) { return HasSeries(record, kind.prefix); });
     if (moves) {
-      const auto [it, is_new] = motions.try_emplace("motion-" + scene, record);
+      const auto [it, is_new] = motions.try_emplace("motion-" + problem, record);
       if (!is_new && MotionRank(record) > MotionRank(it->second)) it->second = record;
     }
     if (record.Find("series.drift") != nullptr) {
       const std::string step = record.Text("step");
       const std::string steps =
           step.empty() ? "rtol-" + record.Text("rtol") : fmt::format("step-{}s", step);
-      drift[fmt::format("{}-{}", scene, steps)].push_back(record);
+      drift[fmt::format("{}-{}", problem, steps)].push_back(record);
     }
   }
   std::vector<NamedFigure> figures;
@@ -307,7 +307,7 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
 
 std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
   std::vector<Record> sorted(records.begin(), records.end());
-  SortRungs(&sorted);
+  SortSweepLevels(&sorted);
   std::vector<NamedFigure> figures;
   std::vector<std::string> others, contents;  // other keys that distinguish ladders
   for (std::size_t begin = 0; begin < sorted.size();) {

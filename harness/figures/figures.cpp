@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/figures/panel.h"
@@ -195,7 +195,7 @@ CurveStyle StyleOf(const Record& record) {
           .dash = DashOf(record),
           .width = WidthOfSolver(record),
           .shape = ShapeOf(record),
-          .doubtful = HasDoubt(record)};
+          .flagged = HasWarning(record)};
 }
 
 std::string MethodLabel(const Record& record, std::span<const Record> all) {

@@ -26,7 +26,7 @@ struct CurveStyle {
   std::size_t dash = 0;  ///< below kDashes
   double width = 1.2;    ///< [pt]
   Shape shape = Shape::kNone;
-  bool doubtful = false;  ///< marks are hollow, and a curve without marks gets hollow circles
+  bool flagged = false;  ///< marks are hollow, and a curve without marks gets hollow circles
 };
 
 /// Returns the style of the index-th curve of a figure in which colours carry no other meaning:

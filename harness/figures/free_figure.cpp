@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/figures/axis.h"
 #include "harness/figures/figures.h"
 #include "harness/record/measures.h"
@@ -136,7 +136,7 @@ Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string
     curve.x = {row.Number("t_reached")};
     curve.y = {NAN};
   }
-  curve.style.doubtful = HasDoubt(row);
+  curve.style.flagged = HasWarning(row);
   return curve;
 }
 
@@ -151,7 +151,7 @@ Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, cons
     } else {
       curve.x.push_back(x.Of(row));
       curve.y.push_back(row.Number(wanted.y));
-      if (HasDoubt(row)) curve.hollow.emplace_back(curve.x.back(), curve.y.back());
+      if (HasWarning(row)) curve.hollow.emplace_back(curve.x.back(), curve.y.back());
     }
   }
   return curve;
@@ -237,12 +237,13 @@ std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& f
     remarks.push_back(fmt::format("{} of {} runs failed and {} drawn as {}", failed, rows.size(),
                                   failed == 1 ? "is" : "are", failed == 1 ? "a cross" : "crosses"));
   }
-  const auto doubted = std::ranges::count_if(rows, [](const Record& row) { return HasDoubt(row); });
-  if (doubted > 0) {
+  const auto flagged =
+      std::ranges::count_if(rows, [](const Record& row) { return HasWarning(row); });
+  if (flagged > 0) {
     remarks.push_back(
         fmt::format("{} of {} runs finished with warnings (column warnings of "
                     "tables); their marks are hollow",
-                    doubted, rows.size()));
+                    flagged, rows.size()));
   }
   return remarks;
 }
@@ -361,7 +362,7 @@ std::string DistinctPoints::CellOf(const Record& record, int axis) const {
 }
 
 std::string DistinctPoints::KeyOf(const Record& record) const {
-  std::string key = fmt::format("{}{}|", HasFailed(record), HasDoubt(record));
+  std::string key = fmt::format("{}{}|", HasFailed(record), HasWarning(record));
   for (const std::string& one : group_) key += record.Text(one) + "|";
   // while all records are kept, each has its own cell
   if (parts_ == 0) return key + std::to_string(seen_);

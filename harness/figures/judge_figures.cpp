@@ -64,7 +64,7 @@ Glyph GlyphOf(CellState state) {
 
 class MapPainter {
  public:
-  MapPainter(const FailureMap& map, FigureSize size) : map_(map), groups_(Folded(map)) {
+  MapPainter(const RobustnessMap& map, FigureSize size) : map_(map), groups_(Folded(map)) {
     page_.width = std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
     const auto columns = static_cast<double>(map.rules.columns.size());
     label_width_ = 0.34 * page_.width;
@@ -72,7 +72,7 @@ class MapPainter {
     cell_width_ = std::min(room / columns, 40.0);
     label_letters_ = static_cast<std::size_t>((label_width_ - kRoom) / kLetterWidth);
     std::size_t head = 1, lines = 1;
-    for (const MapColumn& column : map.rules.columns)
+    for (const MapMethod& column : map.rules.columns)
       head = std::max(head, CountCharacters(column.label));
     for (const FoldedGroup& group : groups_) {
       lines = std::max(lines, Wrapped(group.label, label_letters_).size());
@@ -154,8 +154,8 @@ class MapPainter {
       const FoldedCell& cell = group.cells[c];
       const std::size_t shade = ShadeOf(cell);
       Shade(Left(c), y, cell_width_, cell_height_, shade);
-      const bool hollow = cell.worst == CellState::kHolds && cell.in_doubt;
-      doubts_ = doubts_ || hollow;
+      const bool hollow = cell.worst == CellState::kHolds && cell.with_warnings;
+      warnings_ = warnings_ || hollow;
       Draw(GlyphOf(cell.worst), hollow, Left(c) + 0.5 * cell_width_, y + 0.5 * cell_height_,
            shade + 2 >= kShades.size() ? "#ffffff" : "#000000");
       if (!cell.fails_demand) continue;
@@ -202,7 +202,7 @@ class MapPainter {
       Draw(glyph, false, at + 5.0, y, "#000000");
       Text(glyph.meaning, at + 12.0, y, "left");
     }
-    if (doubts_) {
+    if (warnings_) {
       const double at = place("holds, with warnings", 12.0);
       Draw(GlyphOf(CellState::kHolds), true, at + 5.0, y, "#000000");
       Text("holds, with warnings", at + 12.0, y, "left");
@@ -210,17 +210,17 @@ class MapPainter {
     if (framed_) words("frame: must hold and does not");
   }
 
-  const FailureMap& map_;
+  const RobustnessMap& map_;
   std::vector<FoldedGroup> groups_;
   GnuplotPage page_;
   double label_width_ = 0.0, cell_width_ = 0.0, cell_height_ = 0.0, head_height_ = 0.0;
   std::size_t label_letters_ = 0;
-  bool framed_ = false, doubts_ = false;
+  bool framed_ = false, warnings_ = false;
   std::string commands_;
 };
 
 /// Ranks states to select the worst; states that are not applicable have no effect.
-int Badness(CellState state) {
+int Severity(CellState state) {
   return state == CellState::kNotApplicable ? -1 : static_cast<int>(state);
 }
 
@@ -239,7 +239,7 @@ double FoldedGroup::Share() const {
   return all.Share();
 }
 
-std::vector<FoldedGroup> Folded(const FailureMap& map) {
+std::vector<FoldedGroup> Folded(const RobustnessMap& map) {
   std::vector<FoldedGroup> groups;
   for (std::size_t g = 0; g < map.cells.size(); ++g) {
     const MapGroup& rules = map.rules.groups[g];
@@ -251,10 +251,10 @@ std::vector<FoldedGroup> Folded(const FailureMap& map) {
       for (std::size_t c = 0; c < row.size(); ++c) {
         FoldedCell& folded = group.cells[c];
         const MapCell& cell = row[c];
-        if (Badness(cell.state) > Badness(folded.worst)) folded.worst = cell.state;
+        if (Severity(cell.state) > Severity(folded.worst)) folded.worst = cell.state;
         folded.judged += cell.state == CellState::kNotApplicable ? 0 : 1;
         folded.holding += cell.state == CellState::kHolds ? 1 : 0;
-        folded.in_doubt = folded.in_doubt || HoldsInDoubt(cell);
+        folded.with_warnings = folded.with_warnings || HoldsWithWarnings(cell);
         folded.fails_demand =
             folded.fails_demand || (cell.demanded && cell.state != CellState::kHolds);
       }
@@ -264,10 +264,13 @@ std::vector<FoldedGroup> Folded(const FailureMap& map) {
   return groups;
 }
 
-MapDrawing DrawMap(const FailureMap& map, FigureSize size) { return MapPainter(map, size).Draw(); }
+MapDrawing DrawMap(const RobustnessMap& map, FigureSize size) {
+  return MapPainter(map, size).Draw();
+}
 
-std::optional<std::string> WriteMapFigure(const std::filesystem::path& path, const FailureMap& map,
-                                          FigureSize size, const std::string& gnuplot) {
+std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
+                                          const RobustnessMap& map, FigureSize size,
+                                          const std::string& gnuplot) {
   const MapDrawing drawing = DrawMap(map, size);
   return DrawWithGnuplot(path, drawing.page, drawing.script, gnuplot);
 }
@@ -275,12 +278,12 @@ namespace {
 
 constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
 
-using Rows = std::vector<const TradeoffRow*>;
+using Rows = std::vector<const WorkPrecisionRow*>;
 
 /// Groups rows that agree in these keys, in the order of the figure's rows.
 std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows& rows) {
   std::map<std::string, Rows> groups;
-  for (const TradeoffRow* row : rows) {
+  for (const WorkPrecisionRow* row : rows) {
     std::string name;
     for (const char* key : keys) name += row->record.Text(key) + '\n';
     groups[name].push_back(row);
@@ -290,20 +293,20 @@ std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows
 
 std::vector<Record> RecordsOf(const Rows& rows) {
   std::vector<Record> records;
-  for (const TradeoffRow* row : rows) records.push_back(row->record);
+  for (const WorkPrecisionRow* row : rows) records.push_back(row->record);
   return records;
 }
 
-Rows RowsWith(const TradeoffProblem& problem, const std::string& integrator) {
+Rows RowsWith(const WorkPrecisionProblem& problem, const std::string& integrator) {
   Rows rows;
-  for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionRow& row : problem.rows) {
     const bool is_one = integrator.empty() || row.record.Text("integrator") == integrator;
     if (is_one) rows.push_back(&row);
   }
   return rows;
 }
 
-bool IsDoubted(const TradeoffRow& row) {
+bool IsFlagged(const WorkPrecisionRow& row) {
   return !HasFailed(row.record) && !row.record.Text("warnings").empty();
 }
 
@@ -313,20 +316,20 @@ std::string LabelOfAxis(const std::string& key) {
 }
 
 /// Returns the cost of a failed run up to its failure.
-double SpentBy(const TradeoffRow& row) {
+double SpentBy(const WorkPrecisionRow& row) {
   if (std::isfinite(row.cost)) return row.cost;
   return row.record.Number("cpu_s");
 }
 
 /// Draws a run's error over `x`; failed runs are crosses there, or at the cost reached.
 template <class X>
-void AddPoint(const TradeoffRow& row, X x, Curve* sound, Curve* doubted) {
+void AddPoint(const WorkPrecisionRow& row, X x, Curve* sound, Curve* flagged) {
   if (HasFailed(row.record)) {
     const double at = x(row);
     sound->crosses.emplace_back(std::isfinite(at) ? at : SpentBy(row), kNowhere);
     return;
   }
-  Curve& curve = IsDoubted(row) ? *doubted : *sound;
+  Curve& curve = IsFlagged(row) ? *flagged : *sound;
   curve.x.push_back(x(row));
   curve.y.push_back(row.error);
 }
@@ -334,14 +337,14 @@ void AddPoint(const TradeoffRow& row, X x, Curve* sound, Curve* doubted) {
 /// Draws all runs of a formulation in one coordinate set as marks, hollow with warnings.
 void AddCloud(const Rows& rows, Figure* figure) {
   Curve sound{.style = StyleOf(rows.front()->record), .points = true, .line = false};
-  sound.style.doubtful = false;
-  Curve doubted = sound;
-  doubted.style.doubtful = true;
-  for (const TradeoffRow* row : rows) {
+  sound.style.flagged = false;
+  Curve flagged = sound;
+  flagged.style.flagged = true;
+  for (const WorkPrecisionRow* row : rows) {
     AddPoint(
-        *row, [](const TradeoffRow& one) { return one.cost; }, &sound, &doubted);
+        *row, [](const WorkPrecisionRow& one) { return one.cost; }, &sound, &flagged);
   }
-  if (!doubted.x.empty()) figure->curves.push_back(std::move(doubted));
+  if (!flagged.x.empty()) figure->curves.push_back(std::move(flagged));
   figure->curves.push_back(std::move(sound));
 }
 
@@ -352,9 +355,9 @@ void AddBest(const Rows& rows, Figure* figure) {
              .style = StyleOf(first)};
   best.style.shape = Shape::kNone;
   best.style.width = 1.2;
-  best.style.doubtful = false;
+  best.style.flagged = false;
   double least = std::numeric_limits<double>::infinity();
-  for (const TradeoffRow* row : rows) {
+  for (const WorkPrecisionRow* row : rows) {
     if (HasFailed(row->record) || !row->reason.empty() || !(row->error < least)) continue;
     least = row->error;
     best.x.push_back(row->cost);
@@ -367,9 +370,9 @@ void AddBest(const Rows& rows, Figure* figure) {
 LegendRow RowOf(const Curve& line) { return {{line.label, line.style}}; }
 
 /// Draws stairs: between two rows of the front, the cheaper one applies.
-Curve Stairs(const TradeoffProblem& problem) {
+Curve Stairs(const WorkPrecisionProblem& problem) {
   Curve stairs{.label = "Pareto front", .style = {.width = 0.6}, .merges = false};
-  for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionRow& row : problem.rows) {
     if (!row.on_front) continue;
     if (!stairs.y.empty()) {
       stairs.x.push_back(row.cost);
@@ -381,9 +384,9 @@ Curve Stairs(const TradeoffProblem& problem) {
   return stairs;
 }
 
-std::vector<std::string> IntegratorsOfRows(const TradeoffProblem& problem) {
+std::vector<std::string> IntegratorsOfRows(const WorkPrecisionProblem& problem) {
   std::set<std::string> names;
-  for (const TradeoffRow& row : problem.rows) names.insert(row.record.Text("integrator"));
+  for (const WorkPrecisionRow& row : problem.rows) names.insert(row.record.Text("integrator"));
   return {names.begin(), names.end()};
 }
 
@@ -396,7 +399,7 @@ std::vector<Curve> TrustLines(const Rows& rows, const std::vector<Curve>& curves
     }
   }
   std::set<double> ends;
-  for (const TradeoffRow* row : rows) {
+  for (const WorkPrecisionRow* row : rows) {
     const double end = row->record.Number("reference_valid_until");
     if (std::isfinite(end)) ends.insert(end);
   }
@@ -435,10 +438,11 @@ std::string Slug(const std::string& text) {
 
 }  // namespace
 
-Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem) {
+Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
+                           const WorkPrecisionProblem& problem) {
   Figure figure{.title = problem.name + ": what accuracy costs",
-                .x_label = LabelOfAxis(tradeoff.cost),
-                .y_label = LabelOfAxis(tradeoff.error),
+                .x_label = LabelOfAxis(work_precision.cost),
+                .y_label = LabelOfAxis(work_precision.error),
                 .log_x = true,
                 .log_y = true,
                 .curves = {}};
@@ -454,47 +458,48 @@ Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& prob
   return figure;
 }
 
-Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
+Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionProblem& problem,
                        const std::string& integrator) {
   Figure figure{
       .title = fmt::format("{}, {}: is the tolerance honoured?", problem.name, integrator),
       .x_label = "tolerance",
-      .y_label = LabelOfAxis(tradeoff.error),
+      .y_label = LabelOfAxis(work_precision.error),
       .log_x = true,
       .log_y = true,
       .curves = {}};
   Rows rows = RowsWith(problem, integrator);
   std::erase_if(rows,
-                [](const TradeoffRow* row) { return std::isnan(row->record.Number("rtol")); });
+                [](const WorkPrecisionRow* row) { return std::isnan(row->record.Number("rtol")); });
   if (rows.empty()) return figure;
-  const auto rtol = [](const TradeoffRow& row) { return row.record.Number("rtol"); };
-  std::ranges::stable_sort(rows, std::less(), [&](const TradeoffRow* row) { return rtol(*row); });
+  const auto rtol = [](const WorkPrecisionRow& row) { return row.record.Number("rtol"); };
+  std::ranges::stable_sort(rows, std::less(),
+                           [&](const WorkPrecisionRow* row) { return rtol(*row); });
   const std::vector<Record> records = RecordsOf(rows);
   figure.legend = ChannelLegend(records);
   for (const auto& [name, own] : RowsBy(kChannelKeys, rows)) {
     Curve sound{.label = MethodLabel(own.front()->record, records),
                 .style = StyleOf(own.front()->record),
                 .points = true};
-    sound.style.doubtful = false;
-    Curve doubted = sound;
-    doubted.label = "";
-    doubted.line = false;
-    doubted.style.doubtful = true;
-    for (const TradeoffRow* row : own) AddPoint(*row, rtol, &sound, &doubted);
+    sound.style.flagged = false;
+    Curve flagged = sound;
+    flagged.label = "";
+    flagged.line = false;
+    flagged.style.flagged = true;
+    for (const WorkPrecisionRow* row : own) AddPoint(*row, rtol, &sound, &flagged);
     // several runs at one tolerance form a cloud without a line
     std::vector<double> places = sound.x;
     sound.line = std::ranges::adjacent_find(places) == places.end();
-    if (!doubted.x.empty()) figure.curves.push_back(std::move(doubted));
+    if (!flagged.x.empty()) figure.curves.push_back(std::move(flagged));
     figure.curves.push_back(std::move(sound));
   }
   const bool is_length =
-      IsErrorOfPositions(tradeoff.error) || UnitOf(ColumnOf(tradeoff.error, {})) == "m";
+      IsErrorOfPositions(work_precision.error) || UnitOf(ColumnOf(work_precision.error, {})) == "m";
   const double length = rows.front()->record.Number("link_length");
   const double scale = is_length && length > 0.0 ? length : 1.0;
   Curve honoured{.label = is_length ? "error = tolerance x link" : "error = tolerance"};
   honoured.style.width = 0.6;
   honoured.merges = false;
-  for (const TradeoffRow* row : {rows.front(), rows.back()}) {
+  for (const WorkPrecisionRow* row : {rows.front(), rows.back()}) {
     honoured.x.push_back(rtol(*row));
     honoured.y.push_back(scale * rtol(*row));
   }
@@ -503,10 +508,10 @@ Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
   return figure;
 }
 
-Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& integrator) {
+Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::string& integrator) {
   double finest = std::numeric_limits<double>::infinity();
   Rows rows;
-  for (const TradeoffRow* row : RowsWith(problem, integrator)) {
+  for (const WorkPrecisionRow* row : RowsWith(problem, integrator)) {
     const double rtol = row->record.Number("rtol");
     if (row->record.Numbers("series.error").empty() || !(rtol <= finest)) continue;
     if (rtol < finest) rows.clear();
@@ -537,7 +542,7 @@ Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& in
   return figure;
 }
 
-std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff) {
+std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precision) {
   std::vector<NamedFigure> figures;
   std::set<std::string> taken;
   const auto add = [&](const std::string& kind, const std::string& what, Figure figure) {
@@ -550,11 +555,11 @@ std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff) {
     if (!taken.insert(name).second) name = kind + what;  // with a hash in its file name
     figures.push_back({name, std::move(figure)});
   };
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    add("work-precision-", problem.name, WorkPrecisionFigure(tradeoff, problem));
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    add("work-precision-", problem.name, WorkPrecisionFigure(work_precision, problem));
     for (const std::string& integrator : IntegratorsOfRows(problem)) {
       const std::string what = problem.name + " " + integrator;
-      add("tolerance-", what, ToleranceFigure(tradeoff, problem, integrator));
+      add("tolerance-", what, ToleranceFigure(work_precision, problem, integrator));
       add("error-", what, ErrorOverTimeFigure(problem, integrator));
     }
   }

@@ -11,8 +11,8 @@
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/figures.h"
 #include "harness/figures/panel.h"
-#include "harness/judge/failure_map.h"
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/robustness_map.h"
+#include "harness/judge/work_precision.h"
 
 namespace loopbench::harness {
 
@@ -22,7 +22,7 @@ namespace loopbench::harness {
 struct FoldedCell {
   CellState worst = CellState::kNotApplicable;  ///< worst of the applicable rows
   std::size_t holding = 0, judged = 0;          ///< numbers of applicable rows
-  bool in_doubt = false;                        ///< a row holds with warnings (HoldsInDoubt)
+  bool with_warnings = false;                   ///< a row holds with warnings (HoldsWithWarnings)
   bool fails_demand = false;                    ///< a row must hold and does not
 
   /// Fraction of the applicable rows that hold; 1 if all do.
@@ -39,7 +39,7 @@ struct FoldedGroup {
 };
 
 /// Returns the groups of a map, in ascending order of the fraction that holds.
-std::vector<FoldedGroup> Folded(const FailureMap& map);
+std::vector<FoldedGroup> Folded(const RobustnessMap& map);
 
 /// A drawing: gnuplot's commands and the page they are for.
 struct MapDrawing {
@@ -51,12 +51,12 @@ struct MapDrawing {
 /// fewer rows that hold; the glyph shows how the worst row ended. There are no hues. Cells with a
 /// required row that does not hold have a frame. Rows, numbers and reasons are in robustness-map.md
 /// and .csv.
-MapDrawing DrawMap(const FailureMap& map, FigureSize size = FigureSize::kTwoColumn);
+MapDrawing DrawMap(const RobustnessMap& map, FigureSize size = FigureSize::kTwoColumn);
 
 /// Draws into `path`, as PDF if its extension is ".pdf", else as SVG; returns the result of
 /// DrawWithGnuplot().
 [[nodiscard]] std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
-                                                        const FailureMap& map,
+                                                        const RobustnessMap& map,
                                                         FigureSize size = FigureSize::kTwoColumn,
                                                         const std::string& gnuplot = "gnuplot");
 
@@ -67,18 +67,19 @@ MapDrawing DrawMap(const FailureMap& map, FigureSize size = FigureSize::kTwoColu
 /// the same formulation and level dominates. Thin black stairs are the overall Pareto front. Failed
 /// runs are crosses on the lower edge if their cost is known (their CPU time in place of the
 /// missing simulation time).
-Figure WorkPrecisionFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem);
+Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
+                           const WorkPrecisionProblem& problem);
 
 /// Error over tolerance of the runs with one integrator, to check whether tolerances are met. A
 /// line shows error = tolerance (times a link length, for lengths).
-Figure ToleranceFigure(const Tradeoff& tradeoff, const TradeoffProblem& problem,
+Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionProblem& problem,
                        const std::string& integrator);
 
 /// Error over time ("series.error" over "series.error_t") of the runs with one integrator at its
 /// finest tolerance. A vertical line marks the trust horizon of the reference solution.
-Figure ErrorOverTimeFigure(const TradeoffProblem& problem, const std::string& integrator);
+Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::string& integrator);
 
 /// Returns the first figure per problem and the others per integrator, if they have data.
-std::vector<NamedFigure> TradeoffFigures(const Tradeoff& tradeoff);
+std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precision);
 
 }  // namespace loopbench::harness

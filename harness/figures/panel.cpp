@@ -110,8 +110,8 @@ LegendItem TextItem(const std::string& text) { return {.text = text, .line = fal
 LegendRow SignsOf(const std::vector<Curve>& curves, const std::vector<std::string>& failures) {
   const auto any = [&](const auto& is) { return std::ranges::any_of(curves, is); };
   LegendRow row;
-  if (any([](const Curve& curve) { return curve.style.doubtful || !curve.hollow.empty(); })) {
-    row.push_back({"flagged", {.shape = Shape::kCircle, .doubtful = true}, false});
+  if (any([](const Curve& curve) { return curve.style.flagged || !curve.hollow.empty(); })) {
+    row.push_back({"flagged", {.shape = Shape::kCircle, .flagged = true}, false});
   }
   if (any([](const Curve& curve) { return curve.ends_early || !curve.crosses.empty(); })) {
     row.push_back(TextItem(fmt::format("×: failed run{}{}{}", failures.empty() ? "" : " (",
@@ -164,8 +164,7 @@ std::string LineLook(const CurveStyle& style) {
 std::string MarkLook(const CurveStyle& style) {
   constexpr std::array kOpen = {6, 6, 8, 4, 12, 10};  // in the order of Shape; filled is the next
   const int open = kOpen[static_cast<std::size_t>(style.shape)];
-  return fmt::format("pt {} ps 0.4 lw 1 lc rgb '{}'", style.doubtful ? open : open + 1,
-                     style.color);
+  return fmt::format("pt {} ps 0.4 lw 1 lc rgb '{}'", style.flagged ? open : open + 1, style.color);
 }
 
 bool NamesAtEnds(const Figure& figure, const std::vector<Curve>& merged) {
@@ -499,7 +498,7 @@ std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
     if (own.empty()) continue;
     script += DataBlock(fmt::format("{}{}", name, i), own);
     if (curve.line) add(fmt::format("${}{} with lines {} notitle", name, i, LineLook(curve.style)));
-    const bool marked = curve.style.shape != Shape::kNone || curve.style.doubtful || curve.points;
+    const bool marked = curve.style.shape != Shape::kNone || curve.style.flagged || curve.points;
     if (curve.points) {
       add(fmt::format("${}{} with points {} notitle", name, i, MarkLook(curve.style)));
     } else if (marked) {
@@ -510,7 +509,7 @@ std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
       // white marks first, over the curve's own marks
       CurveStyle inner = curve.style, outer = curve.style;
       inner.color = "#ffffff";
-      outer.doubtful = true;
+      outer.flagged = true;
       script += DataBlock(fmt::format("{}{}h", name, i), curve.hollow);
       for (const CurveStyle& style : {inner, outer}) {
         add(fmt::format("${}{}h with points {} notitle", name, i, MarkLook(style)));

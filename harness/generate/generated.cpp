@@ -16,8 +16,8 @@ namespace {
 
 // A first miss may be alone: starts at rest have branches of their own. Each further recording,
 // also after one that failed, needs twice as many misses as the one before.
-constexpr int kFirstMisses = 2, kMostDoublings = 20;
-constexpr std::size_t kMostBranches = 8;
+constexpr int kFirstMisses = 2, kMaxDoublings = 20;
+constexpr std::size_t kMaxBranches = 8;
 
 /// Adds the time of its life to a sum [s].
 class Timer {
@@ -250,8 +250,8 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
     return true;
   }
   ++misses_;
-  if (--misses_left_ > 0 || branches_.size() >= kMostBranches) return false;
-  misses_left_ = kFirstMisses << std::min(++attempts_, kMostDoublings);
+  if (--misses_left_ > 0 || branches_.size() >= kMaxBranches) return false;
+  misses_left_ = kFirstMisses << std::min(++attempts_, kMaxDoublings);
   const Timer timer(seconds_);
   try {
     AddBranch();

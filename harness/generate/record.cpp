@@ -247,12 +247,12 @@ RecordedFunction RecordAt(const RecordingSubject& subject, const RecordingStart&
   };
   RecordedFunction recorded = record(CastsAs::kNumber);
   // members of an ensemble record equal graphs, of which one is checked
-  constexpr std::size_t kMostChecked = 1000;
+  constexpr std::size_t kMaxChecked = 1000;
   thread_local std::set<std::string> checked;
   if (checked.contains(recorded.key)) return recorded;
   RequireNoCastDecides(recorded, record);
   RequireNoTurns(recorded, space);
-  if (checked.size() >= kMostChecked) checked.clear();
+  if (checked.size() >= kMaxChecked) checked.clear();
   checked.insert(recorded.key);
   return recorded;
 }
@@ -275,13 +275,13 @@ RecordedFunction RecordFunction(const RecordingSubject& subject, const Recording
 }
 
 void RequireShort(const RecordedFunction& recorded) {
-  constexpr std::int64_t kMostOperations = 50'000;
+  constexpr std::int64_t kMaxOperations = 50'000;
   const std::int64_t operations =
       std::ranges::count(recorded.graph.Live(recorded.outputs, true), true);
-  if (operations <= kMostOperations) return;
+  if (operations <= kMaxOperations) return;
   throw NotCovered(
       fmt::format("found {} operations, expected at most {}: they would take a compiler too long",
-                  operations, kMostOperations));
+                  operations, kMaxOperations));
 }
 
 MethodCounts CountsOf(const RecordedFunction& recorded) {

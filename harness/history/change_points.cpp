@@ -130,9 +130,10 @@ class Segments {
         changes.push_back(ChangeAt(i));
         const LevelChange& change = changes.back();
         const bool is_small = std::abs(change.after - change.before) < resolution_.least;
-        const double doubt = is_small ? std::numeric_limits<double>::infinity() : change.expected;
-        if (doubt > most) {
-          most = doubt;
+        const double expected =
+            is_small ? std::numeric_limits<double>::infinity() : change.expected;
+        if (expected > most) {
+          most = expected;
           worst = i;
         }
       }

@@ -53,13 +53,13 @@ std::vector<Missing> MissingCases(const ComparisonReport& report, const CompareO
 
 /// Lists cases by name, up to a readable number.
 std::string Listed(const std::string& what, const std::vector<std::string>& cases) {
-  constexpr std::size_t kMostNamed = 20;
+  constexpr std::size_t kMaxNamed = 20;
   if (cases.empty()) return "";
   std::string text = fmt::format("{} {}:\n\n", cases.size(), what);
-  for (const std::string& one : cases | std::views::take(kMostNamed)) {
+  for (const std::string& one : cases | std::views::take(kMaxNamed)) {
     text += "- " + Quiet(EscapeMarkdownParagraph(one)) + "\n";
   }
-  if (cases.size() > kMostNamed) text += fmt::format("- {} more\n", cases.size() - kMostNamed);
+  if (cases.size() > kMaxNamed) text += fmt::format("- {} more\n", cases.size() - kMaxNamed);
   return text + "\n";
 }
 
@@ -67,13 +67,13 @@ std::string Listed(const std::string& what, const std::vector<std::string>& case
 
 std::string ComparisonMarkdown(const ComparisonReport& report, const std::string& conclusion,
                                const std::vector<std::string>& notes) {
-  constexpr int kMostRows = 50;
+  constexpr int kMaxRows = 50;
   std::string text = "### Loopbench: " + EscapeMarkdown(conclusion) + "\n\n";
   std::string rows;
   int failures = 0;
   for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent}) {
     for (const Finding& finding : report.findings) {
-      if (finding.judgement != judgement || ++failures > kMostRows) continue;
+      if (finding.judgement != judgement || ++failures > kMaxRows) continue;
       rows += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", ToString(judgement),
                           Cell(finding.one), Cell(Named(finding)), Cell(finding.base),
                           Cell(finding.fresh),
@@ -85,7 +85,7 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
     text += "| | case | measure | base | new | ratio | why |\n|---|---|---|---|---|---|---|\n" +
             rows + "\n";
   }
-  if (failures > kMostRows) text += fmt::format("and {} more\n\n", failures - kMostRows);
+  if (failures > kMaxRows) text += fmt::format("and {} more\n\n", failures - kMaxRows);
   for (const auto& [cases, why] : MissingCases(report, {})) text += Listed(why, *cases);
   text += Listed("ran with other settings, compared all the same", report.other_settings);
   text += fmt::format("{} measures the same, {} better, {} worse, {} different, {} not measured\n",
@@ -139,7 +139,7 @@ std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions
 }
 namespace {
 
-constexpr std::size_t kMostCharts = 200;
+constexpr std::size_t kMaxCharts = 200;
 constexpr double kWidth = 760, kHeight = 190, kLeft = 92, kRight = 16, kTop = 12, kBottom = 46;
 
 constexpr const char* kStyle = R"(
@@ -323,16 +323,16 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
       "to the 90th percentile. "
       "Hollow dots: the machine had another speed than usual, so that they decide nothing. "
       "Lines: levels. Broken lines: steps, with the ratio of the levels.</p>\n";
-  for (std::size_t i = 0; i < std::min(order.size(), kMostCharts); ++i) {
+  for (std::size_t i = 0; i < std::min(order.size(), kMaxCharts); ++i) {
     page += fmt::format(
         "<figure><figcaption>{}: {}</figcaption><p class=\"soft\">{}</p>\n{}</figure>\n",
         EscapeXml(order[i]->one), EscapeXml(order[i]->measure), EscapeXml(order[i]->machine),
         Chart(history, *order[i]).Text());
   }
-  if (order.size() > kMostCharts) {
+  if (order.size() > kMaxCharts) {
     page +=
         fmt::format("<p>{} more series, without steps or after {} with them, are not drawn.</p>\n",
-                    order.size() - kMostCharts, kMostCharts);
+                    order.size() - kMaxCharts, kMaxCharts);
   }
   page +=
       "<h2>Commits</h2>\n<div "

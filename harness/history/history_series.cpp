@@ -104,7 +104,7 @@ void AddValues(const std::string& machine, std::size_t entry, const std::vector<
       fresh.rule = RuleOfTracked(value.measure);
     }
     HistorySeries& series = (*all)[at->second];
-    series.values.push_back({entry, value.least, value.upper, value.yardstick});
+    series.values.push_back({entry, value.least, value.upper, value.calibration});
   }
 }
 
@@ -193,7 +193,7 @@ void FindChangesOf(HistorySeries* series, double places) {
 /// Marks times measured at an unusual machine speed. The usual speed is the fastest quarter of up
 /// to twenty entries before and after. It survives a month of mostly slow runs, and soon follows a
 /// permanent change.
-/// @param compilers  by entry: compilers may generate different instructions for the yardstick
+/// @param compilers  by entry: compilers may generate different instructions for the calibration
 void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<HistorySeries>* all) {
   constexpr std::size_t kAround = 20;
   using Builder = std::pair<std::string, std::string>;  ///< machine and compiler
@@ -203,16 +203,16 @@ void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<History
   std::map<Builder, std::map<std::size_t, std::vector<double>>> by_machine;
   for (const HistorySeries& one : *all) {
     for (const HistoryValue& value : one.values) {
-      if (!(value.yardstick > 0.0)) continue;
-      by_machine[builder(one, value)][value.entry].push_back(value.yardstick);
+      if (!(value.calibration > 0.0)) continue;
+      by_machine[builder(one, value)][value.entry].push_back(value.calibration);
     }
   }
   std::map<std::pair<Builder, std::size_t>, double> usual;
   for (const auto& [machine, entries] : by_machine) {
     std::vector<double> speeds;
-    for (const auto& [entry, yardsticks] : entries) speeds.push_back(Median(yardsticks));
+    for (const auto& [entry, calibrations] : entries) speeds.push_back(Median(calibrations));
     std::size_t i = 0;
-    for (const auto& [entry, yardsticks] : entries) {
+    for (const auto& [entry, calibrations] : entries) {
       const std::size_t from = i < kAround ? 0 : i - kAround;
       const std::size_t to = std::min(speeds.size(), ++i + kAround);
       usual[{machine, entry}] = Quantile({speeds.begin() + static_cast<std::ptrdiff_t>(from),
@@ -222,8 +222,8 @@ void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<History
   }
   for (HistorySeries& one : *all) {
     for (HistoryValue& value : one.values) {
-      if (!(value.yardstick > 0.0)) continue;
-      const double speed = value.yardstick / usual[{builder(one, value), value.entry}];
+      if (!(value.calibration > 0.0)) continue;
+      const double speed = value.calibration / usual[{builder(one, value), value.entry}];
       value.is_steady = speed < kOtherSpeed && speed > 1.0 / kOtherSpeed;
     }
   }

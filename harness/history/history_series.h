@@ -18,7 +18,7 @@ namespace loopbench::harness {
 struct HistoryValue {
   std::size_t entry = 0;            ///< index into the history
   double value = 0.0, upper = 0.0;  ///< for times: minimum and 90th percentile
-  double yardstick = 0.0;           ///< for times [ns], NaN if unknown
+  double calibration = 0.0;         ///< for times [ns], NaN if unknown
   /// False for times measured while the machine was slower or faster than usual at that time; true
   /// if its speed is unknown. Unsteady values are not used for levels.
   bool is_steady = true;
@@ -46,7 +46,7 @@ inline constexpr const char* kAllCases = "all cases";
 
 /// Change of the outcome or of the warnings of a case since the previous commit.
 struct EndingChange {
-  std::string machine, one, measure;  ///< measure: "outcome" or "doubts"
+  std::string machine, one, measure;  ///< measure: "outcome" or "warnings"
   std::size_t entry = 0;              ///< index into the history
   std::string before, after;
 };

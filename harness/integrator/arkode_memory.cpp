@@ -209,7 +209,7 @@ Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_ste
   // Newton residual in units of the tolerance: at ARKODE's 0.1 it dominates the global error.
   LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, 0.01);
   // A step that may shrink is cheaper shortened than iterated on.
-  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, fixed_step ? Stepper::kMostIterations : 8);
+  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, fixed_step ? Stepper::kMaxIterations : 8);
   // A stage starts from the line through the last two states: fewer and less distant iterations
   // than from the last state alone.
   LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);

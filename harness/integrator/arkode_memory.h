@@ -101,7 +101,7 @@ class Newton {
  public:
   /// Makes ARKStep's `memory` solve its stages with Jacobians of the GuardedOde that is its user
   /// data. The first `controlled` components of y are not quadratures. Steps of fixed length cannot
-  /// shrink, and may take Stepper::kMostIterations. Must outlive `memory`.
+  /// shrink, and may take Stepper::kMaxIterations. Must outlive `memory`.
   Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_step, SUNContext context);
   Newton(const Newton&) = delete;
   Newton& operator=(const Newton&) = delete;

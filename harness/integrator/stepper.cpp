@@ -153,7 +153,7 @@ bool Fails(const GuardedOde& ode, const Stepper& stepper, int code, IntegratorRe
     result.outcome = OutcomeOfReturnCode(code);
     result.message = result.outcome == Outcome::kFinished ? "" : stepper.message();
     if (result.outcome == Outcome::kNewtonFailure && ode.options().fixed_step > 0) {
-      result.message += " The step is fixed: " + std::to_string(Stepper::kMostIterations) +
+      result.message += " The step is fixed: " + std::to_string(Stepper::kMaxIterations) +
                         " iterations are its limit, and a shorter step needs fewer.";
     }
   }

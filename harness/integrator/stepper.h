@@ -90,7 +90,7 @@ class GuardedOde {
 /// this header; Integrate() (arkode.h) is the loop over Step() with limits and observers.
 class Stepper {
  public:
-  static constexpr int kMostIterations = 50;  ///< of Newton in a stage of a step of fixed length
+  static constexpr int kMaxIterations = 50;  ///< of Newton in a stage of a step of fixed length
 
   /// Takes the profile, step limits and stop times from `ode.options()`, which must be valid. May
   /// evaluate the derivative at (t0, y0) to choose the first step; requires t0 < t_end.

@@ -214,7 +214,7 @@ class Builder final : public Walker {
 
  private:
   void Complain(const std::string& what) {
-    if (complaints_.size() >= kMostMessages) {
+    if (complaints_.size() >= kMaxMessages) {
       ++more_;
     } else {
       complaints_.push_back(fmt::format("{}:{}: {}: {}", file_, line(),

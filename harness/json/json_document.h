@@ -28,7 +28,7 @@ inline constexpr std::size_t kMaxConfigDepth = 64;
 
 /// Maximum number of messages; further errors are only counted. A file full of errors must not be
 /// slower to read than a valid file.
-inline constexpr std::size_t kMostMessages = 100;
+inline constexpr std::size_t kMaxMessages = 100;
 
 /// Returns the text of a file. Throws ConfigError with the file and the reason (missing, a folder,
 /// not readable, larger than kMaxConfigBytes).

@@ -16,7 +16,7 @@ namespace loopbench::harness {
 namespace {
 
 constexpr std::size_t kLongestShown = 60;  ///< bytes of a value in a message
-constexpr std::size_t kMostListed = 32;    ///< names in a message
+constexpr std::size_t kMaxListed = 32;     ///< names in a message
 
 /// Returns the value as in the file, or its type if it is too long.
 std::string Shown(const Json& value) {
@@ -33,7 +33,7 @@ std::string Listed(const std::vector<std::string>& names) {
   std::vector<std::string> quoted;
   for (const std::string& name : names) {
     if (name.empty()) continue;
-    if (quoted.size() == kMostListed) {
+    if (quoted.size() == kMaxListed) {
       quoted.push_back("...");
       break;
     }
@@ -64,8 +64,8 @@ void ErrorList::AddWithCure(std::string_view cure, std::string_view pointer, std
     if (room) messages_.back().cure = cure;
     return;
   }
-  constexpr std::size_t kMostPlaces = 3;
-  if (first->also.size() < kMostPlaces) first->also.push_back(ShownPointer(std::string(pointer)));
+  constexpr std::size_t kMaxPlaces = 3;
+  if (first->also.size() < kMaxPlaces) first->also.push_back(ShownPointer(std::string(pointer)));
   ++first->others;
 }
 
@@ -329,7 +329,7 @@ std::vector<double> JsonNode::Spaced(const Range& range) const {
   }
   const std::vector<JsonNode> three = ends.Elements("numbers");
   const double from = three[0].Number(range), to = three[1].Number(range);
-  const auto count = static_cast<int>(three[2].Integer(2, kMostInRange));
+  const auto count = static_cast<int>(three[2].Integer(2, kMaxInRange));
   if (!range.Contains(from) || !range.Contains(to)) return {};
   if (from == to) {
     ends.FailAs("a range that ends where it begins", "two different ends");

@@ -84,7 +84,7 @@ class Origins {
 // The caller ends with ErrorList::ThrowIfAny(); values read before are not used if it throws. For
 // harness/config and harness/store (see json_document.h).
 
-/// Errors of one file, in the order of detection. Errors beyond kMostMessages are only counted.
+/// Errors of one file, in the order of detection. Errors beyond kMaxMessages are only counted.
 class ErrorList {
  public:
   /// `text` is the file's text, for line numbers; it must outlive the list.
@@ -107,7 +107,7 @@ class ErrorList {
 
   bool empty() const { return messages_.empty(); }
   /// Returns true if further errors are only counted and need no text.
-  bool full() const { return messages_.size() >= kMostMessages; }
+  bool full() const { return messages_.size() >= kMaxMessages; }
 
   /// Throws ConfigError with all messages, one per line, if there are any. `ending` is an
   /// additional line.
@@ -169,7 +169,7 @@ struct Range {
   std::string Text() const;
 };
 
-inline constexpr int kMostInRange = 10000;  ///< maximum count of a lin or log range
+inline constexpr int kMaxInRange = 10000;  ///< maximum count of a lin or log range
 
 inline constexpr Range kPositive = {.min = 0.0, .above_min = true};
 inline constexpr Range kNotNegative = {.min = 0.0};
@@ -223,7 +223,7 @@ class JsonNode {
   /// Returns integers in [min, max], as NumberList(); values of lin and log are rounded.
   std::vector<std::int64_t> IntegerList(std::int64_t min, std::int64_t max) const;
   /// Returns the numbers of {"lin": [from, to, count]} or {"log": [from, to, count]}: evenly spaced
-  /// linearly or logarithmically, with exact ends; count is 2 to kMostInRange.
+  /// linearly or logarithmically, with exact ends; count is 2 to kMaxInRange.
   std::vector<double> Spaced(const Range& range = {}) const;
 
   /// Returns the index of this string in `known`; reports other values with the nearest spelling.

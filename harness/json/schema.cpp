@@ -83,7 +83,7 @@ Json ChoiceSchema(const std::vector<std::string>& names) {
 Json VectorSchema() { return Named("vector", ArraySchema(NumberSchema(), 2, 3)); }
 
 Json SpacedSchema(const Json& end, bool positive) {
-  const Json count = Named("count", IntegerSchema(2, kMostInRange));
+  const Json count = Named("count", IntegerSchema(2, kMaxInRange));
   const auto three = [&](const Json& one) {
     return ArraySchema(Json::array({one, one, count}), 3, 3);
   };

@@ -137,10 +137,10 @@ double OtherSpeed(const Check& check, const Sample& above, const Sample& below) 
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
   for (const Sample* sample : {&above, &below}) {
     for (const Record& row : sample->rows) {
-      const double yardstick = YardstickOf(row, check.demand.measure);
-      if (!(yardstick > 0.0)) continue;
-      least = std::min(least, yardstick);
-      most = std::max(most, yardstick);
+      const double calibration = CalibrationOf(row, check.demand.measure);
+      if (!(calibration > 0.0)) continue;
+      least = std::min(least, calibration);
+      most = std::max(most, calibration);
     }
   }
   return most > kOtherSpeed * least ? most / least : 1.0;

@@ -82,7 +82,7 @@ struct ClaimResult {
 /// the check fail. Failed runs are allowed if the check measures or selects the outcome, or if
 /// failed_runs_hold. A missing or non-finite value makes the check kNotMeasured, because it may be
 /// decisive. A ratio of times is kNotMeasured if a change of the machine's speed between them,
-/// measured by the yardstick, may decide it.
+/// measured by the calibration, may decide it.
 CheckResult Evaluate(const Check& check, std::span<const Record> records);
 
 /// Evaluates all checks of a rule. All hold: reproduced. None holds and at least one fails: not

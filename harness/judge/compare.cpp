@@ -11,7 +11,7 @@
 #include <set>
 #include <sstream>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/judge/demand.h"
 #include "harness/judge/statistics.h"
 #include "harness/record/noise.h"
@@ -36,7 +36,7 @@ struct Ruling {
   std::string why = {};
 };
 
-Ruling OfTexts(Rule rule, const std::string& base, const std::string& fresh) {
+Ruling CompareTexts(Rule rule, const std::string& base, const std::string& fresh) {
   if (base == fresh) return {};
   if (rule == Rule::kHash) return {Judgement::kWorse, "other bits"};
   if (rule == Rule::kOutcome) {
@@ -64,12 +64,12 @@ Ruling Between(double value, double lower, double upper, const std::string& why)
   return {Judgement::kBetter, why};
 }
 
-Ruling OfRatio(double ratio, double allowed) {
+Ruling CompareRatio(double ratio, double allowed) {
   return Between(ratio, 1.0 / allowed, allowed,
                  fmt::format("ratio {:.4g}, allowed {:.4g}", ratio, allowed));
 }
 
-Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* finding) {
+Ruling CompareValues(const Pair& pair, const CompareOptions& options, Finding* finding) {
   const double base = pair.base.Number(finding->measure.key);
   const double fresh = pair.fresh.Number(finding->measure.key);
   finding->ratio = fresh / base;
@@ -78,11 +78,11 @@ Ruling OfNumbers(const Pair& pair, const CompareOptions& options, Finding* findi
       // round-off is not compared
       const double floor = options.error_floor;
       finding->ratio = std::max(std::abs(fresh), floor) / std::max(std::abs(base), floor);
-      return OfRatio(finding->ratio,
-                     pair.same_arithmetic ? options.error_ratio : options.error_ratio_other);
+      return CompareRatio(finding->ratio,
+                          pair.same_arithmetic ? options.error_ratio : options.error_ratio_other);
     }
     case Rule::kInstructions:
-      return OfRatio(finding->ratio, options.instruction_ratio);
+      return CompareRatio(finding->ratio, options.instruction_ratio);
     case Rule::kCount:
       return Between(fresh, base, base, "exact count");
     default:
@@ -121,25 +121,27 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
 }
 
 /// Returns the ruling for a missing or invalid measure; nothing if both sides have it.
-std::optional<Ruling> OfWhatIsMissing(const Pair& pair, const Measure& measure) {
-  const Held base = HeldBy(pair.base, measure), fresh = HeldBy(pair.fresh, measure);
-  if (base == Held::kFit && fresh == Held::kFit) return std::nullopt;
+std::optional<Ruling> ClassifyMissing(const Pair& pair, const Measure& measure) {
+  const Presence base = PresenceOf(pair.base, measure), fresh = PresenceOf(pair.fresh, measure);
+  if (base == Presence::kFit && fresh == Presence::kFit) return std::nullopt;
   const bool base_failed = HasFailed(pair.base), fresh_failed = HasFailed(pair.fresh);
-  if (base == Held::kNothing && fresh == Held::kFit && base_failed && !fresh_failed) {
+  if (base == Presence::kNothing && fresh == Presence::kFit && base_failed && !fresh_failed) {
     return Ruling{Judgement::kNotMeasured, "BASE did not finish"};
   }
-  if (base != Held::kUnfit && fresh != Held::kUnfit) {
-    return fresh == Held::kNothing ? Ruling{Judgement::kWorse, "not in NEW"}
-                                   : Ruling{Judgement::kDifferent, "not in BASE"};
+  if (base != Presence::kUnfit && fresh != Presence::kUnfit) {
+    return fresh == Presence::kNothing ? Ruling{Judgement::kWorse, "not in NEW"}
+                                       : Ruling{Judgement::kDifferent, "not in BASE"};
   }
-  const char* side = base != Held::kUnfit ? "NEW" : fresh != Held::kUnfit ? "BASE" : "BASE and NEW";
+  const char* side = base != Presence::kUnfit    ? "NEW"
+                     : fresh != Presence::kUnfit ? "BASE"
+                                                 : "BASE and NEW";
   // a run that failed equally on both sides may give NaN on both
   const bool failed_alike = base_failed && fresh_failed &&
                             Shown(pair.base, measure.key) == "null" &&
                             Shown(pair.fresh, measure.key) == "null";
-  return Ruling{failed_alike         ? Judgement::kNotMeasured
-                : base == Held::kFit ? Judgement::kWorse
-                                     : Judgement::kDifferent,
+  return Ruling{failed_alike             ? Judgement::kNotMeasured
+                : base == Presence::kFit ? Judgement::kWorse
+                                         : Judgement::kDifferent,
                 fmt::format("in {}: expected {}", side, Expected(measure.rule))};
 }
 
@@ -150,7 +152,8 @@ std::string ObstacleOf(const Measure& measure, const Pair& pair) {
                ? "machine not known"
                : "another machine";
   }
-  const double speed = YardstickOf(pair.fresh, measure.key) / YardstickOf(pair.base, measure.key);
+  const double speed =
+      CalibrationOf(pair.fresh, measure.key) / CalibrationOf(pair.base, measure.key);
   // only if known and compiled equally; compilers may generate different instructions
   const bool is_equal_work = OriginOf(pair.base).compiler == OriginOf(pair.fresh).compiler;
   if (is_equal_work && (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed)) {
@@ -172,7 +175,7 @@ Finding Compared(const std::string& one, const Measure& measure, const Pair& pai
   Finding finding{.one = one, .measure = measure};
   Ruling ruling;
   const bool is_time = measure.rule == Rule::kTime;
-  if (const auto missing = OfWhatIsMissing(pair, measure)) {
+  if (const auto missing = ClassifyMissing(pair, measure)) {
     finding.base = Shown(pair.base, measure.key);
     finding.fresh = Shown(pair.fresh, measure.key);
     finding.on_both = false;
@@ -185,9 +188,9 @@ Finding Compared(const std::string& one, const Measure& measure, const Pair& pai
     } else if (is_time) {
       TestTimes(pair, options, &finding);
     } else if (TypeOf(measure.key) == ValueType::kText) {
-      ruling = OfTexts(measure.rule, finding.base, finding.fresh);
+      ruling = CompareTexts(measure.rule, finding.base, finding.fresh);
     } else {
-      ruling = OfNumbers(pair, options, &finding);
+      ruling = CompareValues(pair, options, &finding);
     }
   }
   finding.judgement = ruling.judgement;
@@ -224,9 +227,9 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
 
 /// Restricts warnings of accuracy runs to warnings from the record alone: comparisons with other
 /// runs depend on the store.
-std::vector<Record> WithOwnDoubts(std::vector<Record> records) {
+std::vector<Record> WithOwnWarnings(std::vector<Record> records) {
   for (Record& record : records) {
-    if (record.Text("kind") == "accuracy") record.Set("warnings", OwnDoubts(record));
+    if (record.Text("kind") == "accuracy") record.Set("warnings", OwnWarnings(record));
   }
   return records;
 }
@@ -300,7 +303,8 @@ int ComparisonReport::ExitCode(const CompareOptions& options) const {
 ComparisonReport Compare(const std::vector<Record>& given_base,
                          const std::vector<Record>& given_fresh, const CompareOptions& options) {
   ComparisonReport comparison;
-  const std::vector<Record> base = WithOwnDoubts(given_base), fresh = WithOwnDoubts(given_fresh);
+  const std::vector<Record> base = WithOwnWarnings(given_base),
+                            fresh = WithOwnWarnings(given_fresh);
   Ambiguous ambiguous;
   const auto in_base = ByCase(base, options, &ambiguous);
   const auto in_fresh = ByCase(fresh, options, &ambiguous);

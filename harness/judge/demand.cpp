@@ -19,14 +19,14 @@ bool EndsCase(std::string_view key) {
 bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
 
 /// Group of a rule (`--only`, summary), and its valid values.
-struct Facts {
+struct FieldSet {
   std::string_view group, expected;
 };
 
-Facts FactsOf(Rule rule) {
+FieldSet FieldSetOf(Rule rule) {
   switch (rule) {
     case Rule::kOutcome:
-    case Rule::kDoubts:
+    case Rule::kWarnings:
       return {"outcomes", "a text"};
     case Rule::kEqual:
       return {"counts", "a finite number"};
@@ -60,9 +60,9 @@ bool IsNumber(const Value& value) {
 
 }  // namespace
 
-std::string_view GroupOf(Rule rule) { return FactsOf(rule).group; }
+std::string_view GroupOf(Rule rule) { return FieldSetOf(rule).group; }
 
-std::string_view Expected(Rule rule) { return FactsOf(rule).expected; }
+std::string_view Expected(Rule rule) { return FieldSetOf(rule).expected; }
 
 const std::vector<std::string>& GroupNames() {
   static const std::vector<std::string> names = {"outcomes", "counts",       "hashes",
@@ -70,14 +70,14 @@ const std::vector<std::string>& GroupNames() {
   return names;
 }
 
-Held HeldBy(const Record& record, const Measure& measure) {
+Presence PresenceOf(const Record& record, const Measure& measure) {
   const Value* value = record.Find(measure.key);
-  if (value == nullptr) return Held::kNothing;
+  if (value == nullptr) return Presence::kNothing;
   const Rule rule = measure.rule;
   bool fits = false;
   if (const auto* text = std::get_if<std::string>(value)) {
-    const bool is_text = rule == Rule::kOutcome || rule == Rule::kDoubts || rule == Rule::kHash;
-    fits = is_text && (!text->empty() || rule == Rule::kDoubts);
+    const bool is_text = rule == Rule::kOutcome || rule == Rule::kWarnings || rule == Rule::kHash;
+    fits = is_text && (!text->empty() || rule == Rule::kWarnings);
   } else if (const auto* series = std::get_if<std::vector<double>>(value)) {
     fits = rule == Rule::kTime && !series->empty() && std::ranges::all_of(*series, IsTime);
   } else if (IsNumber(*value)) {
@@ -86,7 +86,7 @@ Held HeldBy(const Record& record, const Measure& measure) {
            (rule == Rule::kEqual || (rule == Rule::kInstructions && number > 0.0) ||
             ((rule == Rule::kCount || rule == Rule::kError) && number >= 0.0));
   }
-  return fits ? Held::kFit : Held::kUnfit;
+  return fits ? Presence::kFit : Presence::kUnfit;
 }
 
 std::string Shown(const Record& record, std::string_view key) {
@@ -101,7 +101,7 @@ std::string Shown(const Record& record, std::string_view key) {
                      unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
 }
 
-double YardstickOf(const Record& record, std::string_view key) {
+double CalibrationOf(const Record& record, std::string_view key) {
   const auto is_any = [key](const auto&... parts) {
     return ((key.find(parts) != std::string_view::npos) || ...);
   };

@@ -19,12 +19,12 @@ std::string_view GroupOf(Rule rule);
 const std::vector<std::string>& GroupNames();
 
 /// State of a record's value for a measure.
-enum class Held {
+enum class Presence {
   kNothing,  ///< no such key
   kUnfit,    ///< wrong type or invalid number (null is NaN)
   kFit,
 };
-Held HeldBy(const Record& record, const Measure& measure);
+Presence PresenceOf(const Record& record, const Measure& measure);
 
 /// Returns the valid values of a rule for messages: "a number >= 0".
 std::string_view Expected(Rule rule);
@@ -34,8 +34,8 @@ std::string_view Expected(Rule rule);
 std::string Shown(const Record& record, std::string_view key);
 
 /// Returns the calibration time [ns] of the machine for the time under `key`
-/// (harness/timing/yardstick.h); NaN if unknown or if the value is not a time.
-double YardstickOf(const Record& record, std::string_view key);
+/// (harness/timing/calibration.h); NaN if unknown or if the value is not a time.
+double CalibrationOf(const Record& record, std::string_view key);
 
 /// Returns the text that identifies a case of a store: the keys before "case_id" or "outcome" in
 /// the record.

@@ -11,7 +11,7 @@
 #include <set>
 #include <vector>
 
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/work_precision.h"
 #include "harness/tables/columns.h"
 #include "harness/text/escape.h"
 #include "harness/text/files.h"
@@ -51,7 +51,7 @@ std::optional<CellState> StateNamed(std::string_view name) {
 
 using Place = std::vector<std::string>;  // group, row, column
 
-std::map<Place, MapCell*> PlacesOf(FailureMap& map) {
+std::map<Place, MapCell*> PlacesOf(RobustnessMap& map) {
   std::map<Place, MapCell*> places;
   for (std::size_t g = 0; g < map.cells.size(); ++g) {
     const MapGroup& group = map.rules.groups[g];
@@ -67,8 +67,8 @@ std::map<Place, MapCell*> PlacesOf(FailureMap& map) {
 
 }  // namespace
 
-FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file) {
-  FailureMap map = MakeFailureMap(rules, {});
+RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file) {
+  RobustnessMap map = MakeRobustnessMap(rules, {});
   map.remarks.clear();
   std::map<Place, MapCell*> places = PlacesOf(map);
   std::vector<std::string> heading;
@@ -108,7 +108,7 @@ FailureMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::st
     if (!state) fail(fmt::format("state \"{}\"", field("state")), "a state of cells");
     cell->second->state = *state;
     cell->second->demanded = field("required") == "true";
-    cell->second->doubted = 0;
+    cell->second->flagged = 0;
     places.erase(cell);
   }
   if (!places.empty()) {
@@ -163,7 +163,7 @@ std::string MapColour(const Record& row, const TableColumn& column) {
 }
 
 // Adds the rows of one group.
-void AddMapRows(const FailureMap& map, std::size_t group,
+void AddMapRows(const RobustnessMap& map, std::size_t group,
                 const std::function<std::string(const MapCell&)>& text, Table* table) {
   for (std::size_t r = 0; r < map.cells[group].size(); ++r) {
     Record row;
@@ -176,7 +176,7 @@ void AddMapRows(const FailureMap& map, std::size_t group,
   }
 }
 
-std::vector<TableColumn> MatrixColumns(const FailureMap& map, bool letters) {
+std::vector<TableColumn> MatrixColumns(const RobustnessMap& map, bool letters) {
   std::vector<TableColumn> columns = {{"row", "stress test"}};
   for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
     columns.push_back({ColumnKey(c), letters ? MethodLetter(c) : map.rules.columns[c].label});
@@ -184,7 +184,7 @@ std::vector<TableColumn> MatrixColumns(const FailureMap& map, bool letters) {
   return columns;
 }
 
-Table LimitTable(const FailureMap& map) {
+Table LimitTable(const RobustnessMap& map) {
   Table table{.title = "Limits",
               .columns = {{"row", "stress test"},
                           {"right", "expected outcome"},
@@ -203,7 +203,7 @@ Table LimitTable(const FailureMap& map) {
 }
 
 // Returns all cells that do not hold.
-Table DetailTable(const FailureMap& map) {
+Table DetailTable(const RobustnessMap& map) {
   Table table{.title = "Cells that do not hold",
               .columns = {{"row", "stress test"},
                           {"column", "method"},
@@ -211,7 +211,7 @@ Table DetailTable(const FailureMap& map) {
                           {"number", "number"},
                           {"count", "hold"},
                           {"reason", "why"}}};
-  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
+  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapMethod& column,
                          const MapCell& cell) {
     if (cell.state == CellState::kHolds) return;
     AddRow({row.label, column.label, cell.word + (cell.demanded ? " (must hold)" : ""),
@@ -222,39 +222,39 @@ Table DetailTable(const FailureMap& map) {
 }
 
 // Returns cells that hold with warnings, each to be explained.
-Table DoubtTable(const FailureMap& map) {
+Table FlaggedTable(const RobustnessMap& map) {
   Table table{.title = "Cells that hold, with runs with warnings",
               .columns = {{"row", "stress test"},
                           {"column", "method"},
                           {"count", "with warnings"},
                           {"warnings", "warnings"}}};
-  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapColumn& column,
+  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapMethod& column,
                          const MapCell& cell) {
-    if (!HoldsInDoubt(cell)) return;
-    AddRow(
-        {row.label, column.label, fmt::format("{} of {}", cell.doubted, cell.holding), cell.doubts},
-        &table);
+    if (!HoldsWithWarnings(cell)) return;
+    AddRow({row.label, column.label, fmt::format("{} of {}", cell.flagged, cell.holding),
+            cell.warnings},
+           &table);
   });
   return table;
 }
 
 }  // namespace
 
-std::string CountDoubts(const FailureMap& map) {
-  std::size_t holding = 0, doubted = 0;
-  EachCell(map, [&](const MapGroup&, const MapRow&, const MapColumn&, const MapCell& cell) {
+std::string CountFlagged(const RobustnessMap& map) {
+  std::size_t holding = 0, flagged = 0;
+  EachCell(map, [&](const MapGroup&, const MapRow&, const MapMethod&, const MapCell& cell) {
     holding += cell.state == CellState::kHolds ? 1 : 0;
-    doubted += HoldsInDoubt(cell) ? 1 : 0;
+    flagged += HoldsWithWarnings(cell) ? 1 : 0;
   });
-  return fmt::format("{} of {} cells that hold have runs with warnings", doubted, holding);
+  return fmt::format("{} of {} cells that hold have runs with warnings", flagged, holding);
 }
 
-std::string CountCells(const FailureMap& map) {
+std::string CountCells(const RobustnessMap& map) {
   std::string text;
   std::size_t total = 0;
   for (const CellState state : kCellStates) {
     std::size_t count = 0;
-    EachCell(map, [&](const MapGroup&, const MapRow&, const MapColumn&, const MapCell& cell) {
+    EachCell(map, [&](const MapGroup&, const MapRow&, const MapMethod&, const MapCell& cell) {
       count += cell.state == state ? 1 : 0;
     });
     total += count;
@@ -265,7 +265,7 @@ std::string CountCells(const FailureMap& map) {
   return fmt::format("{} cells:{}", total, text);
 }
 
-Table MapTable(const FailureMap& map) {
+Table MapTable(const RobustnessMap& map) {
   Table table;
   table.title = map.rules.title;
   table.columns = MatrixColumns(map, true);
@@ -278,12 +278,12 @@ Table MapTable(const FailureMap& map) {
   }
   table.notes.push_back("");
   table.notes.push_back(CountCells(map));
-  table.notes.push_back(CountDoubts(map));
+  table.notes.push_back(CountFlagged(map));
   for (const std::string& remark : map.remarks) table.notes.push_back("note: " + remark);
   return table;
 }
 
-Table MapCellTable(const FailureMap& map) {
+Table MapCellTable(const RobustnessMap& map) {
   Table table;
   for (const char* key :
        {"group", "row",      "method", "state",   "class",         "outcome", "measure",
@@ -292,7 +292,7 @@ Table MapCellTable(const FailureMap& map) {
     table.columns.push_back({key, key, Format::kShortest});
   }
   const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
-  EachCell(map, [&](const MapGroup& group, const MapRow& row, const MapColumn& column,
+  EachCell(map, [&](const MapGroup& group, const MapRow& row, const MapMethod& column,
                     const MapCell& cell) {
     const Judged& decided = cell.decided;
     AddRow({group.label,         row.label,
@@ -304,16 +304,16 @@ Table MapCellTable(const FailureMap& map) {
             count(cell.holding), count(cell.records),
             count(cell.cases),   cell.demanded,
             cell.reason,         cell.case_id,
-            count(cell.doubted), cell.doubts},
+            count(cell.flagged), cell.warnings},
            &table);
   });
   return table;
 }
 
-std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& notes) {
+std::string MapMarkdown(const RobustnessMap& map, const std::vector<std::string>& notes) {
   std::string page = fmt::format("# {}\n\n", EscapeMarkdown(map.rules.title));
   if (!map.rules.comment.empty()) page += EscapeMarkdownParagraph(map.rules.comment) + "\n\n";
-  page += CountCells(map) + ". " + CountDoubts(map) + ".\n\n";
+  page += CountCells(map) + ". " + CountFlagged(map) + ".\n\n";
   for (const std::string& remark : map.remarks) {
     page += "Note: " + EscapeMarkdown(remark) + ".\n\n";
   }
@@ -328,8 +328,8 @@ std::string MapMarkdown(const FailureMap& map, const std::vector<std::string>& n
   page += ToMarkdown(LimitTable(map)) + "\n";
   Table details = DetailTable(map);
   if (!details.rows.empty()) page += ToMarkdown(details);
-  Table doubts = DoubtTable(map);
-  if (!doubts.rows.empty()) page += "\n" + ToMarkdown(doubts);
+  Table warnings = FlaggedTable(map);
+  if (!warnings.rows.empty()) page += "\n" + ToMarkdown(warnings);
   for (const std::string& note : notes) page += "\n" + EscapeMarkdownParagraph(note) + "\n";
   return page;
 }
@@ -352,10 +352,10 @@ bool NamesMethod(const std::string& key) {
   return !others.contains(key);
 }
 
-std::vector<Record> RecordsOfRows(const Tradeoff& tradeoff) {
+std::vector<Record> RecordsOfRows(const WorkPrecision& work_precision) {
   std::vector<Record> records;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) records.push_back(row.record);
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) records.push_back(row.record);
   }
   return records;
 }
@@ -382,7 +382,7 @@ std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool 
 }
 
 /// Returns a row of a table: the record with the problem and the results.
-Record ShownRow(const TradeoffProblem& problem, const TradeoffRow& row) {
+Record ShownRow(const WorkPrecisionProblem& problem, const WorkPrecisionRow& row) {
   Record shown = row.record;
   shown.Set("problem", problem.name);
   shown.Set("front", std::string(row.on_front ? "*" : ""));
@@ -400,18 +400,19 @@ std::string WithUnit(const std::string& words, const std::string& key) {
   return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
 }
 
-Format FormatOfCost(const Tradeoff& tradeoff) {
-  const Measure* measure = FindMeasure(tradeoff.cost);
+Format FormatOfCost(const WorkPrecision& work_precision) {
+  const Measure* measure = FindMeasure(work_precision.cost);
   return measure == nullptr || measure->heading.words.empty() ? Format::kShortest
                                                               : measure->heading.format;
 }
 
-std::vector<TableColumn> FullColumns(const Tradeoff& tradeoff, const std::vector<Record>& records) {
+std::vector<TableColumn> FullColumns(const WorkPrecision& work_precision,
+                                     const std::vector<Record>& records) {
   std::vector<TableColumn> columns = {{"problem", "problem"}};
   for (TableColumn& column : MethodColumns(records, false)) columns.push_back(std::move(column));
-  columns.push_back({"error", WithUnit("error", tradeoff.error), Format::kScientific});
+  columns.push_back({"error", WithUnit("error", work_precision.error), Format::kScientific});
   columns.push_back({"error_is_bound", "is bound"});
-  columns.push_back({"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)});
+  columns.push_back({"cost", WithUnit("cost", work_precision.cost), FormatOfCost(work_precision)});
   columns.push_back({"front", "front"});
   for (const char* key : {"outcome", "warnings", "reference_error", "reference_valid_until",
                           "steps", "rejected", "rhs_evaluations", "aa_spread_wall"}) {
@@ -423,12 +424,12 @@ std::vector<TableColumn> FullColumns(const Tradeoff& tradeoff, const std::vector
   return columns;
 }
 
-std::vector<TableColumn> FrontColumns(const Tradeoff& tradeoff,
+std::vector<TableColumn> FrontColumns(const WorkPrecision& work_precision,
                                       const std::vector<Record>& records) {
   std::vector<TableColumn> columns = {{"front", ""}};
   for (TableColumn& column : MethodColumns(records, true)) columns.push_back(std::move(column));
-  columns.push_back({"error", WithUnit("error", tradeoff.error), Format::kScientific});
-  columns.push_back({"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)});
+  columns.push_back({"error", WithUnit("error", work_precision.error), Format::kScientific});
+  columns.push_back({"cost", WithUnit("cost", work_precision.cost), FormatOfCost(work_precision)});
   columns.push_back({"reason", "not compared because"});
   return columns;
 }
@@ -445,13 +446,13 @@ std::string MethodText(const Record& record, const std::vector<TableColumn>& col
   return text;
 }
 
-const TradeoffRow& RowOf(const TradeoffProblem& problem, const Cheapest& one) {
+const WorkPrecisionRow& RowOf(const WorkPrecisionProblem& problem, const Cheapest& one) {
   return problem.rows[static_cast<std::size_t>(one.row)];
 }
 
-std::vector<std::string> FormulationsOfAll(const Tradeoff& tradeoff) {
+std::vector<std::string> FormulationsOfAll(const WorkPrecision& work_precision) {
   std::set<std::string> names;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
     for (const Cheapest& one : problem.cheapest) names.insert(one.formulation);
   }
   return {names.begin(), names.end()};
@@ -459,16 +460,17 @@ std::vector<std::string> FormulationsOfAll(const Tradeoff& tradeoff) {
 
 }  // namespace
 
-Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view) {
-  const std::vector<Record> records = RecordsOfRows(tradeoff);
+Table WorkPrecisionTable(const WorkPrecision& work_precision, const WorkPrecisionView& view) {
+  const std::vector<Record> records = RecordsOfRows(work_precision);
   Table table;
-  table.title = fmt::format("{} against {}", tradeoff.error, tradeoff.cost);
+  table.title = fmt::format("{} against {}", work_precision.error, work_precision.cost);
   table.group = "problem";
   table.colour = &FrontColour;
-  table.columns = view.compact ? FrontColumns(tradeoff, records) : FullColumns(tradeoff, records);
+  table.columns =
+      view.compact ? FrontColumns(work_precision, records) : FullColumns(work_precision, records);
   std::size_t hidden = 0;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
       if (view.all || row.on_front || !row.reason.empty()) {
         table.rows.push_back(ShownRow(problem, row));
       } else {
@@ -476,7 +478,7 @@ Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view) {
       }
     }
   }
-  table.notes = tradeoff.remarks;
+  table.notes = work_precision.remarks;
   table.notes.push_back(
       "* = Pareto front: no compared row is better in one value and as good in the other");
   if (hidden > 0) {
@@ -485,15 +487,16 @@ Table TradeoffTable(const Tradeoff& tradeoff, const TradeoffView& view) {
   return table;
 }
 
-Table OverviewTable(const Tradeoff& tradeoff) {
+Table OverviewTable(const WorkPrecision& work_precision) {
   Table table;
   table.title =
       fmt::format("The cheapest method for an error: {}, and its ratio to the cheapest of all",
-                  WithUnit(tradeoff.cost, tradeoff.cost));
+                  WithUnit(work_precision.cost, work_precision.cost));
   table.columns = {{"problem", "problem"},
-                   {"error_class", WithUnit("error <=", tradeoff.error), Format::kShortest}};
-  for (const std::string& name : FormulationsOfAll(tradeoff)) table.columns.push_back({name, name});
-  for (const TradeoffProblem& problem : tradeoff.problems) {
+                   {"error_class", WithUnit("error <=", work_precision.error), Format::kShortest}};
+  for (const std::string& name : FormulationsOfAll(work_precision))
+    table.columns.push_back({name, name});
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
     Record* row = nullptr;
     double last = std::numeric_limits<double>::quiet_NaN();
     for (const Cheapest& one : problem.cheapest) {
@@ -510,24 +513,24 @@ Table OverviewTable(const Tradeoff& tradeoff) {
   return table;
 }
 
-Table CheapestTable(const Tradeoff& tradeoff) {
-  const std::vector<TableColumn> naming = MethodColumns(RecordsOfRows(tradeoff), true);
+Table CheapestTable(const WorkPrecision& work_precision) {
+  const std::vector<TableColumn> naming = MethodColumns(RecordsOfRows(work_precision), true);
   Table table;
   table.title = "The cheapest methods";
   table.columns = {{"problem", "problem"},
-                   {"error_class", WithUnit("error <=", tradeoff.error), Format::kShortest},
+                   {"error_class", WithUnit("error <=", work_precision.error), Format::kShortest},
                    {"formulation", "formulation"},
                    {"method", "method"},
-                   {"error", WithUnit("error", tradeoff.error), Format::kScientific},
-                   {"cost", WithUnit("cost", tradeoff.cost), FormatOfCost(tradeoff)},
+                   {"error", WithUnit("error", work_precision.error), Format::kScientific},
+                   {"cost", WithUnit("cost", work_precision.cost), FormatOfCost(work_precision)},
                    {"ratio", "to the cheapest", Format::kExponent}};
-  for (const TradeoffProblem& problem : tradeoff.problems) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
     for (const Cheapest& one : problem.cheapest) {
       if (one.row < 0) {
         AddRow({problem.name, one.error_class, one.formulation, std::string(kNobody)}, &table);
         continue;
       }
-      const TradeoffRow& row = RowOf(problem, one);
+      const WorkPrecisionRow& row = RowOf(problem, one);
       AddRow({problem.name, one.error_class, one.formulation, MethodText(row.record, naming),
               row.error, row.cost, one.ratio},
              &table);
@@ -536,13 +539,15 @@ Table CheapestTable(const Tradeoff& tradeoff) {
   return table;
 }
 
-std::string TradeoffMarkdown(const Tradeoff& tradeoff, const std::vector<std::string>& notes) {
-  Table overview = OverviewTable(tradeoff);
-  overview.notes = tradeoff.remarks;
-  for (std::string& line : FairnessStatement(tradeoff)) overview.notes.push_back(std::move(line));
-  Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
+std::string WorkPrecisionMarkdown(const WorkPrecision& work_precision,
+                                  const std::vector<std::string>& notes) {
+  Table overview = OverviewTable(work_precision);
+  overview.notes = work_precision.remarks;
+  for (std::string& line : FairnessStatement(work_precision))
+    overview.notes.push_back(std::move(line));
+  Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
   rows.notes.insert(rows.notes.end(), notes.begin(), notes.end());
-  return ToMarkdown(overview) + "\n" + ToMarkdown(CheapestTable(tradeoff)) + "\n" +
+  return ToMarkdown(overview) + "\n" + ToMarkdown(CheapestTable(work_precision)) + "\n" +
          ToMarkdown(rows);
 }
 

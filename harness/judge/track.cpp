@@ -69,7 +69,7 @@ TrackedValue Tracked(const std::string& one, const Measure& measure, const Recor
     value.lower = Quantile(sample, 0.1);
     value.upper = Quantile(sample, 0.9);
     value.least = *std::ranges::min_element(sample);
-    value.yardstick = YardstickOf(record, measure.key);
+    value.calibration = CalibrationOf(record, measure.key);
   } else {
     value.value = value.lower = value.upper = value.least = record.Number(measure.key);
   }
@@ -97,9 +97,9 @@ TrackedRecords TrackRecords(const std::vector<Record>& records) {
     }
     for (const Measure& measure : Measures()) {
       if (!IsTracked(measure.rule)) continue;
-      const Held held = HeldBy(record, measure);
-      if (held == Held::kFit) tracked.values.push_back(Tracked(one, measure, record));
-      if (held != Held::kUnfit) continue;
+      const Presence held = PresenceOf(record, measure);
+      if (held == Presence::kFit) tracked.values.push_back(Tracked(one, measure, record));
+      if (held != Presence::kUnfit) continue;
       leave_out(fmt::format("{}: found {}, expected {}", measure.key, Shown(record, measure.key),
                             Expected(measure.rule)));
     }

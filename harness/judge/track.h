@@ -18,7 +18,7 @@ struct TrackedValue {
   double lower = 0.0, upper = 0.0;  ///< spread; equal to value if there is none
   double least = 0.0;  ///< minimum of a sample, least disturbed by other work on the machine
   /// Calibration time of the machine for times [ns]; NaN if unknown.
-  double yardstick = std::numeric_limits<double>::quiet_NaN();
+  double calibration = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// github-action-benchmark, tool "customSmallerIsBetter":

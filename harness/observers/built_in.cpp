@@ -166,20 +166,20 @@ template class DriftObserver<Planar>;
 template class DriftObserver<Spatial>;
 
 template <class Space>
-ExactObserver<Space>::ExactObserver(const SceneObservation& scene,
+ExactObserver<Space>::ExactObserver(const ObservedQuantities& problem,
                                     const Mechanism<Space, double>& mechanism)
-    : scene_(scene) {
+    : problem_(problem) {
   const auto find = [&](const std::string& name) {
     const auto it = std::ranges::find(mechanism.body_names(), name);
     return static_cast<int>(it - mechanism.body_names().begin());
   };
-  for (const AngleCombination& combination : scene.branch_invariants) {
+  for (const AngleCombination& combination : problem.branch_invariants) {
     combinations_.emplace_back();
     for (const auto& [name, factor] : combination) {
       combinations_.back().emplace_back(find(name), factor);
     }
   }
-  if (scene.closed_form) pendulum_body_ = find(scene.closed_form->body);
+  if (problem.closed_form) pendulum_body_ = find(problem.closed_form->body);
   last_angle_.assign(mechanism.num_bodies(), 0.0);
 }
 
@@ -239,7 +239,7 @@ void ExactObserver<Space>::Observe(const Sample<Space>& sample) {
     branch_.value.push_back(worst);
   }
   if (pendulum_body_ >= 0) {
-    const PendulumForm& form = *scene_.closed_form;
+    const PendulumForm& form = *problem_.closed_form;
     const double theta = BodyAngle(sample, pendulum_body_) - form.down_angle;
     if (!started_) {
       theta0_ = theta;
@@ -303,8 +303,8 @@ template <class Space>
 void CoordinateObserver<Space>::Observe(const Sample<Space>& sample) {
   const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
   const auto& joints = kinematics.mechanism().joints();
-  constexpr std::size_t kMostJoints = 1000;
-  if (joints.size() > kMostJoints) return;
+  constexpr std::size_t kMaxJoints = 1000;
+  if (joints.size() > kMaxJoints) return;
   const bool first = series_.empty();
   std::size_t s = 0;
   for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
@@ -367,7 +367,7 @@ template class CoordinateObserver<Spatial>;
 namespace {
 
 /// Rows and speeds up to which every accepted step affords a dense decomposition (about 0.1 ms).
-constexpr int kMostRows = 24, kMostSpeeds = 64;
+constexpr int kMaxRows = 24, kMaxSpeeds = 64;
 
 /// Counts the zeros that a quantity passed of which only the size is seen, sample by sample.
 class Passages {
@@ -430,7 +430,7 @@ template <class Space>
 void SingularityObserver<Space>::Observe(const Sample<Space>& sample) {
   Work& work = *work_;
   const int rows = work.view.mechanism().num_rows(), speeds = work.view.mechanism().num_u();
-  if (rows == 0 || rows > kMostRows || speeds == 0 || speeds > kMostSpeeds) return;
+  if (rows == 0 || rows > kMaxRows || speeds == 0 || speeds > kMaxSpeeds) return;
   const LoopSpectrum now = SpectrumOfLoops(work.view.At(sample.formulation.kinematics()));
   const std::size_t count = static_cast<std::size_t>(now.singular_values.size());
   if (work.smallest.empty()) {

@@ -65,7 +65,7 @@ template <class Space>
 struct Watched {
   const MechanismDescription& description;
   const Mechanism<Space, double>& mechanism;  ///< made of the description
-  const SceneObservation& scene;
+  const ObservedQuantities& problem;
   int points;                          ///< kept of a series
   std::span<const double> stops = {};  ///< [s], rising: times at which steps have to end
 };
@@ -198,7 +198,7 @@ class ConditionObserver final : public Observer<Space> {
   bool started_ = false;
   int rank_min_ = 0, beyond_joint_speeds_ = 0;
   double rcond_min_ = 1.0, rcond_t_ = 0.0;
-  std::int64_t softened_steps_ = 0, softened_evaluations_ = 0, mode_changes_ = 0;
+  std::int64_t regularized_steps_ = 0, regularized_evaluations_ = 0, mode_changes_ = 0;
 };
 
 /// Distance from a singular configuration: the smallest ratio of singular values of the scaled
@@ -228,7 +228,7 @@ class SingularityObserver final : public Observer<Space> {
 template <class Space>
 class ExactObserver final : public Observer<Space> {
  public:
-  ExactObserver(const SceneObservation& scene, const Mechanism<Space, double>& mechanism);
+  ExactObserver(const ObservedQuantities& problem, const Mechanism<Space, double>& mechanism);
   void Observe(const Sample<Space>& sample) override;
   void Write(Record& record) const override;
 
@@ -239,7 +239,7 @@ class ExactObserver final : public Observer<Space> {
  private:
   double BodyAngle(const Sample<Space>& sample, int body);
 
-  SceneObservation scene_;
+  ObservedQuantities problem_;
   std::vector<std::vector<std::pair<int, double>>> combinations_;  ///< by body index
   int pendulum_body_ = -1;
   std::vector<double> first_, last_angle_;

@@ -92,8 +92,8 @@ void ConditionObserver<Space>::Observe(const Sample<Space>& sample) {
     rcond_min_ = diagnostics.rcond;
     rcond_t_ = sample.t;
   }
-  if (diagnostics.smallest_weight < 1.0) ++softened_steps_;
-  softened_evaluations_ = diagnostics.softened_evaluations;
+  if (diagnostics.smallest_weight < 1.0) ++regularized_steps_;
+  regularized_evaluations_ = diagnostics.regularized_evaluations;
   mode_changes_ = diagnostics.mode_changes;
   started_ = true;
 }
@@ -105,8 +105,8 @@ void ConditionObserver<Space>::Write(Record& record) const {
   record.Set("rank_constraints_min", std::int64_t{rank_min_ + beyond_joint_speeds_});
   record.Set("rcond_min", rcond_min_);
   record.Set("rcond_min_t", rcond_t_);
-  record.Set("regularized_steps", softened_steps_);
-  record.Set("regularized_evaluations", softened_evaluations_);
+  record.Set("regularized_steps", regularized_steps_);
+  record.Set("regularized_evaluations", regularized_evaluations_);
   record.Set("mode_changes", mode_changes_);
 }
 
@@ -117,7 +117,7 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>
   all.push_back(std::make_unique<EnergyObserver<Space>>(run.points, run.mechanism.has_power()));
   all.push_back(std::make_unique<ConditionObserver<Space>>());
   all.push_back(std::make_unique<SingularityObserver<Space>>(run.description, run.mechanism));
-  all.push_back(std::make_unique<ExactObserver<Space>>(run.scene, run.mechanism));
+  all.push_back(std::make_unique<ExactObserver<Space>>(run.problem, run.mechanism));
   all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
   all.push_back(std::make_unique<CorrectionObserver<Space>>());
   all.push_back(std::make_unique<StepLengthObserver<Space>>(run));
@@ -130,7 +130,7 @@ std::vector<std::unique_ptr<Observer<Space>>> MakeMemberObservers(const Watched<
   std::vector<std::unique_ptr<Observer<Space>>> all;
   all.push_back(std::make_unique<DriftObserver<Space>>());
   all.push_back(std::make_unique<EnergyObserver<Space>>(run.points, run.mechanism.has_power()));
-  all.push_back(std::make_unique<ExactObserver<Space>>(run.scene, run.mechanism));
+  all.push_back(std::make_unique<ExactObserver<Space>>(run.problem, run.mechanism));
   return all;
 }
 
@@ -166,7 +166,7 @@ const std::deque<ObserverRow>& RegisteredObservers() { return Rows(); }
 template <class Space>
 void WriteFinalPoses(const MechanismDescription& user, const Compiled& compiled, int part,
                      const Kinematics<Space, double>& kinematics, Record& record) {
-  const std::size_t stride = 1 + user.bodies.size() / kMostFinalBodies;
+  const std::size_t stride = 1 + user.bodies.size() / kMaxFinalBodies;
   for (std::size_t i = 0; i < user.bodies.size(); i += stride) {
     const BodyImage& image = compiled.bodies[i];
     if (image.part != part) continue;

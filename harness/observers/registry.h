@@ -59,11 +59,11 @@ const std::deque<ObserverRow>& RegisteredObservers();
 
 // Final poses of the user's bodies, independent of preprocessing.
 
-/// Writes "series.final.<body>" for the bodies of `part`, at most kMostFinalBodies of the whole
+/// Writes "series.final.<body>" for the bodies of `part`, at most kMaxFinalBodies of the whole
 /// mechanism, evenly chosen: of a planar mechanism x, y [m] of the body's origin and its angle
 /// [rad] with all its turns; in space x, y, z and the body's first two axes in ground axes, where
 /// whole turns do not show.
-inline constexpr std::size_t kMostFinalBodies = 100;
+inline constexpr std::size_t kMaxFinalBodies = 100;
 template <class Space>
 void WriteFinalPoses(const MechanismDescription& user, const Compiled& compiled, int part,
                      const Kinematics<Space, double>& kinematics, Record& record);

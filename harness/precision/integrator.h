@@ -36,13 +36,13 @@ struct Problem {
 };
 
 enum class OneStepMethod { kDormandPrince, kGragg };
-inline constexpr int kMostColumns = 10;  ///< of Gragg's extrapolation, each worth two orders
+inline constexpr int kMaxColumns = 10;  ///< of Gragg's extrapolation, each worth two orders
 
 template <class S>
 struct OneStepOptions {
   OneStepMethod method = OneStepMethod::kDormandPrince;
   S tolerance = S(1e-6);  ///< rtol = atol > 0
-  int columns = kMostColumns;
+  int columns = kMaxColumns;
   S fixed_step = S(0);    ///< positive: every step but the last has this length, untested
   S begin = S(0);         ///< [s]
   S first_step = S(0);    ///< 0: found by the profile's rule
@@ -76,7 +76,7 @@ OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>&
 template <class S>
 class OneStep {
  public:
-  /// `columns` of Gragg's extrapolation, kMostColumns at most.
+  /// `columns` of Gragg's extrapolation, kMaxColumns at most.
   OneStep(const Problem<S>& system, OneStepMethod method, int columns);
 
   /// The error estimate grows with the step as h^estimate_order().
@@ -108,7 +108,7 @@ class OneStep {
   int columns_;
   std::vector<S> y_new_, error_, f_new_, stage_, before_;
   std::array<std::vector<S>, kStages> k_;
-  std::array<std::vector<S>, kMostColumns> table_;  ///< the last row of the extrapolation
+  std::array<std::vector<S>, kMaxColumns> table_;  ///< the last row of the extrapolation
   std::int64_t evaluations_ = 0;
 };
 

@@ -19,19 +19,19 @@ namespace {
 
 /// One entry per formulation of kLadderFormulations, in their order.
 template <class S>
-std::unique_ptr<System<Planar, S>> Make(const Column& column,
+std::unique_ptr<System<Planar, S>> Make(const Method& method,
                                         const Mechanism<Planar, S>& mechanism) {
-  const FormulationOptions options{.enforcement = column.enforcement, .solver = column.solver};
-  if (column.formulation == "odca") return MakeSystem<odca::Odca>(mechanism, options);
-  if (column.formulation == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
-  if (column.formulation == "reduction")
+  const FormulationOptions options{.enforcement = method.enforcement, .solver = method.solver};
+  if (method.formulation == "odca") return MakeSystem<odca::Odca>(mechanism, options);
+  if (method.formulation == "lagrange") return MakeSystem<lagrange::Lagrange>(mechanism, options);
+  if (method.formulation == "reduction")
     return MakeSystem<reduction::Reduction>(mechanism, options);
-  throw std::invalid_argument("no ladder of formulation " + column.formulation);
+  throw std::invalid_argument("no ladder of formulation " + method.formulation);
 }
 
 /// A run and its final state.
 struct Ended {
-  Rung rung;
+  SweepLevel rung;
   VectorX<Float128> centres;
 };
 
@@ -39,10 +39,10 @@ template <class S>
 Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod method,
             double tolerance) {
   const CpuLimit time(task.limits.cpu_s);
-  const Mechanism<Planar, S> mechanism(task.description, task.column.coordinates);
-  const auto formulation = Make<S>(task.column, mechanism);
+  const Mechanism<Planar, S> mechanism(task.description, task.method.coordinates);
+  const auto formulation = Make<S>(task.method, mechanism);
   Ended ended;
-  Rung& rung = ended.rung;
+  SweepLevel& rung = ended.rung;
   rung.scalar = scalar;
   rung.tolerance = tolerance;
   const VectorX<S> q = exact.q().template cast<S>(), u = exact.u().template cast<S>();
@@ -128,9 +128,9 @@ double Epsilon(Scalar scalar) {
 
 /// Returns the run that judges `own`: at the same tolerance the widest that finished, or for the
 /// widest the next narrower; nullptr if there is none.
-const Rung* JudgeOf(const std::vector<Rung>& rungs, const Rung& own) {
-  const Rung *widest = &own, *narrower = nullptr;
-  for (const Rung& rung : rungs) {
+const SweepLevel* JudgeOf(const std::vector<SweepLevel>& rungs, const SweepLevel& own) {
+  const SweepLevel *widest = &own, *narrower = nullptr;
+  for (const SweepLevel& rung : rungs) {
     if (rung.tolerance != own.tolerance || rung.outcome != Outcome::kFinished) continue;
     if (rung.scalar > widest->scalar) widest = &rung;
     if (rung.scalar >= own.scalar) continue;
@@ -139,13 +139,13 @@ const Rung* JudgeOf(const std::vector<Rung>& rungs, const Rung& own) {
   return widest == &own ? narrower : widest;
 }
 
-void Judge(std::vector<Rung>& rungs) {
-  for (Rung& own : rungs) {
-    const Rung* other = JudgeOf(rungs, own);
+void Judge(std::vector<SweepLevel>& rungs) {
+  for (SweepLevel& own : rungs) {
+    const SweepLevel* other = JudgeOf(rungs, own);
     if (own.outcome != Outcome::kFinished || other == nullptr) continue;
     if (other->scalar > own.scalar) {
-      own.error_ruled_by = RuledBy(own.error, other->error);
-      own.drift_ruled_by = RuledBy(own.drift, other->drift);
+      own.error_ruled_by = DominatedBy(own.error, other->error);
+      own.drift_ruled_by = DominatedBy(own.drift, other->drift);
       continue;
     }
     // no wider scalar: its round-off is estimated from the narrower one by the ratio of eps, within
@@ -158,23 +158,23 @@ void Judge(std::vector<Rung>& rungs) {
 
 }  // namespace
 
-std::string_view RuledBy(double own, double widest) {
+std::string_view DominatedBy(double own, double widest) {
   if (std::isnan(own) || std::isnan(widest)) return "";
   return own > 2 * widest || own < widest / 2 ? "round-off" : "truncation";
 }
 
 Ladder RunLadder(const LadderTask& task) {
-  Exact exact(task.description, task.column.coordinates);
+  Exact exact(task.description, task.method.coordinates);
   Ladder ladder;
   ladder.start = exact.outcome();
   ladder.message = exact.message();
   if (ladder.start != Outcome::kFinished) return ladder;
-  LadderTask unsoftened = task;
-  unsoftened.column = {"lagrange", Enforcement::kPosition, Coordinates::kJoint,
-                       SolverKind::kAsPublished};
+  LadderTask unregularized = task;
+  unregularized.method = {"lagrange", Enforcement::kPosition, Coordinates::kJoint,
+                          SolverKind::kAsPublished};
   Exact in_joints(task.description, Coordinates::kJoint);
   const auto reference_at = [&](double tolerance) {
-    return Climb<Float128>(unsoftened, in_joints, Scalar::kFloat128, OneStepMethod::kGragg,
+    return Climb<Float128>(unregularized, in_joints, Scalar::kFloat128, OneStepMethod::kGragg,
                            tolerance);
   };
   const Ended reference = reference_at(task.precision.reference);

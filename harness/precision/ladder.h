@@ -27,14 +27,14 @@ inline constexpr std::array<std::string_view, 3> kLadderFormulations = {"odca", 
 /// One mechanism, one method, and the scalars to run.
 struct LadderTask {
   MechanismDescription description;  ///< planar, no tables of time
-  Column column;                     ///< with one of kLadderFormulations
+  Method method;                     ///< with one of kLadderFormulations
   double horizon = 1.0;              ///< [s]
   Precision precision;               ///< scalars, tolerances, the reference's
   Limits limits;                     ///< CPU time and steps, of each run
 };
 
 /// One run in one scalar.
-struct Rung {
+struct SweepLevel {
   Scalar scalar = Scalar::kDouble;
   double tolerance = 0.0;
   Outcome outcome = Outcome::kFinished;
@@ -51,10 +51,10 @@ struct Rung {
 struct Ladder {
   Outcome start = Outcome::kFinished;  ///< otherwise nothing was run
   std::string message;
-  std::vector<Rung> rungs;  ///< by scalar, then by tolerance, in the order of the task
+  std::vector<SweepLevel> rungs;  ///< by scalar, then by tolerance, in the order of the task
   /// In float128 by Gragg's method. Its error is the distance from a second reference with a
   /// tolerance 10^4 times as large; its drift uses its own coordinates.
-  Rung reference;
+  SweepLevel reference;
 };
 
 /// Mismatches and distances are measured in float128 on the mechanism as described, whatever the
@@ -68,6 +68,6 @@ Ladder RunLadder(const LadderTask& task);
 /// next wider scalar is not used: neighbours may fail alike. For the widest, the next narrower one
 /// bounds the round-off. Truncation dominates if its number exceeds ten times the narrower one's
 /// scaled by the ratio of their eps.
-std::string_view RuledBy(double own, double widest);
+std::string_view DominatedBy(double own, double widest);
 
 }  // namespace loopbench::harness

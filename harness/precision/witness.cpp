@@ -43,7 +43,7 @@ class Followed {
     system_->BeginStep(t, stage_);
     const Outcome outcome = system_->Derivative(t, stage_, rates);
     const bool goes_on_from_here = t == accepted_t_;
-    return outcome == Outcome::kSingular && goes_on_from_here ? Softened(t, y, rates) : outcome;
+    return outcome == Outcome::kSingular && goes_on_from_here ? Regularized(t, y, rates) : outcome;
   }
 
   bool Accept(S t, std::span<S> y) {
@@ -61,27 +61,27 @@ class Followed {
   }
 
  private:
-  Outcome Softened(S t, std::span<const S> y, std::span<S> rates) {
-    if (softened_ == nullptr) {
-      softened_ = Make<Space, S>(options_.formulation, SolverKind::kRankRevealing, mechanism_);
-      softened_->Start(t, system_->q(), system_->u());
+  Outcome Regularized(S t, std::span<const S> y, std::span<S> rates) {
+    if (regularized_ == nullptr) {
+      regularized_ = Make<Space, S>(options_.formulation, SolverKind::kRankRevealing, mechanism_);
+      regularized_->Start(t, system_->q(), system_->u());
     }
-    return softened_->Derivative(t, y, rates);
+    return regularized_->Derivative(t, y, rates);
   }
 
   const Mechanism<Space, S>& mechanism_;
   const WitnessOptions<S>& options_;
-  std::unique_ptr<System<Space, S>> system_, softened_;
+  std::unique_ptr<System<Space, S>> system_, regularized_;
   std::vector<S> stage_;
   S accepted_t_ = S(0);
 };
 
 /// Gragg's method with orders 14 and 20.
 template <class S>
-constexpr int kColumns = std::same_as<S, long double> ? 7 : kMostColumns;
+constexpr int kColumns = std::same_as<S, long double> ? 7 : kMaxColumns;
 
 /// Maximum halvings of a step that runs into a singular configuration.
-constexpr int kMostFailures = 40;
+constexpr int kMaxFailures = 40;
 /// Limits for a stretch without a singular configuration: this many steps, and a multiple of the
 /// longest stretch before it. Near a singular configuration steps shrink with the distance, over a
 /// hundred a stretch; beyond it a lost motion needed 17 000. The first stretch has its own limit.
@@ -124,7 +124,7 @@ OneStepOptions<S> StepsOf(const WitnessOptions<S>& options, S horizon) {
           .tolerance = options.tolerance,
           .columns = kColumns<S> - options.fewer,
           .longest_step = horizon / S(10),
-          .most_failures = at_stages ? kMostFailures : 7,
+          .most_failures = at_stages ? kMaxFailures : 7,
           .steps_around_failures = at_stages};
 }
 

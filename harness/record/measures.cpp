@@ -81,7 +81,7 @@ constexpr Measure kMeasures[] = {
     {"ensemble_*", kNumber},
 
     // warnings
-    {"warnings", kText, {"warnings"}, {}, kDoubts},
+    {"warnings", kText, {"warnings"}, {}, kWarnings},
     {"agreement", kNumber, {"ends alike", "", kInteger}},
 
     // rank and conditioning

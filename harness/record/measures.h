@@ -59,7 +59,7 @@ struct Merging {
 enum class Rule {
   kNone,          ///< no comparison
   kOutcome,       ///< "finished" must stay "finished"
-  kDoubts,        ///< warnings of a run's own record: no new code may appear (doubts.h)
+  kWarnings,      ///< warnings of a run's own record: no new code may appear (warnings.h)
   kEqual,         ///< number that identifies the measurement: any change is a difference
   kCount,         ///< exact count of work: more is worse, fewer is better
   kHash,          ///< equal bits

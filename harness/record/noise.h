@@ -38,15 +38,15 @@ struct NoiseThresholds {
   std::string governor = "performance";
 };
 
-/// Times whose yardsticks (harness/timing/yardstick.h) differ by more than this factor count as
-/// times of two machines. On an idle machine, medians of the yardstick differ by less than 1 %;
+/// Times whose calibrations (harness/timing/calibration.h) differ by more than this factor count as
+/// times of two machines. On an idle machine, medians of the calibration differ by less than 1 %;
 /// with a loaded host or a lower clock they are 5 % longer or more.
 inline constexpr double kOtherSpeed = 1.03;
 
-/// Returns `wanted` rounds of measurements, ascending: first the rounds in which no yardstick took
-/// longer than on an idle machine, in order, then the least disturbed ones.
-/// @param slowest  longest yardstick of each round [ns]
-/// @param alone    yardstick of the idle machine [ns]
+/// Returns `wanted` rounds of measurements, ascending: first the rounds in which no calibration
+/// took longer than on an idle machine, in order, then the least disturbed ones.
+/// @param slowest  longest calibration of each round [ns]
+/// @param alone    calibration of the idle machine [ns]
 std::vector<std::size_t> QuietRounds(const std::vector<double>& slowest, double alone,
                                      std::size_t wanted);
 

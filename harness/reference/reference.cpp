@@ -215,9 +215,9 @@ Distance Reference::Certified() const {
   return largest;
 }
 
-std::string ReferenceId(const ExperimentScene& scene, double horizon,
+std::string ReferenceId(const ExperimentProblem& problem, double horizon,
                         const ReferenceOptions& options) {
-  return Fnv1a(fmt::format("{}|{}|{}|{}|{}|{}", kFormat, scene.mechanism.canonical, horizon,
+  return Fnv1a(fmt::format("{}|{}|{}|{}|{}|{}", kFormat, problem.mechanism.canonical, horizon,
                            options.scalar, options.points, options.cpu_s));
 }
 

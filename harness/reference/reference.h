@@ -151,7 +151,7 @@ struct Reference {
 
 /// Returns the name of a problem's reference. It depends on the problem alone, not on the version
 /// of this program, so that references are reused.
-std::string ReferenceId(const ExperimentScene& scene, double horizon,
+std::string ReferenceId(const ExperimentProblem& problem, double horizon,
                         const ReferenceOptions& options);
 
 /// The file of a reference beside a store's `file`.

@@ -11,7 +11,7 @@
 #include "harness/config/formulations.h"
 #include "harness/judge/claims.h"
 #include "harness/tables/columns.h"
-#include "harness/tables/doubt_notes.h"
+#include "harness/tables/warning_notes.h"
 #include "harness/text/escape.h"
 #include "harness/text/words.h"
 #include "harness/view/html.h"
@@ -59,7 +59,7 @@ bool IsBrief(const ReportTable& table, const std::string& key) {
 }
 
 std::string TableText(const ReportTable& table) {
-  const std::vector<std::string> telling = TellingKeys(table.rows);
+  const std::vector<std::string> telling = DistinguishingKeys(table.rows);
   const auto column = [&](const TableColumn& one) {
     const bool tells = std::ranges::find(telling, one.key) != telling.end();
     return ColumnText(table, one, tells || IsBrief(table, one.key));
@@ -68,9 +68,9 @@ std::string TableText(const ReportTable& table) {
     return [key](const Record& row) { return ScriptString(row.Text(key)); };
   };
   return fmt::format(
-      R"({{"kind":"{}","title":{},"command":{},"alike":{},"names":{},"scenes":{},"ids":{},"doubts":{},"failed":{},"formulations":{},"absolute":{},"messages":{},"columns":{}}})",
+      R"({{"kind":"{}","title":{},"command":{},"alike":{},"names":{},"problems":{},"ids":{},"warnings":{},"failed":{},"formulations":{},"absolute":{},"messages":{},"columns":{}}})",
       table.kind, ScriptString(table.title), ScriptString(table.command), Strings(table.alike),
-      Strings(table.names), Strings(table.scenes), ListOf(table.rows, text("case_id")),
+      Strings(table.names), Strings(table.problems), ListOf(table.rows, text("case_id")),
       ListOf(table.rows, text("warnings")),
       ListOf(table.rows, [](const Record& row) { return HasFailed(row) ? "1" : "0"; }),
       ListOf(table.rows, text("formulation")),
@@ -91,9 +91,9 @@ std::string LooksText() {
   return "{" + text + "}";
 }
 
-std::string DoubtsText() {
+std::string WarningsText() {
   std::string text;
-  for (const auto& [code, meaning] : MeaningsOfDoubts()) {
+  for (const auto& [code, meaning] : MeaningsOfWarnings()) {
     text +=
         fmt::format("{}{}:{}", text.empty() ? "" : ",", ScriptString(code), ScriptString(meaning));
   }
@@ -107,7 +107,7 @@ std::string CurvesText(const ReportPlot& plot) {
   });
 }
 
-std::string CostRowText(const TradeoffRow& row, const std::vector<std::string>& keys) {
+std::string CostRowText(const WorkPrecisionRow& row, const std::vector<std::string>& keys) {
   return fmt::format(
       R"({{"name":{},"id":{},"formulation":{},"absolute":{},"x":{},"y":{},"bound":{},"front":{},"reason":{}}})",
       ScriptString(NameOfRow(row.record, keys)), ScriptString(row.record.Text("case_id")),
@@ -116,19 +116,19 @@ std::string CostRowText(const TradeoffRow& row, const std::vector<std::string>& 
 }
 
 std::string CostText(const ReportCost& cost) {
-  const auto problem = [](const TradeoffProblem& one) {
+  const auto problem = [](const WorkPrecisionProblem& one) {
     std::vector<Record> records;
-    for (const TradeoffRow& row : one.rows) records.push_back(row.record);
-    const std::vector<std::string> keys = TellingKeys(records);
+    for (const WorkPrecisionRow& row : one.rows) records.push_back(row.record);
+    const std::vector<std::string> keys = DistinguishingKeys(records);
     return fmt::format(
         R"({{"name":{},"rows":{}}})", ScriptString(one.name),
-        ListOf(one.rows, [&](const TradeoffRow& row) { return CostRowText(row, keys); }));
+        ListOf(one.rows, [&](const WorkPrecisionRow& row) { return CostRowText(row, keys); }));
   };
   return fmt::format(
       R"({{"error":{},"cost":{},"command":{},"fairness":{},"remarks":{},"problems":{}}})",
       ScriptString(cost.error), ScriptString(cost.cost), ScriptString(cost.command),
-      Strings(cost.fairness), Strings(cost.tradeoff.remarks),
-      ListOf(cost.tradeoff.problems, problem));
+      Strings(cost.fairness), Strings(cost.work_precision.remarks),
+      ListOf(cost.work_precision.problems, problem));
 }
 
 std::string CellText(const MapCell& cell) {
@@ -140,7 +140,7 @@ std::string CellText(const MapCell& cell) {
       cell.cases, cell.demanded);
 }
 
-std::string MapText(const FailureMap& map, const std::string& command) {
+std::string MapText(const RobustnessMap& map, const std::string& command) {
   std::string groups;
   for (std::size_t g = 0; g < map.cells.size(); ++g) {
     const MapGroup& group = map.rules.groups[g];
@@ -160,12 +160,12 @@ std::string MapText(const FailureMap& map, const std::string& command) {
       R"({{"title":{},"comment":{},"command":{},"states":{},"columns":{},"remarks":{},"groups":[{}]}})",
       ScriptString(map.rules.title), ScriptString(map.rules.comment), ScriptString(command),
       ListOf(kCellStates, [](CellState state) { return ScriptString(ToString(state)); }),
-      ListOf(map.rules.columns, [](const MapColumn& one) { return ScriptString(one.label); }),
+      ListOf(map.rules.columns, [](const MapMethod& one) { return ScriptString(one.label); }),
       Strings(map.remarks), groups);
 }
 
-std::string SceneText(const ReportScene& scene) {
-  const bool planar = scene.picture && scene.picture->planar;
+std::string ProblemText(const ReportProblem& problem) {
+  const bool planar = problem.picture && problem.picture->planar;
   const auto path = [&](const ReportPath& one) {
     return fmt::format(
         R"({{"label":{},"row":{},"times":{},"frames":{}}})", ScriptString(one.label),
@@ -173,17 +173,18 @@ std::string SceneText(const ReportScene& scene) {
         ListOf(one.poses, [&](const Poses& poses) { return PosesJson(poses, planar, 7); }));
   };
   return fmt::format(R"({{"name":{},"missing":{},"picture":{},"paths":{}}})",
-                     ScriptString(scene.name), ScriptString(scene.missing),
-                     scene.picture ? ToJson(*scene.picture) : "null", ListOf(scene.paths, path));
+                     ScriptString(problem.name), ScriptString(problem.missing),
+                     problem.picture ? ToJson(*problem.picture) : "null",
+                     ListOf(problem.paths, path));
 }
 
 }  // namespace
 
 std::vector<DataElement> ToJson(const ReportData& data) {
   std::vector<DataElement> elements = {
-      {"tables", fmt::format(R"({{"looks":{},"doubts":{},"tables":{}}})", LooksText(), DoubtsText(),
-                             ListOf(data.tables, TableText))},
-      {"scenes", ListOf(data.scenes, SceneText)},
+      {"tables", fmt::format(R"({{"looks":{},"warnings":{},"tables":{}}})", LooksText(),
+                             WarningsText(), ListOf(data.tables, TableText))},
+      {"problems", ListOf(data.problems, ProblemText)},
       {"costs", ListOf(data.costs, CostText)},
       {"plots", ListOf(data.plots, [](const ReportPlot& plot) {
          return fmt::format(R"({{"name":"{}","title":{},"unit":{}}})", plot.name,
@@ -281,14 +282,14 @@ std::string Command(const std::string& command) {
 /// Returns numbers of runs and outcomes, as a sentence and a bar.
 std::string SummaryOf(const ReportData& data) {
   if (data.runs == 0) return "<p>The store has no accuracy runs.</p>\n";
-  const std::size_t good = data.runs - data.failed - data.doubted;
+  const std::size_t good = data.runs - data.failed - data.flagged;
   std::string text = fmt::format(
       "<p class=\"counts\"><span class=\"good\">{} finished without warnings</span> "
-      "<span class=\"doubt\">{} flagged</span> <span class=\"bad\">{} failed</span></p>\n",
-      good, data.doubted, data.failed);
+      "<span class=\"flagged\">{} flagged</span> <span class=\"bad\">{} failed</span></p>\n",
+      good, data.flagged, data.failed);
   text += "<div class=\"bar\" role=\"img\" aria-label=\"shares of all runs\">";
   for (const auto& [name, count] :
-       {std::pair{"good", good}, {"doubt", data.doubted}, {"bad", data.failed}}) {
+       {std::pair{"good", good}, {"flagged", data.flagged}, {"bad", data.failed}}) {
     if (count > 0) text += fmt::format("<span class=\"{}\" style=\"flex:{}\"></span>", name, count);
   }
   return text + "</div>\n";
@@ -303,7 +304,7 @@ std::string FindingsOf(const ReportData& data) {
     text += fmt::format(
         "<li class=\"{}\"><b>{}</b> {} <button type=\"button\" class=\"show\" "
         "data-filter=\"{}\">Show these runs</button></li>\n",
-        finding.failed ? "bad" : "doubt",
+        finding.failed ? "bad" : "flagged",
         finding.failed ? "Failed:" : "Flagged:", EscapeXml(finding.text),
         EscapeXml(finding.filter));
   }
@@ -316,7 +317,7 @@ std::string ClaimsOf(const ReportData& data) {
   for (const ClaimResult& claim : data.claims) {
     const char* look = claim.verdict == Verdict::kReproduced      ? "good"
                        : claim.verdict == Verdict::kNotReproduced ? "bad"
-                                                                  : "doubt";
+                                                                  : "flagged";
     text += fmt::format(
         "<details class=\"claim {}\"><summary><b>{}</b> {} <span class=\"soft\">({})</span>"
         "</summary>\n<p>{}</p>\n<table class=\"plain\"><tr>",

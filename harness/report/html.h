@@ -17,7 +17,7 @@ struct DataElement {
   std::string json;
 };
 
-/// Returns "tables", "costs", "map", "scenes" and one "curves-NAME" per plot. Tables have numbers
+/// Returns "tables", "costs", "map", "problems" and one "curves-NAME" per plot. Tables have numbers
 /// with all digits, curves and poses with display precision.
 std::vector<DataElement> ToJson(const ReportData& data);
 

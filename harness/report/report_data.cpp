@@ -11,14 +11,14 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/work_precision.h"
 #include "harness/record/provenance.h"
 #include "harness/reference/reference.h"
 #include "harness/store/result_store.h"
 #include "harness/suite/suite.h"
 #include "harness/tables/columns.h"
-#include "harness/tables/doubt_notes.h"
 #include "harness/tables/table_view.h"
+#include "harness/tables/warning_notes.h"
 #include "harness/text/files.h"
 #include "harness/text/words.h"
 #include "harness/trajectory/trajectory.h"
@@ -132,17 +132,17 @@ std::vector<std::string> ReferencesOf(const Work& work) {
   return ids;
 }
 
-void AddPaths(const Work& work, const MechanismDescription& user, ReportScene* scene,
+void AddPaths(const Work& work, const MechanismDescription& user, ReportProblem* problem,
               std::vector<std::string>* remarks, std::vector<std::string>* changed) {
   std::vector<std::size_t> with_file;
   for (const std::size_t row : work.rows) {
     const auto path = TrajectoryOf(work.records[row], work.store_file);
     if (!path.empty() && std::filesystem::exists(path)) with_file.push_back(row);
   }
-  if (with_file.size() > kMostPaths) {
+  if (with_file.size() > kMaxPaths) {
     remarks->push_back(fmt::format("{}: motions of the first {} of {} runs are in this page",
-                                   scene->name, kMostPaths, with_file.size()));
-    with_file.resize(kMostPaths);
+                                   problem->name, kMaxPaths, with_file.size()));
+    with_file.resize(kMaxPaths);
   }
   const std::vector<std::string> references = ReferencesOf(work);
   const std::size_t paths = std::max<std::size_t>(1, with_file.size() + references.size());
@@ -150,12 +150,12 @@ void AddPaths(const Work& work, const MechanismDescription& user, ReportScene* s
   const auto add = [&](ReportPath path, const std::string& label) {
     if (path.times.size() < path.stored) {
       remarks->push_back(fmt::format("motion of {}, {}: {} of its {} times are in this page",
-                                     scene->name, label, path.times.size(), path.stored));
+                                     problem->name, label, path.times.size(), path.stored));
     }
-    if (path.times.size() > 1) scene->paths.push_back(std::move(path));
+    if (path.times.size() > 1) problem->paths.push_back(std::move(path));
   };
   const auto fail = [&](const std::string& label, const std::exception& error) {
-    remarks->push_back(fmt::format("{}, {}: no motion: {}", scene->name, label, error.what()));
+    remarks->push_back(fmt::format("{}, {}: no motion: {}", problem->name, label, error.what()));
   };
   for (const std::string& id : references) {
     try {
@@ -186,30 +186,30 @@ void AddPaths(const Work& work, const MechanismDescription& user, ReportScene* s
   }
 }
 
-void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remarks,
+void Fill(const Work& work, ReportProblem* problem, std::vector<std::string>* remarks,
           std::vector<std::string>* changed) {
   const auto file = MechanismOf(work.records[work.rows.front()], work.store_file);
   if (file.empty() || !std::filesystem::exists(file)) {
-    scene->missing =
+    problem->missing =
         "The store keeps no motion of this problem: a run keeps one with \"output\": {\"step\": "
         "0.01} (each run) or \"reference\": {} (the certified motion) in the experiment.";
     return;
   }
   try {
     const MechanismDescription user = ReadKeptMechanism(file);
-    scene->picture = MakePicture(user, "mechanisms/" + file.filename().string());
-    scene->picture->motions.clear();  // only `view` shows degrees of freedom
-    AddPaths(work, user, scene, remarks, changed);
+    problem->picture = MakePicture(user, "mechanisms/" + file.filename().string());
+    problem->picture->motions.clear();  // only `view` shows degrees of freedom
+    AddPaths(work, user, problem, remarks, changed);
   } catch (const ChangedFile& error) {
     changed->emplace_back(error.what());
-    scene->missing = error.what();
+    problem->missing = error.what();
     return;
   } catch (const std::exception& error) {
-    scene->missing = error.what();
+    problem->missing = error.what();
     return;
   }
-  if (scene->paths.empty()) {
-    scene->missing =
+  if (problem->paths.empty()) {
+    problem->missing =
         "No motion of this problem could be read (what is left out is said at the end of the "
         "page); "
         "with \"output\": {\"step\": 0.01} in the experiment a run keeps its own.";
@@ -218,33 +218,33 @@ void Fill(const Work& work, ReportScene* scene, std::vector<std::string>* remark
 
 }  // namespace
 
-std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
-                                    const std::vector<std::string>& names,
-                                    const std::vector<std::string>& scenes,
-                                    const std::filesystem::path& store_file,
-                                    std::vector<std::string>* remarks,
-                                    std::vector<std::string>* changed) {
-  std::vector<ReportScene> found;
+std::vector<ReportProblem> FindProblems(const std::vector<Record>& rows,
+                                        const std::vector<std::string>& names,
+                                        const std::vector<std::string>& problems,
+                                        const std::filesystem::path& store_file,
+                                        std::vector<std::string>* remarks,
+                                        std::vector<std::string>* changed) {
+  std::vector<ReportProblem> found;
   std::vector<std::vector<std::size_t>> members;
   for (std::size_t row = 0; row < rows.size(); ++row) {
-    auto at = static_cast<std::size_t>(std::ranges::find(found, scenes[row], &ReportScene::name) -
-                                       found.begin());
+    auto at = static_cast<std::size_t>(
+        std::ranges::find(found, problems[row], &ReportProblem::name) - found.begin());
     if (at == found.size()) {
-      found.push_back({.name = scenes[row]});
+      found.push_back({.name = problems[row]});
       members.emplace_back();
     }
     members[at].push_back(row);
   }
-  const std::size_t shown = std::min(found.size(), kMostScenes);
+  const std::size_t shown = std::min(found.size(), kMaxProblems);
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (i >= shown) {
       found[i].missing = fmt::format(
           "Pictures are of the first {} problems of a store; for this one "
           "make a store of its own (loopbench merge, --filter of run).",
-          kMostScenes);
+          kMaxProblems);
       continue;
     }
-    Fill({rows, names, store_file, members[i], kMostPlaces / shown}, &found[i], remarks, changed);
+    Fill({rows, names, store_file, members[i], kMaxPlaces / shown}, &found[i], remarks, changed);
   }
   return found;
 }
@@ -281,8 +281,8 @@ std::vector<TableColumn> AllColumns(const Table& table) {
 }
 
 // Returns the keys of problems: equal in all rows of a problem, but not in all rows.
-std::vector<std::string> KeysOfScenes(const std::vector<Record>& rows,
-                                      const std::vector<std::string>& telling) {
+std::vector<std::string> KeysOfProblems(const std::vector<Record>& rows,
+                                        const std::vector<std::string>& telling) {
   std::vector<std::string> keys;
   std::map<std::string, const Record*> first;
   for (const Record& row : rows) {
@@ -290,17 +290,17 @@ std::vector<std::string> KeysOfScenes(const std::vector<Record>& rows,
   }
   for (const std::string& key : telling) {
     if (key == "mechanism" || key == "horizon" || key == "experiment") continue;
-    const bool is_scenes = first.size() > 1 && std::ranges::all_of(rows, [&](const Record& row) {
-                             const Record& other =
-                                 *first.at(row.Text("problem_id") + " " + row.Text("horizon"));
-                             return row.Text(key) == other.Text(key);
-                           });
-    if (is_scenes) keys.push_back(key);
+    const bool is_problems = first.size() > 1 && std::ranges::all_of(rows, [&](const Record& row) {
+                               const Record& other =
+                                   *first.at(row.Text("problem_id") + " " + row.Text("horizon"));
+                               return row.Text(key) == other.Text(key);
+                             });
+    if (is_problems) keys.push_back(key);
   }
   return keys;
 }
 
-std::string SceneName(const Record& row, const std::vector<std::string>& keys) {
+std::string ProblemName(const Record& row, const std::vector<std::string>& keys) {
   std::string name = row.Text("mechanism");
   if (!row.Text("horizon").empty()) name += fmt::format(", {} s", row.Text("horizon"));
   for (const std::string& key : keys) name += fmt::format(", {} {}", key, row.Text(key));
@@ -308,18 +308,18 @@ std::string SceneName(const Record& row, const std::vector<std::string>& keys) {
 }
 
 void NameRows(ReportTable* table) {
-  std::vector<std::string> telling = TellingKeys(table->rows);
-  const std::vector<std::string> of_scenes = KeysOfScenes(table->rows, telling);
+  std::vector<std::string> telling = DistinguishingKeys(table->rows);
+  const std::vector<std::string> of_problems = KeysOfProblems(table->rows, telling);
   std::erase_if(telling, [&](const std::string& key) {
     return key == "mechanism" || key == "horizon" ||
-           std::ranges::find(of_scenes, key) != of_scenes.end();
+           std::ranges::find(of_problems, key) != of_problems.end();
   });
   std::map<std::string, std::string> ids;  // ids of problems, by name
   for (const Record& row : table->rows) {
-    std::string name = SceneName(row, of_scenes);
+    std::string name = ProblemName(row, of_problems);
     const std::string id = row.Text("problem_id");
     if (ids.emplace(name, id).first->second != id) name += fmt::format(" ({})", id.substr(0, 6));
-    table->scenes.push_back(name);
+    table->problems.push_back(name);
     std::string own = NameOfRow(row, telling);
     if (own.empty() || telling.empty()) own = row.Text("formulation");
     table->names.push_back(own);
@@ -352,7 +352,7 @@ std::vector<ReportTable> MakeTables(const std::vector<Record>& records, const st
 
 /// Returns a finding for each outcome other than "finished", and one for each warning note.
 std::vector<ReportFinding> FindingsOf(const ReportTable& table,
-                                      const std::vector<std::string>& doubts) {
+                                      const std::vector<std::string>& warnings) {
   std::map<std::string, std::vector<std::size_t>> endings;
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     if (HasFailed(table.rows[i])) endings[table.rows[i].Text("outcome")].push_back(i);
@@ -363,8 +363,8 @@ std::vector<ReportFinding> FindingsOf(const ReportTable& table,
         fmt::format("{} of {} runs ended as {}: ", rows.size(), table.rows.size(), outcome);
     for (std::size_t i = 0; i < std::min(rows.size(), kRowsNamed); ++i) {
       const Record& row = table.rows[rows[i]];
-      text +=
-          fmt::format("{}{}: {}", i == 0 ? "" : "; ", table.scenes[rows[i]], table.names[rows[i]]);
+      text += fmt::format("{}{}: {}", i == 0 ? "" : "; ", table.problems[rows[i]],
+                          table.names[rows[i]]);
       if (!row.Text("t_reached").empty()) {
         text += fmt::format(" at {:.4g} s", row.Number("t_reached"));
       }
@@ -373,7 +373,7 @@ std::vector<ReportFinding> FindingsOf(const ReportTable& table,
     if (rows.size() > kRowsNamed) text += fmt::format("; and {} more", rows.size() - kRowsNamed);
     findings.push_back({true, text, "outcome=" + outcome});
   }
-  for (const std::string& note : doubts) {
+  for (const std::string& note : warnings) {
     const std::string code = note.substr(0, note.find(':'));
     if (code.find(' ') == std::string::npos) findings.push_back({false, note, "warnings~" + code});
   }
@@ -387,15 +387,15 @@ std::vector<ReportCost> MakeCosts(const std::vector<Record>& records, const std:
     const bool is_there = std::ranges::any_of(
         records, [&](const Record& record) { return std::isfinite(record.Number(key)); });
     if (!is_there) continue;
-    TradeoffOptions options{.error = key};
+    WorkPrecisionOptions options{.error = key};
     for (const std::string& other : CaseKeysOf(records)) {
       if (other == "config_hash") options.per.push_back(other);
     }
     try {
-      ReportCost cost{.tradeoff = MakeTradeoff(records, options)};
+      ReportCost cost{.work_precision = MakeTradeoff(records, options)};
       cost.error = ColumnOf(key, records).header;
-      cost.cost = ColumnOf(cost.tradeoff.cost, records).header;
-      cost.fairness = FairnessStatement(cost.tradeoff);
+      cost.cost = ColumnOf(cost.work_precision.cost, records).header;
+      cost.fairness = FairnessStatement(cost.work_precision);
       cost.command = Typed({"work-precision", store, "--error-key", key});
       costs.push_back(std::move(cost));
     } catch (const ConfigError& error) {
@@ -442,21 +442,21 @@ ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& o
   for (const ClaimRule& rule : options.claims) data.claims.push_back(Evaluate(rule, records));
   data.claims_command = Typed(
       {"check-claims", store, "--claims", options.claims_file.string(), "--out", "verdicts.md"});
-  if (options.rules) data.map = MakeFailureMap(*options.rules, records);
+  if (options.rules) data.map = MakeRobustnessMap(*options.rules, records);
   data.map_command = Typed({"robustness", store, "--rules", options.rules_file.string()});
   if (data.tables.empty() || data.tables.front().kind != "drift") return data;
   const ReportTable& runs = data.tables.front();
   data.runs = runs.rows.size();
   for (const Record& row : runs.rows) {
     data.failed += HasFailed(row) ? 1 : 0;
-    data.doubted += IsDoubtful(row, "outcome") ? 1 : 0;
+    data.flagged += IsFlagged(row, "outcome") ? 1 : 0;
   }
-  data.doubts = DoubtNotes(runs.rows, records);
-  data.findings = FindingsOf(runs, data.doubts);
+  data.warning_notes = WarningNotes(runs.rows, records);
+  data.findings = FindingsOf(runs, data.warning_notes);
   AddPlots(runs, options, &data);
   data.costs = MakeCosts(records, store, &data.remarks);
-  data.scenes = FindScenes(runs.rows, runs.names, runs.scenes, StoreFile(options.store),
-                           &data.remarks, &data.changed);
+  data.problems = FindProblems(runs.rows, runs.names, runs.problems, StoreFile(options.store),
+                               &data.remarks, &data.changed);
   return data;
 }
 namespace {

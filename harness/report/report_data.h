@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "harness/judge/claims.h"
-#include "harness/judge/failure_map.h"
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/robustness_map.h"
+#include "harness/judge/work_precision.h"
 #include "harness/record/record.h"
 #include "harness/tables/table.h"
 #include "harness/view/picture.h"
@@ -40,8 +40,8 @@ struct ReportPath {
 };
 
 /// One mechanism with its motions.
-struct ReportScene {
-  std::string name = {};                ///< as in ReportTable::scenes
+struct ReportProblem {
+  std::string name = {};                ///< as in ReportTable::problems
   std::optional<Picture> picture = {};  ///< none: see `missing`
   std::vector<ReportPath> paths = {};
   std::string missing =
@@ -50,16 +50,16 @@ struct ReportScene {
 
 /// Returns problems in the order of the rows, whose names and problems are given. `changed`
 /// receives the messages about files that have changed since their run.
-std::vector<ReportScene> FindScenes(const std::vector<Record>& rows,
-                                    const std::vector<std::string>& names,
-                                    const std::vector<std::string>& scenes,
-                                    const std::filesystem::path& store_file,
-                                    std::vector<std::string>* remarks,
-                                    std::vector<std::string>* changed);
+std::vector<ReportProblem> FindProblems(const std::vector<Record>& rows,
+                                        const std::vector<std::string>& names,
+                                        const std::vector<std::string>& problems,
+                                        const std::filesystem::path& store_file,
+                                        std::vector<std::string>* remarks,
+                                        std::vector<std::string>* changed);
 
 /// Maximum number of drawn problems of a report, of motions of a problem, and of body poses in all
 /// motions of a page.
-inline constexpr std::size_t kMostScenes = 12, kMostPaths = 60, kMostPlaces = 120'000;
+inline constexpr std::size_t kMaxProblems = 12, kMaxPaths = 60, kMaxPlaces = 120'000;
 
 // Data of the page of a store: computed from records with the rules, tables and texts of the other
 // commands, and free of HTML. The page (web/report/) displays them and evaluates nothing.
@@ -81,7 +81,7 @@ struct ReportTable {
   std::vector<std::string> alike = {};  ///< "solver: rank-revealing"
   std::vector<Record> rows = {};
   std::vector<std::string> names = {};  ///< labels of the rows, from their distinguishing keys
-  std::vector<std::string> scenes =
+  std::vector<std::string> problems =
       {};  ///< problems of the rows: mechanism, horizon and other problem keys
   std::string command = {};
 };
@@ -103,7 +103,7 @@ struct ReportPlot {
 
 /// Work-precision data for one error measure.
 struct ReportCost {
-  Tradeoff tradeoff = {};
+  WorkPrecision work_precision = {};
   std::string error = {}, cost = {};       ///< with units
   std::vector<std::string> fairness = {};  ///< settings common to all compared rows
   std::string command = {};
@@ -111,16 +111,16 @@ struct ReportCost {
 
 struct ReportData {
   std::string store = {};
-  std::size_t runs = 0, failed = 0, doubted = 0;  ///< accuracy runs
+  std::size_t runs = 0, failed = 0, flagged = 0;  ///< accuracy runs
   std::vector<ClaimResult> claims = {};
   std::vector<ReportFinding> findings = {};
-  std::vector<std::string> doubts = {};    ///< DoubtNotes()
-  std::vector<std::string> warnings = {};  ///< warnings about noise
+  std::vector<std::string> warning_notes = {};  ///< WarningNotes()
+  std::vector<std::string> warnings = {};       ///< warnings about noise
   std::vector<ReportTable> tables = {};
   std::vector<ReportPlot> plots = {};
   std::vector<ReportCost> costs = {};
-  std::optional<FailureMap> map = {};
-  std::vector<ReportScene> scenes = {};
+  std::optional<RobustnessMap> map = {};
+  std::vector<ReportProblem> problems = {};
   std::vector<std::string> remarks = {};     ///< decimated or omitted data
   std::vector<std::string> changed = {};     ///< files of the store that differ from the output of
                                              ///< their run

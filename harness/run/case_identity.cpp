@@ -19,8 +19,8 @@ const BodyImage& ImageOf(const MechanismDescription& description, const Compiled
 
 }  // namespace
 
-CompiledScene CompileScene(const MechanismDescription& description, const SceneObservation& observe,
-                           CompileOptions options) {
+SimplifiedProblem SimplifyProblem(const MechanismDescription& description,
+                                  const ObservedQuantities& observe, CompileOptions options) {
   const bool angles = !observe.branch_invariants.empty() || observe.closed_form.has_value();
   if (angles) options.islands = false;
   if (angles && description.space == SpaceKind::kSpatial) {  // no body may change its axes
@@ -28,20 +28,20 @@ CompiledScene CompileScene(const MechanismDescription& description, const SceneO
     options = CompileOptions::None();
     options.redundancy = redundancy;
   }
-  CompiledScene scene{Compile(description, options), observe};
-  if (scene.compiled.done == CompileOptions::None()) return scene;
-  const std::vector<BodyDescription>& bodies = scene.compiled.parts.front().description.bodies;
-  for (AngleCombination& combination : scene.observe.branch_invariants) {
+  SimplifiedProblem problem{Compile(description, options), observe};
+  if (problem.compiled.done == CompileOptions::None()) return problem;
+  const std::vector<BodyDescription>& bodies = problem.compiled.parts.front().description.bodies;
+  for (AngleCombination& combination : problem.observe.branch_invariants) {
     // fixed terms add a constant, and only changes count
     std::erase_if(combination, [&](const auto& term) {
-      return ImageOf(description, scene.compiled, term.first).part < 0;
+      return ImageOf(description, problem.compiled, term.first).part < 0;
     });
     for (auto& [name, factor] : combination) {
-      name = bodies[ImageOf(description, scene.compiled, name).body].name;
+      name = bodies[ImageOf(description, problem.compiled, name).body].name;
     }
   }
-  if (auto& form = scene.observe.closed_form) {
-    const BodyImage& image = ImageOf(description, scene.compiled, form->body);
+  if (auto& form = problem.observe.closed_form) {
+    const BodyImage& image = ImageOf(description, problem.compiled, form->body);
     if (image.part < 0) {
       form.reset();
     } else {
@@ -49,7 +49,7 @@ CompiledScene CompileScene(const MechanismDescription& description, const SceneO
       form->down_angle -= image.turn;
     }
   }
-  return scene;
+  return problem;
 }
 
 std::string ToString(const CompileOptions& options) {
@@ -73,9 +73,9 @@ Record CommonContent(const Experiment& experiment) {
   return content;
 }
 
-Record SceneContent(const Experiment& experiment, const Case& one) {
+Record ProblemContent(const Experiment& experiment, const Case& one) {
   Record content = CommonContent(experiment);
-  content.Set("document", experiment.scenes[one.scene].mechanism.canonical);
+  content.Set("document", experiment.problems[one.problem].mechanism.canonical);
   return content;
 }
 
@@ -88,7 +88,7 @@ void SetCaseId(Record* keys, const std::string& content) {
 }
 
 std::string AccuracyContent(const Experiment& experiment, const Case& one) {
-  Record content = SceneContent(experiment, one);
+  Record content = ProblemContent(experiment, one);
   content.Set("ensemble", std::int64_t{one.ensemble});
   content.Set("seed", static_cast<std::int64_t>(one.seed));
   content.Set("perturb", one.perturb);
@@ -97,7 +97,7 @@ std::string AccuracyContent(const Experiment& experiment, const Case& one) {
   }
   content.Set("branch_bound", one.branch_bound);
   content.Set("series_points", std::int64_t{experiment.series_points});
-  if (const auto& series = experiment.scenes[one.scene].series) {
+  if (const auto& series = experiment.problems[one.problem].series) {
     content.Set("reference_series", series->canonical);
   }
   if (experiment.reference) {
@@ -115,8 +115,8 @@ Case Identified(const Experiment& experiment, Case one) {
   return one;
 }
 
-std::string SceneTimingContent(const Experiment& experiment, const Case& one) {
-  Record content = SceneContent(experiment, one);
+std::string ProblemTimingContent(const Experiment& experiment, const Case& one) {
+  Record content = ProblemContent(experiment, one);
   content.Set("repeats", std::int64_t{experiment.timing.repeats});
   return CaseId(content);
 }
@@ -128,7 +128,7 @@ std::string FamilyTimingContent(const Experiment& experiment) {
 }
 
 std::string LadderContent(const Experiment& experiment, const Case& one, const std::string& rungs) {
-  Record content = SceneContent(experiment, one);
+  Record content = ProblemContent(experiment, one);
   content.Set("rungs", rungs);
   return CaseId(content);
 }

@@ -13,17 +13,17 @@ namespace loopbench::harness {
 
 // A problem as it is run: simplified descriptions with their known solutions (docs/decisions/009).
 
-struct CompiledScene {
+struct SimplifiedProblem {
   Compiled compiled;
   /// Names and angles refer to the simplified bodies. Problems with known angles are never split,
   /// so this belongs to the only part.
-  SceneObservation observe;
+  ObservedQuantities observe;
 };
 
 /// Angles of the known solution are measured about the user's z: such a problem is not split, and a
 /// spatial one stays spatial.
-CompiledScene CompileScene(const MechanismDescription& description, const SceneObservation& observe,
-                           CompileOptions options);
+SimplifiedProblem SimplifyProblem(const MechanismDescription& description,
+                                  const ObservedQuantities& observe, CompileOptions options);
 
 /// Returns the active simplifications, such as "planar, welds", or "none".
 std::string ToString(const CompileOptions& options);
@@ -46,7 +46,7 @@ Case Identified(const Experiment& experiment, Case one);
 std::string AccuracyContent(const Experiment& experiment, const Case& one);
 
 /// Returns the content of timings of a problem, or of a family member, which its keys fully define.
-std::string SceneTimingContent(const Experiment& experiment, const Case& one);
+std::string ProblemTimingContent(const Experiment& experiment, const Case& one);
 std::string FamilyTimingContent(const Experiment& experiment);
 
 /// Returns the content of all levels of a precision study. `rungs` names them all: the verdict on

@@ -204,11 +204,11 @@ MechanismDescription Follow(const MechanismDescription& from, const MechanismDes
 // "OA = -1.5, AB = 0.2": who runs the member by itself sets these. Guesses decide about last bits;
 // of large mechanisms they stay out.
 std::string StartText(const MechanismDescription& description) {
-  constexpr std::size_t kMostGuesses = 12;
+  constexpr std::size_t kMaxGuesses = 12;
   const std::vector<JointValues>& coordinates = description.initial.coordinates;
   std::string text;
   for (const JointValues& values : coordinates) {
-    if (coordinates.size() > kMostGuesses && !IsHeld(description, values.joint)) continue;
+    if (coordinates.size() > kMaxGuesses && !IsHeld(description, values.joint)) continue;
     text += fmt::format("{}{} = {}", text.empty() ? "" : ", ",
                         description.joints[static_cast<std::size_t>(values.joint)].name,
                         fmt::join(values.values, " "));

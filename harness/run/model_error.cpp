@@ -13,7 +13,7 @@ namespace {
 
 /// Relative poses of the bodies of a joint.
 template <class Space>
-struct Stand {
+struct RelativePose {
   Pose<Space, double> X_PQ;     ///< axes and centres of mass
   Linear<Space, double> point;  ///< of the joint's M, from P's centre of mass in P's axes
 };
@@ -47,9 +47,10 @@ class Watching {
   }
 
  private:
-  Stand<Space> StandOf(const Kinematics<Space, double>& kinematics, std::size_t index) const {
+  RelativePose<Space> StandOf(const Kinematics<Space, double>& kinematics,
+                              std::size_t index) const {
     const Joint<Space, double>& joint = mechanism_.joints()[index];
-    Stand<Space> stand;
+    RelativePose<Space> stand;
     stand.X_PQ = Compose(Inverse(kinematics.poses()[joint.from]), kinematics.poses()[joint.to]);
     stand.point = Compose(stand.X_PQ, joint.X_QM).p;
     return stand;
@@ -57,7 +58,7 @@ class Watching {
 
   void Look(double t, const Kinematics<Space, double>& kinematics) {
     for (std::size_t j = 0; j < description_.joints.size(); ++j) {
-      const Stand<Space> stand = StandOf(kinematics, j);
+      const RelativePose<Space> stand = StandOf(kinematics, j);
       if (first_.size() == j) first_.push_back(stand);
       Travel& travel = run_.travels[description_.joints[j].name];
       const Pose<Space, double> turned = Compose(Inverse(first_[j].X_PQ), stand.X_PQ);
@@ -72,7 +73,7 @@ class Watching {
 
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
-  std::vector<Stand<Space>> first_;
+  std::vector<RelativePose<Space>> first_;
   ShortRun run_;
 };
 

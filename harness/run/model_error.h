@@ -31,8 +31,8 @@ ReadyToRun<Space> StartAtLevelPosition(const MechanismDescription& description,
   const Start<double> start = Assemble<Space>(description, mechanism);
   ready.failure = start.message;
   if (start.outcome != Outcome::kFinished) return ready;
-  const Column column{.formulation = formulation, .enforcement = Enforcement::kPosition};
-  auto system = MakeFormulation<Space>(column, mechanism);
+  const Method method{.formulation = formulation, .enforcement = Enforcement::kPosition};
+  auto system = MakeFormulation<Space>(method, mechanism);
   const Outcome outcome = system->Start(0.0, start.q, start.u);
   if (outcome != Outcome::kFinished) {
     ready.failure = ToString(outcome);

@@ -57,18 +57,18 @@ std::unique_ptr<Peer> TryPeer(const std::string& formulation,
 
 void RequirePeers(const std::vector<Experiment>& experiments) {
   for (const Experiment& experiment : experiments) {
-    const auto require = [&](const std::string& place, const std::vector<Column>& columns) {
-      for (const Column& column : columns) {
-        if (!IsMissing(column.formulation)) continue;
+    const auto require = [&](const std::string& place, const std::vector<Method>& methods) {
+      for (const Method& method : methods) {
+        if (!IsMissing(method.formulation)) continue;
         throw ConfigError(fmt::format("{}: {}: {}", experiment.path.string(), place,
-                                      WhyMissing(column.formulation)));
+                                      WhyMissing(method.formulation)));
       }
     };
-    require("/methods", experiment.columns);
+    require("/methods", experiment.methods);
     if (experiment.timing.repeats == 0) continue;
-    require("/timing/methods", experiment.timing.columns);
+    require("/timing/methods", experiment.timing.methods);
     for (const TimingFamily& family : experiment.timing.families) {
-      require("/timing/families", family.columns);
+      require("/timing/families", family.methods);
     }
   }
 }

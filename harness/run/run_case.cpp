@@ -8,8 +8,8 @@
 #include <memory>
 #include <optional>
 
-#include "harness/analysis/doubts.h"
 #include "harness/analysis/model_warnings.h"
+#include "harness/analysis/warnings.h"
 #include "harness/integrator/arkode.h"
 #include "harness/observers/observer.h"
 #include "harness/observers/registry.h"
@@ -86,7 +86,7 @@ void ForEachMember(const Experiment& experiment, const Case& one, int threads, c
     const auto run_member = [&](int i, SideBySide& beside) {
       Member& member = held[static_cast<std::size_t>(i)];
       member.start =
-          MemberStart(experiment.scenes[one.scene].mechanism.description, one, first + i);
+          MemberStart(experiment.problems[one.problem].mechanism.description, one, first + i);
       member.run = RunOnce(experiment, one, member.start, &beside);
     };
     RunSideBySide(static_cast<int>(held.size()), threads, run_member);
@@ -102,12 +102,12 @@ void ForEachMember(const Experiment& experiment, const Case& one, int threads, c
 }
 
 /// Returns the reference for the case's errors, and writes its certified error to the record.
-HeldAgainst WriteCertificateOf(const ExperimentScene& scene, const Case& one,
-                               const Reference* reference, Record& record) {
-  HeldAgainst held;
-  if (scene.series) {
-    WriteCertificate(scene.mechanism.description, *scene.series, one.horizon, record);
-    if (scene.series->NumWithin(one.horizon) > 0) held.series = &*scene.series;
+ErrorReference WriteCertificateOf(const ExperimentProblem& problem, const Case& one,
+                                  const Reference* reference, Record& record) {
+  ErrorReference held;
+  if (problem.series) {
+    WriteCertificate(problem.mechanism.description, *problem.series, one.horizon, record);
+    if (problem.series->NumWithin(one.horizon) > 0) held.series = &*problem.series;
   } else if (reference != nullptr) {
     WriteCertificate(*reference, record);
     if (reference->NumTrusted() > 0) held.reference = reference;
@@ -123,7 +123,7 @@ void WriteRefinement(const Experiment& experiment, Case one, Record& record) {
   one.rtol /= 10.0;
   one.atol /= 10.0;
   const Run finer =
-      RunOnce(experiment, one, experiment.scenes[one.scene].mechanism.description, nullptr);
+      RunOnce(experiment, one, experiment.problems[one.problem].mechanism.description, nullptr);
   record.Set("refinement_difference", HasFinished(finer.record)
                                           ? DifferenceOf(record, finer.record).largest
                                           : std::numeric_limits<double>::infinity());
@@ -146,23 +146,23 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 
 Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference,
                const std::filesystem::path& trajectory, int threads) {
-  const ExperimentScene& scene = experiment.scenes[one.scene];
+  const ExperimentProblem& problem = experiment.problems[one.problem];
   Record record = one.keys;
-  record.Set("problem_id", Fnv1a(scene.mechanism.canonical));
-  const double link = LinkLength(scene.mechanism.description);
+  record.Set("problem_id", Fnv1a(problem.mechanism.canonical));
+  const double link = LinkLength(problem.mechanism.description);
   record.Set("link_length", link);
   record.Set("position_goal",
              4 * std::numeric_limits<double>::epsilon() * link *
-                 static_cast<double>(scene.mechanism.description.bodies.size() - 1));
-  const HeldAgainst held = WriteCertificateOf(scene, one, reference, record);
+                 static_cast<double>(problem.mechanism.description.bodies.size() - 1));
+  const ErrorReference held = WriteCertificateOf(problem, one, reference, record);
   std::optional<TrajectoryTask> task;
   if (experiment.output && !trajectory.empty()) {
     task.emplace(*experiment.output, trajectory,
-                 fmt::format("{} {} {} {}", one.mechanism, ToString(one.column), one.integrator,
+                 fmt::format("{} {} {} {}", one.mechanism, ToString(one.method), one.integrator,
                              SettingOf(one)));
   }
-  Run nominal =
-      RunOnce(experiment, one, scene.mechanism.description, nullptr, held, task ? &*task : nullptr);
+  Run nominal = RunOnce(experiment, one, problem.mechanism.description, nullptr, held,
+                        task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   if (experiment.refine && one.rtol > 0.0 && !IsPeer(record) && HasFinished(record)) {
@@ -183,7 +183,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   if (one.ensemble <= 1) runs.push_back(nominal.drift);
   std::erase_if(runs, [](const DriftSeries& run) { return run.t.empty(); });
   if (!runs.empty()) {
-    const double length = scene.mechanism.observe.length;
+    const double length = problem.mechanism.observe.length;
     GrowthOptions options;
     // the bound for round-off holds for some ten lengths of path; paths grow with the horizon
     options.round_off *= std::max(1.0, one.horizon / 10.0);
@@ -191,13 +191,13 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
   }
   WriteExponent("energy_growth_exponent", nominal.energy, one.horizon, nominal.kinetic, record);
   WriteExponent("correction_growth_exponent", nominal.correction, one.horizon,
-                scene.mechanism.observe.length, record);
+                problem.mechanism.observe.length, record);
   if (one.ensemble > 1) tally.Write(record);
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
   if (HasFinished(record)) {
-    record.Set("warnings", OwnDoubts(record));
+    record.Set("warnings", OwnWarnings(record));
   }
   return record;
 }
@@ -212,18 +212,18 @@ std::string StateHash(std::span<const double> y) {
 template <class Space>
 class Runner {
  public:
-  /// Runs part `part` of `user`, simplified to `scene`. A member of an ensemble has other runs
+  /// Runs part `part` of `user`, simplified to `problem`. A member of an ensemble has other runs
   /// `beside` it and fewer observers.
   Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
-         const CompiledScene& scene, int part, SideBySide* beside, const HeldAgainst& held,
+         const SimplifiedProblem& problem, int part, SideBySide* beside, const ErrorReference& held,
          const TrajectoryTask* trajectory)
       : case_(one),
         user_(user),
-        compiled_(scene.compiled),
+        compiled_(problem.compiled),
         part_(part),
-        scene_(scene.observe),
-        description_(scene.compiled.parts[static_cast<std::size_t>(part)].description),
-        mechanism_(description_, one.column.coordinates),
+        problem_(problem.observe),
+        description_(problem.compiled.parts[static_cast<std::size_t>(part)].description),
+        mechanism_(description_, one.method.coordinates),
         stops_(mechanism_.stop_times()),
         beside_(beside) {
     const Measured measured{user_, compiled_};
@@ -233,7 +233,7 @@ class Runner {
       errors_ = std::make_unique<ErrorMeter>(measured, part, *held.reference);
     }
     if (trajectory != nullptr) PrepareRows(*trajectory);
-    const Watched<Space> watched{description_, mechanism_, scene_, experiment.series_points,
+    const Watched<Space> watched{description_, mechanism_, problem_, experiment.series_points,
                                  stops_};
     observers_ = IsMember() ? MakeMemberObservers<Space>(watched) : MakeObservers<Space>(watched);
   }
@@ -248,12 +248,12 @@ class Runner {
     } else {
       Kinematics<Space, double> kinematics(mechanism_);
       kinematics.UpdatePosition(start.q);
-      run.branch_start = ExactObserver<Space>(scene_, mechanism_).BranchAt(kinematics);
+      run.branch_start = ExactObserver<Space>(problem_, mechanism_).BranchAt(kinematics);
       result = Integrate(start);
       for (const auto& observer : observers_) observer->Write(run.record);
-      if (const Value* softened = run.record.Find("regularized_evaluations")) {
+      if (const Value* regularized = run.record.Find("regularized_evaluations")) {
         run.record.Set("regularized_evaluations",
-                       std::get<std::int64_t>(*softened) - looked_by_then_);
+                       std::get<std::int64_t>(*regularized) - looked_by_then_);
       }
       if (errors_) errors_->Write(run.record);
       if (recorder_) recorder_->Finish(run.record);
@@ -264,7 +264,7 @@ class Runner {
     for (const auto& observer : observers_) observer->Trace(traces);
     WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
                 run.record);
-    if (case_.column.execution != Execution::kLibrary) {
+    if (case_.method.execution != Execution::kLibrary) {
       run.record.Set("library_evaluations", library_evaluations_);
       run.record.Set("compile_s", compile_s_);
     }
@@ -313,9 +313,9 @@ class Runner {
   /// Runs `look`, which is none of the integrator's, and keeps its evaluations from being counted.
   template <class Look>
   void Uncounted(const System<Space, double>& system, Look look) {
-    const std::int64_t before = system.diagnostics().softened_evaluations;
+    const std::int64_t before = system.diagnostics().regularized_evaluations;
     look();
-    looked_ += system.diagnostics().softened_evaluations - before;
+    looked_ += system.diagnostics().regularized_evaluations - before;
   }
 
   /// The times of the reference and of rows, each once, for the integrator to show.
@@ -347,15 +347,15 @@ class Runner {
   }
 
   IntegratorResult Integrate(const Start<double>& start) {
-    const auto formulation = MakeFormulation<Space>(case_.column, mechanism_, beside_);
+    const auto formulation = MakeFormulation<Space>(case_.method, mechanism_, beside_);
     IntegratorResult result;
-    const auto peer = TryPeer(case_.column.formulation, description_, &result);
+    const auto peer = TryPeer(case_.method.formulation, description_, &result);
     if (result.outcome != Outcome::kFinished) return result;
     result.outcome = formulation->Start(0.0, start.q, start.u);
     if (result.outcome != Outcome::kFinished) return result;
     formulation->IntegrateWork(mechanism_.has_power() && !peer);  // peers integrate none
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation);
-    GiveExecution<Space>(case_.column, description_, *formulation, &result);
+    GiveExecution<Space>(case_.method, description_, *formulation, &result);
     if (result.outcome != Outcome::kFinished) return result;
     const std::size_t n = static_cast<std::size_t>(formulation->state_size());
     y_.assign(static_cast<std::size_t>(formulation->size()), 0.0);
@@ -413,7 +413,7 @@ class Runner {
   const MechanismDescription& user_;
   const Compiled& compiled_;
   int part_;
-  const SceneObservation& scene_;
+  const ObservedQuantities& problem_;
   const MechanismDescription& description_;
   Mechanism<Space, double> mechanism_;
   std::vector<std::unique_ptr<Observer<Space>>> observers_;
@@ -433,22 +433,22 @@ class Runner {
 }  // namespace
 
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            SideBySide* beside, const HeldAgainst& held, const TrajectoryTask* trajectory) {
-  const SceneObservation& observe = experiment.scenes[one.scene].mechanism.observe;
-  const CompiledScene scene = CompileScene(description, observe, experiment.compile);
+            SideBySide* beside, const ErrorReference& held, const TrajectoryTask* trajectory) {
+  const ObservedQuantities& observe = experiment.problems[one.problem].mechanism.observe;
+  const SimplifiedProblem problem = SimplifyProblem(description, observe, experiment.compile);
   std::vector<Run> parts;
-  for (int part = 0; part < static_cast<int>(scene.compiled.parts.size()); ++part) {
+  for (int part = 0; part < static_cast<int>(problem.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, scene, part, beside, held, trajectory)
+      return Runner<Space>(experiment, one, description, problem, part, beside, held, trajectory)
           .Execute();
     };
-    const auto& own = scene.compiled.parts[static_cast<std::size_t>(part)].description;
+    const auto& own = problem.compiled.parts[static_cast<std::size_t>(part)].description;
     parts.push_back(own.space == SpaceKind::kPlanar ? run.template operator()<Planar>()
                                                     : run.template operator()<Spatial>());
   }
   Run run = MergeParts(parts);
-  if (scene.compiled.done != CompileOptions::None()) {
-    run.record.Set("preprocessed", ToString(scene.compiled.done));
+  if (problem.compiled.done != CompileOptions::None()) {
+    run.record.Set("preprocessed", ToString(problem.compiled.done));
   }
   return run;
 }

@@ -38,17 +38,17 @@ void WriteExponent(const std::string& key, const DriftSeries& series, double hor
 
 // Runs one case for accuracy: start, integration, observers, record.
 
-/// The mechanism with the formulation and level that a column names.
+/// The mechanism with the formulation and level that a method names.
 template <class Space>
-std::unique_ptr<System<Space, double>> MakeFormulation(const Column& column,
+std::unique_ptr<System<Space, double>> MakeFormulation(const Method& method,
                                                        const Mechanism<Space, double>& mechanism,
                                                        SideBySide* beside = nullptr) {
-  return MakeFormulation<Space>(column.formulation, mechanism,
-                                {.enforcement = column.enforcement,
-                                 .solver = column.solver,
-                                 .gains = column.gains,
-                                 .threads = column.threads,
-                                 .general = column.execution != Execution::kLibrary,
+  return MakeFormulation<Space>(method.formulation, mechanism,
+                                {.enforcement = method.enforcement,
+                                 .solver = method.solver,
+                                 .gains = method.gains,
+                                 .threads = method.threads,
+                                 .general = method.execution != Execution::kLibrary,
                                  .beside = beside});
 }
 
@@ -64,23 +64,23 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
 /// Gives a system, after its start and IntegrateWork(), the generated right-hand side of a method.
 /// Throws NotCovered (harness/generate/record.h).
 template <class Space>
-void GiveExecution(const Column& column, const MechanismDescription& description,
+void GiveExecution(const Method& method, const MechanismDescription& description,
                    System<Space, double>& system) {
-  if (column.execution == Execution::kLibrary) return;
+  if (method.execution == Execution::kLibrary) return;
   system.UseCompiled(std::make_unique<generate::GeneratedDerivative<Space>>(
-      generate::RecordingSubject{description, column.coordinates, column.formulation,
+      generate::RecordingSubject{description, method.coordinates, method.formulation,
                                  system.options()},
       system,
-      column.execution == Execution::kGeneratedFma ? generate::Contraction::kFused
+      method.execution == Execution::kGeneratedFma ? generate::Contraction::kFused
                                                    : generate::Contraction::kNone));
 }
 
 /// Stores NotCovered as outcome and message of `result` instead of throwing it.
 template <class Space>
-void GiveExecution(const Column& column, const MechanismDescription& description,
+void GiveExecution(const Method& method, const MechanismDescription& description,
                    System<Space, double>& system, IntegratorResult* result) {
   try {
-    GiveExecution(column, description, system);
+    GiveExecution(method, description, system);
   } catch (const generate::NotCovered& why) {
     result->outcome = Outcome::kInexpressible;
     result->message = why.what();
@@ -110,7 +110,7 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
 // One motion of a case: start, integration, observers, and their records.
 
 /// Reference for the motion: one of these, or none.
-struct HeldAgainst {
+struct ErrorReference {
   const Reference* reference = nullptr;     ///< with snapshots
   const PublishedSeries* series = nullptr;  ///< with times within the horizon
 };
@@ -119,7 +119,7 @@ struct HeldAgainst {
 /// them and fewer observers; `beside` is null for the case itself. Parts connected through ground
 /// alone run one after another.
 Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            SideBySide* beside, const HeldAgainst& held = {},
+            SideBySide* beside, const ErrorReference& held = {},
             const TrajectoryTask* trajectory = nullptr);
 
 }  // namespace loopbench::harness

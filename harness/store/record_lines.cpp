@@ -278,19 +278,19 @@ std::string KeysOfLine(std::string_view line) {
   return keys;
 }
 
-SceneReader::SceneReader(std::filesystem::path path, const Selection& where)
+ProblemReader::ProblemReader(std::filesystem::path path, const Selection& where)
     : file_(StoreFile(path)) {
-  std::unordered_map<std::size_t, std::uint32_t> scenes;
+  std::unordered_map<std::size_t, std::uint32_t> problems;
   std::unordered_set<std::string> kinds;
   const LineReader::Wanted may_match = LinesThatMayMatch(where);
   const auto look = [&](std::string_view line, const LinePlace& place) {
     last_at_ = place.offset;
     const bool is_fresh = kinds.insert(KeysOfLine(line)).second;
     if (!may_match(line, place)) return is_fresh;
-    std::string_view scene = TextUnder("\"problem_id\":\"", line);
-    if (scene.empty()) scene = TextUnder("\"case_id\":\"", line);
-    const auto fresh = static_cast<std::uint32_t>(scenes.size());
-    const auto at = scenes.try_emplace(std::hash<std::string_view>()(scene), fresh).first;
+    std::string_view problem = TextUnder("\"problem_id\":\"", line);
+    if (problem.empty()) problem = TextUnder("\"case_id\":\"", line);
+    const auto fresh = static_cast<std::uint32_t>(problems.size());
+    const auto at = problems.try_emplace(std::hash<std::string_view>()(problem), fresh).first;
     lines_.push_back({place.offset, static_cast<std::uint32_t>(place.length), at->second});
     bytes_ += place.length;
     return is_fresh;  // others are read with their problem
@@ -298,11 +298,11 @@ SceneReader::SceneReader(std::filesystem::path path, const Selection& where)
   ForEachRecord(
       file_, [this](Record one, const LinePlace&) { samples_.push_back(std::move(one)); }, nullptr,
       look);
-  std::ranges::stable_sort(lines_, {}, &Line::scene);
+  std::ranges::stable_sort(lines_, {}, &Line::problem);
 }
 
-void SceneReader::ForEach(const std::function<void(std::vector<Record>)>& take,
-                          std::vector<std::string>* warnings) const {
+void ProblemReader::ForEach(const std::function<void(std::vector<Record>)>& take,
+                            std::vector<std::string>* warnings) const {
   std::ifstream in(file_, std::ios::binary);
   std::vector<Record> records;
   std::string text;
@@ -324,7 +324,7 @@ void SceneReader::ForEach(const std::function<void(std::vector<Record>)>& take,
       warnings->push_back(message + " (torn last line, skipped)");
     }
     const bool is_last = i + 1 == lines_.size();
-    if (!is_last && (records.size() < kAtOnce || lines_[i + 1].scene == line.scene)) continue;
+    if (!is_last && (records.size() < kAtOnce || lines_[i + 1].problem == line.problem)) continue;
     take(std::exchange(records, {}));
   }
 }
@@ -394,11 +394,11 @@ MergedStores::~MergedStores() {
 int MergedStores::Open(std::size_t part) const {
   const auto found = std::ranges::find(open_, part, &std::pair<std::size_t, int>::first);
   if (found != open_.end()) return found->second;
-  constexpr std::size_t kMostOpen = 256;  // of the usual limit of 1024 per process
+  constexpr std::size_t kMaxOpen = 256;  // of the usual limit of 1024 per process
   const std::filesystem::path file = StoreFile(stores_[part]);
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) FailOn("read", file);
-  if (open_.size() == kMostOpen) {
+  if (open_.size() == kMaxOpen) {
     ::close(open_.front().second);
     open_.pop_front();
   }

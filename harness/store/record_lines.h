@@ -73,12 +73,12 @@ void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& ta
 // Reads a store too large for memory, problem by problem: warnings compare only records of one
 // problem.
 
-class SceneReader {
+class ProblemReader {
  public:
   /// Scans the lines and keeps 16 bytes of each, and about 60 bytes of each problem.
   /// @param path  as for ResultStore
   /// @param where  conditions on parameters of a sweep omit lines, as for ReadRecords()
-  SceneReader(std::filesystem::path path, const Selection& where);
+  ProblemReader(std::filesystem::path path, const Selection& where);
 
   std::size_t records() const { return lines_.size(); }
   std::uint64_t bytes() const { return bytes_; }  ///< total length of their lines
@@ -96,7 +96,7 @@ class SceneReader {
  private:
   struct Line {
     std::uint64_t offset = 0;
-    std::uint32_t length = 0, scene = 0;
+    std::uint32_t length = 0, problem = 0;
   };
 
   std::filesystem::path file_;

@@ -26,7 +26,7 @@
 namespace loopbench::harness {
 
 /// Result of a pilot.
-struct Estimate::Spent {
+struct Estimate::PilotCost {
   double all_s = 0.0, running_s = 0.0;  ///< CPU time, total and proportional to the horizon
   double reached = 1.0;                 ///< part reached [of the horizon]
   double members_s = 0.0;               ///< CPU time of the ensemble members in addition
@@ -38,21 +38,21 @@ struct Estimate::Spent {
 namespace {
 
 constexpr double kFirst = 0.02, kGrowth = 3.0;  ///< first part of the horizon, and its growth
-constexpr double kLeastSlope = 0.2;             ///< minimum slope, relative to the mean
+constexpr double kMinSlope = 0.2;               ///< minimum slope, relative to the mean
 constexpr std::size_t kCombinations = 8;        ///< pilots of a sweep; others use the nearest
 constexpr double kNearlyAll = 0.999;            ///< part reached by a reference without certificate
 constexpr int kMembers = 16;                    ///< pilot members of an ensemble
 constexpr double kShort_s = 0.1;                ///< too short for a pilot at each tolerance
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-double Longest(const Experiment& experiment, std::size_t scene) {
-  return std::ranges::max(experiment.scenes[scene].horizons);
+double Longest(const Experiment& experiment, std::size_t problem) {
+  return std::ranges::max(experiment.problems[problem].horizons);
 }
 
 double NumberOfRuns(const Case& one) { return static_cast<double>(RunsOf(one)); }
 
-template <class Spent>
-Rate Next(const Rate& before, const Spent& spent) {
+template <class PilotCost>
+Rate Next(const Rate& before, const PilotCost& spent) {
   const double reached = std::max(spent.reached, 1e-9), mean = spent.running_s / reached;
   const double grown = reached - before.reached;
   // clocks are coarse, and a single step matters in a short run
@@ -61,7 +61,7 @@ Rate Next(const Rate& before, const Spent& spent) {
           .member = spent.member,
           .running_s = spent.running_s,
           .reached = reached,
-          .slope_s = std::clamp(slope, kLeastSlope * mean, mean / kLeastSlope),
+          .slope_s = std::clamp(slope, kMinSlope * mean, mean / kMinSlope),
           .ends_at = spent.failed ? reached : 1.0,
           .most_s = spent.most_s};
 }
@@ -98,7 +98,7 @@ const std::pair<double, double>& Estimate::Tolerances(std::size_t experiment) {
 /// @param times  number of repetitions of the pilot's work in the piece
 const Rate* Estimate::Known(const std::string& key, const std::string& name,
                             const ProcessLimits& limits, double times,
-                            const std::function<Spent(double fraction)>& work) {
+                            const std::function<PilotCost(double fraction)>& work) {
   if (const auto known = rates_.find(key); known != rates_.end()) return &known->second;
   if (spent_s_ >= budget_.all_s) return nullptr;
   // later pilots are shorter: hundreds of them then take a minute or two in total
@@ -108,7 +108,7 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
     Rate rate = {.running_s = 0.0, .reached = 0.0};
     double worked = 0.0;
     for (double fraction = kFirst;; fraction = std::min(1.0, kGrowth * fraction)) {
-      const Spent spent = work(fraction);
+      const PilotCost spent = work(fraction);
       rate = Next(rate, spent);
       worked += spent.all_s + spent.members_s;
       const double enough = std::clamp(budget_.share * times * (rate.fixed_s + rate.Running(1.0)),
@@ -153,22 +153,23 @@ std::filesystem::path Estimate::PlaceForRows() {
 /// @param rtol  0 for fixed steps, where the longest step is used
 const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double rtol) {
   const Experiment& like = experiments_[experiment];
-  const std::size_t scene = std::min(one.scene, like.scenes.size() - 1);  // a sweep's may differ
-  const std::string column = ToString(one.column);
+  const std::size_t problem =
+      std::min(one.problem, like.problems.size() - 1);  // a sweep's may differ
+  const std::string method = ToString(one.method);
   const auto rows = like.output ? PlaceForRows() : std::filesystem::path();
   const auto run = [&](double fraction) {
     Case pilot = one;
-    pilot.scene = scene;
+    pilot.problem = problem;
     pilot.ensemble = 1;
     if (rtol > 0.0) pilot.rtol = pilot.atol = rtol;
     if (pilot.step > 0.0) pilot.step = std::ranges::max(like.fixed_steps);
-    pilot.horizon = fraction * Longest(like, scene);
+    pilot.horizon = fraction * Longest(like, problem);
     pilot.limits.cpu_s = std::min(budget_.most_s, one.limits.cpu_s);
     const CpuLimit all(pilot.limits.cpu_s);
     const Record record = RunCase(like, pilot, nullptr, rows);
     const double reached = record.Number("t_reached"), running = record.Number("cpu_s");
     const bool ended = record.Text("outcome") != ToString(Outcome::kFinished);
-    Spent spent = {.all_s = all.cpu_s(), .running_s = std::isnan(running) ? 0.0 : running};
+    PilotCost spent = {.all_s = all.cpu_s(), .running_s = std::isnan(running) ? 0.0 : running};
     // longer runs have more rows at a fixed distance, but not at a fixed number
     if (like.output && like.output->number == 0) spent.running_s = spent.all_s;
     spent.reached = std::isnan(reached) ? 0.0 : fraction * reached / pilot.horizon;
@@ -187,16 +188,16 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     }
     return spent;
   };
-  return Known(fmt::format("case/{}/{}/{}/{}/{}/{}/{}", experiment, scene, column, one.integrator,
+  return Known(fmt::format("case/{}/{}/{}/{}/{}/{}/{}", experiment, problem, method, one.integrator,
                            rtol, one.step > 0.0, one.ensemble > 1),
-               fmt::format("{} {}", like.scenes[scene].name, column),
-               LimitsOfRuns(one.limits, one.column.threads), NumberOfRuns(one), run);
+               fmt::format("{} {}", like.problems[problem].name, method),
+               LimitsOfRuns(one.limits, one.method.threads), NumberOfRuns(one), run);
 }
 
 double Estimate::OfCase(std::size_t experiment, const Case& one, double simulations) {
   const std::size_t near = Nearest(experiment);
   const Experiment& like = experiments_[near];
-  const double part = one.horizon / Longest(like, std::min(one.scene, like.scenes.size() - 1));
+  const double part = one.horizon / Longest(like, std::min(one.problem, like.problems.size() - 1));
   const auto total = [&](const Rate& rate, double scale) {
     const double running = rate.Running(part) * scale;
     if (simulations > 0.0) return rate.fixed_s + simulations * std::min(running, one.limits.cpu_s);
@@ -233,9 +234,9 @@ double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
   const Experiment& own = experiments_[experiment];
   if (!own.reference) return 0.0;  // a published series is only read
 #ifdef LOOPBENCH_PRECISIONS
-  const MechanismDescription& user = own.scenes[one.scene].mechanism.description;
+  const MechanismDescription& user = own.problems[one.problem].mechanism.description;
   const auto known = [&](WaysTried tried, const char* name, double times) {
-    const auto run = [&, tried](double fraction) -> Spent {
+    const auto run = [&, tried](double fraction) -> PilotCost {
       ReferenceOptions options = *own.reference;
       options.points = std::max(2, static_cast<int>(fraction * options.points));
       const double horizon = fraction * one.horizon;
@@ -266,7 +267,7 @@ double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
 
 double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
   const Experiment& own = experiments_[experiment];
-  const auto run = [&](double fraction) -> Spent {
+  const auto run = [&](double fraction) -> PilotCost {
     LadderGroup part = group;
     part.task.horizon *= fraction;
     const CpuLimit all(budget_.most_s);
@@ -296,7 +297,7 @@ double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
       return OfCase(experiment, one, runs) + kBatches * kBatchSeconds;
     });
   }
-  const auto run = [&](double) -> Spent {
+  const auto run = [&](double) -> PilotCost {
     const CpuLimit all(budget_.most_s);
     const std::vector<Record> records = TimeTogether(own, group, 1);
     return {.all_s = all.cpu_s(),
@@ -336,10 +337,11 @@ std::string Answer(const MechanismDescription& description) {
                                                  : AnswerIn<Spatial>(description);
 }
 
-std::string AnswerOfScene(const Experiment& experiment, const MechanismFile& file) {
-  const CompiledScene scene = CompileScene(file.description, file.observe, experiment.compile);
+std::string AnswerOfProblem(const Experiment& experiment, const MechanismFile& file) {
+  const SimplifiedProblem problem =
+      SimplifyProblem(file.description, file.observe, experiment.compile);
   std::string lines;
-  for (const CompiledPart& part : scene.compiled.parts) {
+  for (const CompiledPart& part : problem.compiled.parts) {
     std::string answer = Answer(part.description);
     if (answer.starts_with(kFault)) return answer;
     lines += answer;
@@ -379,11 +381,11 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
   std::set<std::string> seen;
   for (std::size_t i = 0; i < experiments.size() && all.faults.empty(); ++i) {
     const Experiment& experiment = experiments[i];
-    for (const ExperimentScene& scene : experiment.scenes) {
-      const MechanismFile& file = scene.mechanism;
+    for (const ExperimentProblem& problem : experiment.problems) {
+      const MechanismFile& file = problem.mechanism;
       if (!seen.insert(ToString(experiment.compile) + "\n" + file.canonical).second) continue;
       const StartReport report = ReportOf(LimitsOfRuns(experiment.limits, 1),
-                                          [&] { return AnswerOfScene(experiment, file); });
+                                          [&] { return AnswerOfProblem(experiment, file); });
       std::string values;
       for (const auto& [name, value] : experiment.parameters.items()) {
         values += fmt::format("{}{} = {}", values.empty() ? "" : ", ", name,
@@ -391,10 +393,10 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
       }
       if (!values.empty()) values = " (at " + values + ")";
       for (const std::string& fault : report.faults) {
-        all.faults.push_back(fmt::format("problem \"{}\": {}{}", scene.name, fault, values));
+        all.faults.push_back(fmt::format("problem \"{}\": {}{}", problem.name, fault, values));
       }
       for (const std::string& warning : report.warnings) {
-        all.warnings.push_back(fmt::format("problem \"{}\": {}{}", scene.name, warning, values));
+        all.warnings.push_back(fmt::format("problem \"{}\": {}{}", problem.name, warning, values));
       }
     }
   }

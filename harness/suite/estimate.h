@@ -72,11 +72,11 @@ class Estimate {
   const std::vector<std::string>& cut_off() const { return cut_off_; }
 
  private:
-  struct Spent;
+  struct PilotCost;
   std::size_t Nearest(std::size_t experiment) const;
   const std::pair<double, double>& Tolerances(std::size_t experiment);
   const Rate* Known(const std::string& key, const std::string& name, const ProcessLimits& limits,
-                    double times, const std::function<Spent(double fraction)>& work);
+                    double times, const std::function<PilotCost(double fraction)>& work);
   std::filesystem::path PlaceForRows();
   const Rate* RateOfCase(std::size_t experiment, const Case& one, double rtol);
 

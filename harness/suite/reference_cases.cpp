@@ -25,16 +25,16 @@ namespace loopbench::harness {
 namespace {
 
 /// Returns the planar mechanism of a problem for the ladder, in one piece.
-MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentScene& scene) {
+MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentProblem& problem) {
   CompileOptions options = experiment.compile;
   options.islands = false;
   const MechanismDescription description =
-      CompileScene(scene.mechanism.description, scene.mechanism.observe, options)
+      SimplifyProblem(problem.mechanism.description, problem.mechanism.observe, options)
           .compiled.parts.front()
           .description;
   const auto refuse = [&](const char* found, const char* expected) {
     throw ConfigError(fmt::format("{}: /precision: problem \"{}\": found {}, expected {}",
-                                  experiment.path.string(), scene.name, found, expected));
+                                  experiment.path.string(), problem.name, found, expected));
   };
   for (const JointDescription& joint : description.joints) {
     if (!IsBuiltIn(joint.type)) refuse("a joint of another program", "kinds in all scalars");
@@ -53,15 +53,15 @@ MechanismDescription PlanarPart(const Experiment& experiment, const ExperimentSc
 }
 
 /// Throws ConfigError for a method whose formulation or projection level exists only in double.
-void RequireScalars(const Experiment& experiment, const Column& column) {
+void RequireScalars(const Experiment& experiment, const Method& method) {
   const auto refuse = [&](const std::string& expected) {
-    throw ConfigError(fmt::format("{}: /precision: found {}, expected columns {}",
-                                  experiment.path.string(), ToString(column), expected));
+    throw ConfigError(fmt::format("{}: /precision: found {}, expected methods {}",
+                                  experiment.path.string(), ToString(method), expected));
   };
-  if (std::ranges::find(kLadderFormulations, column.formulation) == kLadderFormulations.end()) {
+  if (std::ranges::find(kLadderFormulations, method.formulation) == kLadderFormulations.end()) {
     refuse(fmt::format("of formulations in all scalars: {}", fmt::join(kLadderFormulations, ", ")));
   }
-  if (!IsBuiltIn(column.enforcement)) refuse("at levels that come with Loopbench");
+  if (!IsBuiltIn(method.enforcement)) refuse("at levels that come with Loopbench");
 }
 
 Record RungKeys(const Case& one, Scalar scalar, double tolerance) {
@@ -73,7 +73,7 @@ Record RungKeys(const Case& one, Scalar scalar, double tolerance) {
   return keys;
 }
 
-void Write(const Rung& rung, Record& record) {
+void Write(const SweepLevel& rung, Record& record) {
   record.Set("outcome", std::string(ToString(rung.outcome)));
   record.Set("t_reached", rung.t_reached);
   if (!std::isnan(rung.error)) record.Set("error_final", rung.error);
@@ -94,11 +94,11 @@ std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Select
   std::vector<LadderGroup> groups;
   for (const Case& one : ExpandLadders(experiment)) {
     LadderGroup group{{.description = {},
-                       .column = one.column,
+                       .method = one.method,
                        .horizon = one.horizon,
                        .precision = experiment.precision,
                        .limits = one.limits},
-                      one.scene,
+                      one.problem,
                       {}};
     const Precision& precision = group.task.precision;
     bool any = false;
@@ -130,11 +130,12 @@ std::size_t CountRungs(const Experiment& experiment) {
 void CheckLadders(const Experiment& experiment) {
   const std::vector<Case> cases = ExpandLadders(experiment);
   if (cases.empty()) return;
-  for (const Case& one : cases) RequireScalars(experiment, one.column);
+  for (const Case& one : cases) RequireScalars(experiment, one.method);
   const auto compile = [&](std::size_t) {
-    std::set<std::size_t> scenes;
+    std::set<std::size_t> problems;
     for (const Case& one : cases) {
-      if (scenes.insert(one.scene).second) PlanarPart(experiment, experiment.scenes[one.scene]);
+      if (problems.insert(one.problem).second)
+        PlanarPart(experiment, experiment.problems[one.problem]);
     }
     return std::string();
   };
@@ -151,7 +152,7 @@ void RequireLadders(const Experiment& experiment) { CheckLadders(experiment); }
 
 std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group) {
   LadderTask task = group.task;
-  task.description = PlanarPart(experiment, experiment.scenes[group.scene]);
+  task.description = PlanarPart(experiment, experiment.problems[group.problem]);
   const Ladder ladder = RunLadder(task);
   std::vector<Record> records = group.keys;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -184,21 +185,21 @@ std::vector<Record> ClimbTogether(const Experiment&, const LadderGroup& group) {
 ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
                           const std::filesystem::path& store) {
   ReferenceCase reference;
-  reference.scene = one.scene;
+  reference.problem = one.problem;
   reference.horizon = one.horizon;
-  const ExperimentScene& scene = experiment.scenes[one.scene];
-  if (scene.series) {
-    reference.id = Fnv1a(
-        fmt::format("{}|{}|{}", scene.mechanism.canonical, one.horizon, scene.series->canonical));
+  const ExperimentProblem& problem = experiment.problems[one.problem];
+  if (problem.series) {
+    reference.id = Fnv1a(fmt::format("{}|{}|{}", problem.mechanism.canonical, one.horizon,
+                                     problem.series->canonical));
   } else {
-    reference.id = ReferenceId(scene, one.horizon, *experiment.reference);
+    reference.id = ReferenceId(problem, one.horizon, *experiment.reference);
     reference.file = ReferencePath(store, reference.id);
   }
   reference.keys.Set("kind", std::string("reference"));
   reference.keys.Set("experiment", experiment.name);
   reference.keys.Set("mechanism", one.mechanism);
   reference.keys.Set("horizon", one.horizon);
-  if (!scene.series) reference.keys.Set("scalar", experiment.reference->scalar);
+  if (!problem.series) reference.keys.Set("scalar", experiment.reference->scalar);
   SetCaseId(&reference.keys, reference.id);
   return reference;
 }
@@ -208,7 +209,7 @@ std::optional<Reference> FindReference(const Experiment& experiment, const Case&
   if (!experiment.reference) return std::nullopt;
   const ReferenceCase known = ReferenceOf(experiment, one, store);
   auto reference =
-      ReadReference(known.file, known.id, experiment.scenes[one.scene].mechanism.description);
+      ReadReference(known.file, known.id, experiment.problems[one.problem].mechanism.description);
   if (reference) return reference;
   Reference none;
   none.outcome = "unsupported";
@@ -218,25 +219,25 @@ std::optional<Reference> FindReference(const Experiment& experiment, const Case&
 
 namespace {
 
-Record CertificateOf(const ExperimentScene& scene, const ReferenceCase& one) {
+Record CertificateOf(const ExperimentProblem& problem, const ReferenceCase& one) {
   Record record = one.keys;
   record.Set("outcome", std::string(ToString(Outcome::kFinished)));
-  WriteCertificate(scene.mechanism.description, *scene.series, one.horizon, record);
+  WriteCertificate(problem.mechanism.description, *problem.series, one.horizon, record);
   return record;
 }
 
 }  // namespace
 
 bool HasReference(const Experiment& experiment, const Case& one) {
-  return experiment.reference || experiment.scenes[one.scene].series;
+  return experiment.reference || experiment.problems[one.problem].series;
 }
 
 #ifdef LOOPBENCH_PRECISIONS
 
 Record MakeOne(const Experiment& experiment, const ReferenceCase& one) {
-  const ExperimentScene& scene = experiment.scenes[one.scene];
-  if (scene.series) return CertificateOf(scene, one);
-  const MechanismDescription& user = scene.mechanism.description;
+  const ExperimentProblem& problem = experiment.problems[one.problem];
+  if (problem.series) return CertificateOf(problem, one);
+  const MechanismDescription& user = problem.mechanism.description;
   std::optional<Reference> reference = ReadReference(one.file, one.id, user);
   if (!reference) {
     reference = MakeReference(user, one.horizon, LinkLength(user), *experiment.reference);
@@ -256,8 +257,8 @@ void RequireReferences(const Experiment&) {}
 #else
 
 Record MakeOne(const Experiment& experiment, const ReferenceCase& one) {
-  const ExperimentScene& scene = experiment.scenes[one.scene];
-  return scene.series ? CertificateOf(scene, one) : one.keys;
+  const ExperimentProblem& problem = experiment.problems[one.problem];
+  return problem.series ? CertificateOf(problem, one) : one.keys;
 }
 
 void RequireReferences(const Experiment& experiment) {

@@ -19,7 +19,7 @@ namespace loopbench::harness {
 /// Ladder::rungs (kind "precision", with case_id and content).
 struct LadderGroup {
   LadderTask task;  ///< without the description, which the child process makes
-  std::size_t scene = 0;
+  std::size_t problem = 0;
   std::vector<Record> keys;
 };
 
@@ -45,7 +45,7 @@ std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGrou
 // record of each, and a file next to the store for certified ones.
 
 struct ReferenceCase {
-  std::size_t scene = 0;
+  std::size_t problem = 0;
   double horizon = 0.0;  ///< [s]
   std::string id;
   std::filesystem::path file;  ///< empty for a published series

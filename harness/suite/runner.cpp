@@ -16,7 +16,7 @@
 #include "harness/suite/suite.h"
 #include "harness/text/escape.h"
 #include "harness/text/terminal.h"
-#include "harness/timing/yardstick.h"
+#include "harness/timing/calibration.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
@@ -139,11 +139,11 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& one,
     }
     return std::vector<Record>{std::move(record)};
   };
-  ProcessLimits limits = LimitsOfRuns(one.limits, runs * one.column.threads);
+  ProcessLimits limits = LimitsOfRuns(one.limits, runs * one.method.threads);
   return {.owed = {one.keys},
           .work = work,
           .limits = limits,
-          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.column), SettingOf(one)),
+          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.method), SettingOf(one)),
           .cost = CostOf(one),
           .trajectory = trajectory};
 }
@@ -164,13 +164,13 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   Piece piece;
   for (const Case& one : group.cases) piece.owed.push_back(one.keys);
   // the first method is timed twice (noise.h)
-  const int columns = static_cast<int>(group.cases.size()) + 1;
+  const int methods = static_cast<int>(group.cases.size()) + 1;
   int threads = 1;
-  for (const Case& one : group.cases) threads = std::max(threads, one.column.threads);
-  const int runs = columns * (experiment.timing.repeats + 1) * threads;
+  for (const Case& one : group.cases) threads = std::max(threads, one.method.threads);
+  const int runs = methods * (experiment.timing.repeats + 1) * threads;
   // right-hand sides have no limit; a minute per method is ample
   constexpr double kDerivatives_s = 60.0;
-  piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * columns * threads,
+  piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * methods * threads,
                   experiment.limits.memory_mb};
   piece.work = [&experiment, &group](int) { return TimeTogether(experiment, group); };
   piece.label = group.name;
@@ -185,7 +185,7 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
   piece.limits = LimitsOfRuns(limits, runs);
   piece.work = [&experiment, &group](int) { return ClimbTogether(experiment, group); };
   piece.label =
-      fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.column));
+      fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.method));
   return piece;
 }
 
@@ -237,7 +237,7 @@ std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
 namespace {
 
 /// Estimates run times only if a progress display is visible.
-std::vector<Progress::Piece> Foreseen(const std::vector<Piece>& pieces, Estimate* estimate) {
+std::vector<Progress::Piece> EstimatedTasks(const std::vector<Piece>& pieces, Estimate* estimate) {
   std::vector<Progress::Piece> foreseen;
   for (const Piece& piece : pieces) {
     foreseen.push_back({piece.label, Progress::IsSeen()
@@ -291,7 +291,7 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
   // spare jobs become threads of the ensembles
   const int free = std::max(1, jobs / static_cast<int>(pieces.size()));
   for (Piece& piece : pieces) piece.threads = free;
-  Progress progress(what, Foreseen(pieces, estimate), jobs);
+  Progress progress(what, EstimatedTasks(pieces, estimate), jobs);
   const auto work = [&](std::size_t i) {
     store_.LeaveToParent();
     return AnswerOf(pieces[i]);
@@ -320,7 +320,7 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
   } else {
     count.processes += pieces.size();
     const auto before_fork = [&](std::size_t i) {
-      YardstickNs();  // calibrates the machine speed for timings
+      CalibrationNs();  // calibrates the machine speed for timings
       return limits(i);
     };
     RunInProcesses(pieces.size(), jobs, work, before_fork,

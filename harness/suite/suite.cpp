@@ -43,7 +43,7 @@ void WarnOfJobs(int jobs, const std::vector<Experiment>& experiments) {
   const int processors = ReadMachineState().processors;
   int threads = 1;
   for (const Experiment& experiment : experiments) {
-    for (const Column& column : experiment.columns) threads = std::max(threads, column.threads);
+    for (const Method& method : experiment.methods) threads = std::max(threads, method.threads);
   }
   if (threads > 1 && jobs * threads > processors) {
     PrintError(
@@ -268,8 +268,8 @@ bool IsId(const std::string& text) {
 }
 
 std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
-                                    const std::string& scene_id) {
-  return store_file.parent_path() / "mechanisms" / (scene_id + ".json");
+                                    const std::string& problem_id) {
+  return store_file.parent_path() / "mechanisms" / (problem_id + ".json");
 }
 
 /// Comment with the hash of all bytes of the file, computed with zeros in place of the hash.
@@ -308,13 +308,13 @@ void KeepMechanisms(const std::vector<Experiment>& experiments,
                     const std::filesystem::path& store_file) {
   for (const Experiment& experiment : experiments) {
     if (!experiment.reference && !experiment.output) continue;
-    for (const ExperimentScene& scene : experiment.scenes) {
-      const auto path = MechanismPath(store_file, Fnv1a(scene.mechanism.canonical));
+    for (const ExperimentProblem& problem : experiment.problems) {
+      const auto path = MechanismPath(store_file, Fnv1a(problem.mechanism.canonical));
       if (std::filesystem::exists(path)) continue;
       try {
-        WriteFileAtomically(
-            path, WithOwnHash(MechanismText(scene.mechanism.description, scene.mechanism.observe,
-                                            fmt::format("{}{}.", kChecksum, kZeros))));
+        WriteFileAtomically(path, WithOwnHash(MechanismText(
+                                      problem.mechanism.description, problem.mechanism.observe,
+                                      fmt::format("{}{}.", kChecksum, kZeros))));
       } catch (const ConfigError&) {
       }
     }

@@ -34,10 +34,10 @@ Shard ParseShard(const std::string& text) {
 }
 namespace {
 
-constexpr std::size_t kSome = 64;             ///< combinations of the sample
-constexpr std::size_t kEachValue = 2000;      ///< maximum number of tested values of an axis
-constexpr std::size_t kMostBodies = 200'000;  ///< per group: about 100 MB
-constexpr std::size_t kMostCases = 100'000;   ///< per group: about 100 MB of records
+constexpr std::size_t kSome = 64;                 ///< combinations of the sample
+constexpr std::size_t kEachValue = 2000;          ///< maximum number of tested values of an axis
+constexpr std::size_t kMaxGroupBodies = 200'000;  ///< per group: about 100 MB
+constexpr std::size_t kMaxGroupCases = 100'000;   ///< per group: about 100 MB of records
 
 bool IsOn(const Condition& condition,
           const std::vector<std::pair<std::string, std::size_t>>& axes) {
@@ -78,11 +78,11 @@ std::size_t RunsOf(const Case& one) {
 }
 
 void AddTo(std::vector<CaseLine>* lines, const Case& one, std::size_t times) {
-  const std::string column = ToString(one.column);
+  const std::string method = ToString(one.method);
   auto line = std::ranges::find_if(*lines, [&](const CaseLine& known) {
-    return known.mechanism == one.mechanism && known.column == column;
+    return known.mechanism == one.mechanism && known.method == method;
   });
-  if (line == lines->end()) line = lines->insert(line, {one.mechanism, column, 0, 0});
+  if (line == lines->end()) line = lines->insert(line, {one.mechanism, method, 0, 0});
   line->cases += times;
   line->runs += times * RunsOf(one);
 }
@@ -127,8 +127,8 @@ LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
     const Experiment one = source_.Read(combination);
     std::size_t all = 0;
     cases = std::max(cases, Expand(one).size());
-    for (const ExperimentScene& scene : one.scenes)
-      all += scene.mechanism.description.bodies.size();
+    for (const ExperimentProblem& problem : one.problems)
+      all += problem.mechanism.description.bodies.size();
     bodies = std::max(bodies, all);
     are_alike_ = are_alike_ && KeysWithoutParameters(one) == keys;
   }
@@ -138,8 +138,8 @@ LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
                     "cases in one file",
                     source_.path().string(), count(), cases, kMaxCases));
   }
-  group_size_ =
-      std::clamp<std::size_t>(std::min(kMostBodies / bodies, kMostCases / cases), 1, kLongSweep);
+  group_size_ = std::clamp<std::size_t>(std::min(kMaxGroupBodies / bodies, kMaxGroupCases / cases),
+                                        1, kLongSweep);
   RequireKeys({first}, filter_);
   source_.CheckExclusions(sample);
   const double step = static_cast<double>(count() - 1) / (kSome - 1);

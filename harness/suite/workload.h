@@ -47,7 +47,7 @@ struct ExperimentFiles {
 
 /// Cases of a problem and method, over all combinations.
 struct CaseLine {
-  std::string mechanism, column;
+  std::string mechanism, method;
   std::size_t cases = 0, runs = 0;  ///< an ensemble adds to the unperturbed run
 };
 

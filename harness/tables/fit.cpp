@@ -66,7 +66,7 @@ std::vector<std::size_t> OrderOfLeaving(const Table& table) {
   return places;
 }
 
-std::string WhatHasLeft(const Table& table, const std::vector<std::size_t>& places) {
+std::string DroppedColumnsNote(const Table& table, const std::vector<std::size_t>& places) {
   const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
   std::vector<std::string> gone, same;
   std::vector<std::size_t> in_order = places;
@@ -98,7 +98,7 @@ Table FitWidth(Table table, std::size_t width) {
   if (!left.empty()) {
     table.notes.insert(table.notes.begin(),
                        fmt::format("left out for a width of {} (--wide shows all): {}", width,
-                                   WhatHasLeft(table, left)));
+                                   DroppedColumnsNote(table, left)));
   }
   std::size_t room = width - std::min(width, Taken(fittings, &Fitting::narrowest));
   table.columns.clear();

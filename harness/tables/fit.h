@@ -17,7 +17,7 @@ std::vector<std::size_t> OrderOfLeaving(const Table& table);
 
 /// Returns "dE [J]; t^p; the same in all rows: T/s 10": the dropped columns, by their indices, with
 /// the values that all rows share.
-std::string WhatHasLeft(const Table& table, const std::vector<std::size_t>& places);
+std::string DroppedColumnsNote(const Table& table, const std::vector<std::size_t>& places);
 
 /// Fits the table into `width` cells (0: unchanged). Breaks texts into lines of at least 24 cells;
 /// if that is not enough, drops columns. The first note names them.

@@ -73,7 +73,7 @@ std::string NumberCell(double number) {
   return fmt::format("{:.{}g}", number, std::max(kLeast, before_point));
 }
 
-bool IsDoubtful(const Record& row, const std::string& key) {
+bool IsFlagged(const Record& row, const std::string& key) {
   const Value* value = row.Find(key);
   if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
   if (key == "outcome") return !HasFailed(row) && !row.Text("warnings").empty();
@@ -86,8 +86,8 @@ bool IsDoubtful(const Record& row, const std::string& key) {
 
 std::string Cell(const Record& row, const TableColumn& column) {
   const Value* value = row.Find(column.key);
-  std::string mark = value != nullptr && IsDoubtful(row, column.key) ? "?" : "";
-  if (column.marks_doubts && IsDoubtful(row, "outcome")) mark += '*';
+  std::string mark = value != nullptr && IsFlagged(row, column.key) ? "?" : "";
+  if (column.marks_warnings && IsFlagged(row, "outcome")) mark += '*';
   if (value == nullptr) return mark;
   if (const auto* number = std::get_if<double>(value)) {
     return FormatNumber(*number, column.format) + mark;
@@ -126,7 +126,7 @@ bool HasFailed(const Record& row) {
 std::string OutcomeColour(const Record& row, const TableColumn& column) {
   if (column.key != "outcome") return "";
   if (HasFailed(row)) return "31";
-  return IsDoubtful(row, column.key) ? "33" : "";
+  return IsFlagged(row, column.key) ? "33" : "";
 }
 
 std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
@@ -248,7 +248,7 @@ constexpr Setting kSettings[] = {{"\\normalsize", 1.0, 6.0, false},
                                  {"\\small", 0.92, 4.0, false},
                                  {"\\footnotesize", 0.85, 3.0, false},
                                  {"\\footnotesize", 0.85, 3.0, true}};
-constexpr double kMostOfText = 120.0;  ///< wider texts are broken into lines [pt at 10 pt]
+constexpr double kMaxOfText = 120.0;  ///< wider texts are broken into lines [pt at 10 pt]
 
 bool IsNumber(const Record& row, const TableColumn& column) {
   const Value* value = row.Find(column.key);
@@ -288,8 +288,8 @@ struct LatexColumn {
 LatexColumn Measured(const Table& table, const TableColumn& column) {
   LatexColumn one{column, WidthOfText(column.header)};
   for (const Record& row : table.rows) one.width = std::max(one.width, WidthOfCell(row, column));
-  if (column.format == Format::kText && one.width > kMostOfText) {
-    one.width = kMostOfText;
+  if (column.format == Format::kText && one.width > kMaxOfText) {
+    one.width = kMaxOfText;
     one.is_broken = true;
   }
   return one;
@@ -380,8 +380,8 @@ std::string ToLatex(const Table& table) {
   std::string out = fmt::format("% needs \\usepackage{{array,booktabs,longtable{}}}\n",
                                 setting.landscape ? ",lscape" : "");
   if (!left.empty()) {
-    out +=
-        fmt::format("% left out to fit the page: {}\n", EscapeTerminal(WhatHasLeft(table, left)));
+    out += fmt::format("% left out to fit the page: {}\n",
+                       EscapeTerminal(DroppedColumnsNote(table, left)));
   }
   const std::string title = table.title.empty() ? "Records" : table.title;
   std::size_t number = 0;

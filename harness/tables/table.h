@@ -25,8 +25,8 @@ struct TableColumn {
   std::vector<std::pair<std::string, std::string>> abbreviations = {};
   /// Columns of least importance are dropped first on narrow terminals, the rightmost of equals.
   int importance = 0;
-  std::size_t most_cells = 0;  ///< width at which a text is broken into lines; 0: never
-  bool marks_doubts = false;   ///< '*' after the cells of runs with warnings
+  std::size_t most_cells = 0;   ///< width at which a text is broken into lines; 0: never
+  bool marks_warnings = false;  ///< '*' after the cells of runs with warnings
 };
 
 /// Returns red for the outcome of a failed run, yellow for an outcome with warnings.
@@ -64,9 +64,9 @@ bool HasFailed(const Record& row);
 /// True if the value of `key` is unreliable: the outcome of a finished run with `warnings`, or an
 /// unresolved exponent or law of growth. Exponents of energy and corrections come from one run,
 /// which resolves none.
-bool IsDoubtful(const Record& row, const std::string& key);
+bool IsFlagged(const Record& row, const std::string& key);
 
-/// Returns the cell for text, Markdown and LaTeX, with '?' after a doubtful value. Absent and NaN
+/// Returns the cell for text, Markdown and LaTeX, with '?' after a flagged value. Absent and NaN
 /// values are empty, never zero. A value that is not a number is printed unchanged in every format;
 /// a series joins its numbers with ';'.
 std::string Cell(const Record& row, const TableColumn& column);
@@ -112,7 +112,7 @@ inline constexpr std::size_t kColumnGap = 2;  ///< [cells]
 struct TextColumn {
   TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
       : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
-          return shown.format != Format::kText && IsDoubtful(row, shown.key);
+          return shown.format != Format::kText && IsFlagged(row, shown.key);
         })) {
     width = CellsOf(EscapeTerminal(column.header));
     for (const Record& row : rows) {
@@ -123,7 +123,7 @@ struct TextColumn {
   /// Returns at least one line.
   std::vector<std::string> LinesOf(const Record& row) const {
     const std::string cell =
-        EscapeTerminal(Cell(row, column)) + (marked && !IsDoubtful(row, column.key) ? " " : "");
+        EscapeTerminal(Cell(row, column)) + (marked && !IsFlagged(row, column.key) ? " " : "");
     if (column.most_cells == 0) return {cell};
     return BrokenInto(cell, column.most_cells);
   }

@@ -14,7 +14,7 @@
 #include "harness/config/formulations.h"
 #include "harness/record/noise.h"
 #include "harness/tables/columns.h"
-#include "harness/tables/doubt_notes.h"
+#include "harness/tables/warning_notes.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
@@ -29,7 +29,7 @@ struct Run {
   Record record;
 };
 
-void SetScene(const std::string& mechanism, const FactorialOptions& options, Key* key) {
+void SetProblem(const std::string& mechanism, const FactorialOptions& options, Key* key) {
   (*key)["family"] = mechanism;
   (*key)["geometry"] = "";
   for (const auto& [square, general] : options.square_and_general) {
@@ -70,7 +70,7 @@ std::vector<Run> Collect(std::span<const Record> records, const FactorialOptions
       if (parameter.key == "config_hash" || parameter.key == "set") continue;
       key["parameter " + parameter.key] = record.Text(parameter.key);
     }
-    SetScene(record.Text("mechanism"), options, &key);
+    SetProblem(record.Text("mechanism"), options, &key);
     const auto [known, is_new] = last.try_emplace(key, record);
     if (!is_new) RequireSameCase(known->second, record);
     known->second = record;
@@ -218,7 +218,7 @@ std::string LadderOf(const Record& record) {
   return text;
 }
 
-void SortRungs(std::vector<Record>* records) {
+void SortSweepLevels(std::vector<Record>* records) {
   const auto key = [](const Record& record) {
     return std::tuple(LadderOf(record), IsReferenceRung(record), -record.Number("rtol"),
                       WidthOf(record));
@@ -308,12 +308,12 @@ bool Shows(const Table& table, const std::string& key) {
 }
 
 // Returns a note on warnings without a column; `runs` are the sources of the table's rows.
-std::optional<std::string> HiddenDoubts(const Table& table, std::span<const Record> runs) {
-  const auto doubted =
-      std::ranges::count_if(runs, [](const Record& run) { return IsDoubtful(run, "outcome"); });
-  if (doubted == 0 || Shows(table, "warnings")) return std::nullopt;
+std::optional<std::string> HiddenWarnings(const Table& table, std::span<const Record> runs) {
+  const auto flagged =
+      std::ranges::count_if(runs, [](const Record& run) { return IsFlagged(run, "outcome"); });
+  if (flagged == 0 || Shows(table, "warnings")) return std::nullopt;
   return fmt::format("{} of {} runs finished with warnings; column warnings says which and why",
-                     doubted, runs.size());
+                     flagged, runs.size());
 }
 
 // Returns notes for unreliable values if the chosen columns do not show this.
@@ -340,7 +340,7 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
            !(column.key.starts_with("growth_hypothesis") ? shows("growth_hypothesis_resolved")
                                                          : shows("growth_resolved")) &&
            std::ranges::any_of(table.rows,
-                               [&](const Record& row) { return IsDoubtful(row, column.key); });
+                               [&](const Record& row) { return IsFlagged(row, column.key); });
   });
   if (unresolved) {
     notes.push_back(
@@ -389,7 +389,7 @@ std::vector<Record> RowsOf(std::span<const Record> records, const TableView& vie
   }
   std::vector<Record> rows = Filter(records, selection);
   SortRows(&rows);
-  if (kind == "precision") SortRungs(&rows);
+  if (kind == "precision") SortSweepLevels(&rows);
   return rows;
 }
 
@@ -416,20 +416,20 @@ Table MakeTable(std::span<const Record> records, const TableView& view) {
   if (!view.group.empty()) SortRowsBy(&table.rows, view.group, false);
   for (std::string& note : WhatColumnsHide(table)) table.notes.push_back(std::move(note));
   if (view.compact) {
-    for (std::string& note : DoubtNotes(table.rows, records)) {
+    for (std::string& note : WarningNotes(table.rows, records)) {
       table.notes.push_back(std::move(note));
     }
-  } else if (const auto note = HiddenDoubts(table, kind == "factorial" ? rows : table.rows)) {
+  } else if (const auto note = HiddenWarnings(table, kind == "factorial" ? rows : table.rows)) {
     table.notes.push_back(*note);
   }
-  const auto doubtful = std::ranges::count_if(
-      table.rows, [](const Record& row) { return IsDoubtful(row, "outcome"); });
-  if (doubtful > 0 && !table.title.empty()) {
+  const auto flagged = std::ranges::count_if(
+      table.rows, [](const Record& row) { return IsFlagged(row, "outcome"); });
+  if (flagged > 0 && !table.title.empty()) {
     const bool shows_outcome = Shows(table, "outcome");
     const auto first = std::ranges::find_if(
         table.columns, [&](const TableColumn& column) { return column.key != table.group; });
-    if (!shows_outcome && first != table.columns.end()) first->marks_doubts = true;
-    table.title += fmt::format(" - {} of {} rows are flagged (marked {}, {})", doubtful,
+    if (!shows_outcome && first != table.columns.end()) first->marks_warnings = true;
+    table.title += fmt::format(" - {} of {} rows are flagged (marked {}, {})", flagged,
                                table.rows.size(), shows_outcome ? "? in outcome" : "*",
                                view.compact               ? "reasons below"
                                : Shows(table, "warnings") ? "reasons in column warnings"

@@ -55,7 +55,7 @@ bool IsReferenceRung(const Record& record);
 
 /// Sorts ladder by ladder, within it by tolerance from the largest, then by scalar from the
 /// narrowest. The reference comes last.
-void SortRungs(std::vector<Record>* records);
+void SortSweepLevels(std::vector<Record>* records);
 
 /// Returns the meaning of error, drift and dominant error, one line each.
 std::vector<std::string> PrecisionNotes();

@@ -196,7 +196,7 @@ std::string EscapeLatex(std::string_view raw) {
 
 std::string BreakableLatex(std::string_view raw) {
   constexpr std::string_view kEnds = "-_/.,:;=+";
-  constexpr int kMostLetters = 8;
+  constexpr int kMaxLetters = 8;
   const std::string shown = EscapeTerminal(raw);
   std::string text;
   int letters = 0;
@@ -204,7 +204,7 @@ std::string BreakableLatex(std::string_view raw) {
     const std::size_t length = FirstOf(left).length;
     text += EscapeLatex(left.substr(0, length));
     letters = left[0] == ' ' ? 0 : letters + 1;
-    if (kEnds.find(left[0]) != std::string_view::npos || letters == kMostLetters) {
+    if (kEnds.find(left[0]) != std::string_view::npos || letters == kMaxLetters) {
       text += "\\allowbreak{}";
       letters = 0;
     }

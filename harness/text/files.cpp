@@ -318,8 +318,8 @@ void RequireOutput(const fs::path& path) {
 }
 
 fs::path BehindLinks(fs::path file) {
-  constexpr int kMostLinks = 40;  // same limit as the system
-  for (int i = 0; i < kMostLinks && fs::is_symlink(fs::symlink_status(file)); ++i) {
+  constexpr int kMaxLinks = 40;  // same limit as the system
+  for (int i = 0; i < kMaxLinks && fs::is_symlink(fs::symlink_status(file)); ++i) {
     file = file.parent_path() / fs::read_symlink(file);
   }
   return file;

@@ -19,8 +19,8 @@
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/allocations.h"
+#include "harness/timing/calibration.h"
 #include "harness/timing/subject.h"
-#include "harness/timing/yardstick.h"
 
 namespace {
 
@@ -137,20 +137,20 @@ class States {
 };
 
 /// The library calls a benchmark several times; the last one's subject is kept.
-struct Prepared {
+struct Fixture {
   std::string name, hash;
   std::unique_ptr<BenchmarkSubject> subject;
 };
 
-Prepared& Prepare(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
-                  BenchmarkKind kind, const Column& column) {
-  static Prepared last;
-  const std::string name = BenchmarkName(kind, member, column);
+Fixture& Prepare(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
+                 BenchmarkKind kind, const Method& method) {
+  static Fixture last;
+  const std::string name = BenchmarkName(kind, member, method);
   if (last.name == name) return last;
   last = {};
   const MechanismDescription description = member.Make();
-  const BenchmarkState& state = states.Get(member, description, column.coordinates);
-  last.subject = MakeSubject(description, column, state, set.integrator, set.step);
+  const BenchmarkState& state = states.Get(member, description, method.coordinates);
+  last.subject = MakeSubject(description, method, state, set.integrator, set.step);
   last.hash = state.hash;
   last.name = name;
   return last;
@@ -162,14 +162,14 @@ void Count(benchmark::State& state, const char* name, double value) {
 }
 
 /// Returns processor time, or wall time with several threads.
-double Nanoseconds(const Column& column) {
+double Nanoseconds(const Method& method) {
   timespec now{};
-  clock_gettime(column.threads > 1 ? CLOCK_MONOTONIC : CLOCK_PROCESS_CPUTIME_ID, &now);
+  clock_gettime(method.threads > 1 ? CLOCK_MONOTONIC : CLOCK_PROCESS_CPUTIME_ID, &now);
   return 1e9 * static_cast<double>(now.tv_sec) + static_cast<double>(now.tv_nsec);
 }
 
 void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind kind,
-             const Column& column) {
+             const Method& method) {
   const auto once = [&] {
     return kind == BenchmarkKind::kRhs ? subject.Derivative() : subject.Step();
   };
@@ -180,19 +180,19 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
     state.SkipWithError(std::string(ToString(outcome)).c_str());
     return;
   }
-  const double yardstick = YardstickNs();
+  const double calibration = CalibrationNs();
   const Allocations before = AllocationsSoFar();
-  const double begin = Nanoseconds(column);
+  const double begin = Nanoseconds(method);
   for (auto _ : state) {
     outcome = once();
     benchmark::DoNotOptimize(outcome);
   }
-  const double spent = Nanoseconds(column) - begin;
+  const double spent = Nanoseconds(method) - begin;
   const Allocations after = AllocationsSoFar();
   const double evaluations = static_cast<double>(state.iterations());
   const double bodies = subject.bodies();
   Count(state, "bodies", bodies);
-  Count(state, "calibration_ns", std::max(yardstick, YardstickNs()));
+  Count(state, "calibration_ns", std::max(calibration, CalibrationNs()));
   // not a rate of the library: it would print nanoseconds with the unit of seconds
   Count(state, "ns_per_body", spent / evaluations / bodies);
   Count(state, "allocations", static_cast<double>(after.count - before.count) / evaluations);
@@ -203,18 +203,18 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
 }
 
 void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
-              BenchmarkKind kind, const Column& column) {
-  const auto run = [&set, &states, &member, kind, column](benchmark::State& state) {
+              BenchmarkKind kind, const Method& method) {
+  const auto run = [&set, &states, &member, kind, method](benchmark::State& state) {
     try {
-      Prepared& prepared = Prepare(set, states, member, kind, column);
+      Fixture& prepared = Prepare(set, states, member, kind, method);
       state.SetLabel(prepared.hash);
-      Measure(state, *prepared.subject, kind, column);
+      Measure(state, *prepared.subject, kind, method);
     } catch (const std::exception& error) {
       state.SkipWithError(EscapeTerminal(error.what()).c_str());
     }
   };
   // the library prints names as they are, and up to a zero byte
-  const std::string shown = EscapeTerminal(BenchmarkName(kind, member, column));
+  const std::string shown = EscapeTerminal(BenchmarkName(kind, member, method));
   benchmark::RegisterBenchmark(shown.c_str(), run);
 }
 
@@ -227,8 +227,8 @@ int SaveStates(const BenchmarkSet& set) {
   for (const BenchmarkGroup& group : set.groups) {
     for (const BenchmarkMember& member : group.members) {
       const MechanismDescription description = member.Make();
-      for (const Column& column : group.columns) {
-        const BenchmarkState& state = states.Get(member, description, column.coordinates);
+      for (const Method& method : group.methods) {
+        const BenchmarkState& state = states.Get(member, description, method.coordinates);
         if (state.outcome == Outcome::kFinished) continue;
         PrintError("{}: no state: {} {}\n", member.name, ToString(state.outcome), state.message);
         return 2;
@@ -315,7 +315,7 @@ int Measured(int argc, char** argv) {
   for (const BenchmarkGroup& group : set.groups) {
     for (const BenchmarkMember& member : group.members) {
       for (const BenchmarkKind kind : group.kinds) {
-        for (const Column& column : group.columns) Register(set, states, member, kind, column);
+        for (const Method& method : group.methods) Register(set, states, member, kind, method);
       }
     }
   }

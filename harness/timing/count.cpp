@@ -50,23 +50,23 @@ struct Options {
   int planted = 0;
 };
 
-Record CountCase(const BenchmarkMember& member, const Column& column, const BenchmarkSet& set,
+Record CountCase(const BenchmarkMember& member, const Method& method, const BenchmarkSet& set,
                  const Options& options) {
-  if (column.threads > 1) {
+  if (method.threads > 1) {
     throw std::runtime_error(
-        fmt::format("{} {}: instructions are those of one thread", member.name, ToString(column)));
+        fmt::format("{} {}: instructions are those of one thread", member.name, ToString(method)));
   }
   const MechanismDescription description = member.Make();
-  const BenchmarkState state = ComputeState(description, column.coordinates);
+  const BenchmarkState state = ComputeState(description, method.coordinates);
   Record record;
   record.Set("kind", std::string("counts"));
   record.Set("experiment", set.name);
   record.Set("mechanism", member.name);
-  record.Set("formulation", column.formulation);
-  record.Set("enforcement", std::string(ToString(column.enforcement)));
-  record.Set("coordinates", std::string(ToString(column.coordinates)));
-  record.Set("solver", std::string(ToString(column.solver)));
-  const auto subject = MakeSubject(description, column, state, set.integrator, set.step);
+  record.Set("formulation", method.formulation);
+  record.Set("enforcement", std::string(ToString(method.enforcement)));
+  record.Set("coordinates", std::string(ToString(method.coordinates)));
+  record.Set("solver", std::string(ToString(method.solver)));
+  const auto subject = MakeSubject(description, method, state, set.integrator, set.step);
   all_finished = true;
   // the first evaluations take memory that later ones reuse
   for (int i = 0; i < 2; ++i) {
@@ -77,7 +77,7 @@ Record CountCase(const BenchmarkMember& member, const Column& column, const Benc
   const Allocations after = AllocationsSoFar();
   if (!all_finished) {
     throw std::runtime_error(
-        fmt::format("{} {}: the right-hand side fails", member.name, ToString(column)));
+        fmt::format("{} {}: the right-hand side fails", member.name, ToString(method)));
   }
   record.Set("outcome", std::string("finished"));
   record.Set("evaluations", std::int64_t{options.evaluations});
@@ -98,8 +98,8 @@ int Count(const Options& options) {
   for (const BenchmarkGroup& group : set.groups) {
     if (std::ranges::count(group.kinds, BenchmarkKind::kRhs) == 0) continue;
     for (const BenchmarkMember& member : group.members) {
-      for (const Column& column : group.columns) {
-        Record record = CountCase(member, column, set, options);
+      for (const Method& method : group.methods) {
+        Record record = CountCase(member, method, set, options);
         ++part;
         if (!options.callgrind.empty()) {
           const std::string file = fmt::format("{}.{}", options.callgrind.string(), part);

@@ -32,9 +32,9 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
   state.outcome = start.outcome;
   state.message = start.message;
   if (start.outcome != Outcome::kFinished) return state;
-  const Column column{"odca", Enforcement::kVelocity, coordinates, SolverKind::kRankRevealing};
+  const Method method{"odca", Enforcement::kVelocity, coordinates, SolverKind::kRankRevealing};
   for (const double step : kWarmUpSteps) {
-    const auto formulation = MakeFormulation<Space>(column, mechanism);
+    const auto formulation = MakeFormulation<Space>(method, mechanism);
     state.outcome = formulation->Start(0.0, start.q, start.u);
     if (state.outcome != Outcome::kFinished) return state;
     std::vector<double> y(formulation->state_size());
@@ -61,10 +61,10 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
 template <class Space>
 class SubjectIn final : public BenchmarkSubject {
  public:
-  SubjectIn(const MechanismDescription& description, const Column& column,
+  SubjectIn(const MechanismDescription& description, const Method& method,
             const BenchmarkState& state, const std::string& integrator, double step)
-      : mechanism_(description, column.coordinates),
-        formulation_(MakeFormulation<Space>(column, mechanism_)) {
+      : mechanism_(description, method.coordinates),
+        formulation_(MakeFormulation<Space>(method, mechanism_)) {
     const Outcome outcome = formulation_->Start(0.0, state.q, state.u);
     if (outcome != Outcome::kFinished) {
       throw std::invalid_argument(fmt::format("cannot start: {}", ToString(outcome)));
@@ -135,16 +135,16 @@ std::string HashExact(std::span<const double> numbers) {
 }
 
 std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,
-                                              const Column& column, const BenchmarkState& state,
+                                              const Method& method, const BenchmarkState& state,
                                               const std::string& integrator, double step) {
   if (state.outcome != Outcome::kFinished) {
     throw std::invalid_argument(
         fmt::format("no state to measure at: {} {}", ToString(state.outcome), state.message));
   }
   if (description.space == SpaceKind::kPlanar) {
-    return std::make_unique<SubjectIn<Planar>>(description, column, state, integrator, step);
+    return std::make_unique<SubjectIn<Planar>>(description, method, state, integrator, step);
   }
-  return std::make_unique<SubjectIn<Spatial>>(description, column, state, integrator, step);
+  return std::make_unique<SubjectIn<Spatial>>(description, method, state, integrator, step);
 }
 
 namespace {

@@ -19,7 +19,7 @@ namespace loopbench::harness {
 // and all terms of the equations are nonzero. Their hashes are saved (configs/benchmarks/). A state
 // that differs is rejected, because times of different states are not comparable.
 
-/// Positions and speeds at which a mechanism is measured, the same for all columns of one
+/// Positions and speeds at which a mechanism is measured, the same for all methods of one
 /// coordinate set.
 struct BenchmarkState {
   Outcome outcome = Outcome::kFinished;
@@ -53,9 +53,9 @@ class BenchmarkSubject {
   virtual std::int64_t operations() const = 0;
 };
 
-/// Throws std::invalid_argument when the mechanism cannot be made or the column cannot start.
+/// Throws std::invalid_argument when the mechanism cannot be made or the method cannot start.
 std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& description,
-                                              const Column& column, const BenchmarkState& state,
+                                              const Method& method, const BenchmarkState& state,
                                               const std::string& integrator, double step);
 
 // Instruction counts from the files of Callgrind (valgrind --tool=callgrind).

@@ -14,7 +14,7 @@
 #include "harness/run/case_identity.h"
 #include "harness/run/peers.h"
 #include "harness/run/run_case.h"
-#include "harness/timing/yardstick.h"
+#include "harness/timing/calibration.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -53,12 +53,12 @@ class SubjectIn final : public Subject {
       : case_(one),
         simulate_(simulate),
         description_(description),
-        mechanism_(description, one.column.coordinates),
+        mechanism_(description, one.method.coordinates),
         start_(Assemble<Space>(description, mechanism_)) {
     result_.outcome = start_.outcome;
     result_.message = start_.message;
     if (start_.outcome != Outcome::kFinished) return;
-    peer_ = TryPeer(one.column.formulation, description, &result_);
+    peer_ = TryPeer(one.method.formulation, description, &result_);
   }
 
   void Prepare() override {
@@ -153,12 +153,12 @@ class SubjectIn final : public Subject {
   }
 
   void Reset() {
-    formulation_ = MakeFormulation<Space>(case_.column, mechanism_);
+    formulation_ = MakeFormulation<Space>(case_.method, mechanism_);
     formulation_->Start(0.0, start_.q, start_.u);
     y_.resize(formulation_->state_size());
     ydot_.resize(y_.size());
     formulation_->ToState(start_.q, start_.u, y_);
-    if (!peer_) GiveExecution<Space>(case_.column, description_, *formulation_, &result_);
+    if (!peer_) GiveExecution<Space>(case_.method, description_, *formulation_, &result_);
   }
 
   double CompileSeconds() const {
@@ -223,7 +223,7 @@ std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, co
 
 /// Calibration values of the kept rounds, and the number of discarded rounds.
 struct Rounds {
-  double yardstick = std::numeric_limits<double>::quiet_NaN();
+  double calibration = std::numeric_limits<double>::quiet_NaN();
   std::int64_t disturbed = 0;
 };
 
@@ -232,28 +232,28 @@ struct Rounds {
 Rounds TimeInTurn(std::size_t wanted, const std::vector<std::unique_ptr<Subject>>& subjects,
                   void (Subject::*time)(), std::vector<double> Subject::*times) {
   constexpr double kPatience_s = 1.0;  // as long as a neighbour's burst of work; some stay longer
-  std::vector<std::vector<double>> yardsticks;
+  std::vector<std::vector<double>> calibrations;
   std::vector<double> slowest;
   std::vector<std::size_t> kept;
   const auto is_quiet = [&](std::size_t round) {
-    return slowest[round] <= kOtherSpeed * YardstickAloneNs();
+    return slowest[round] <= kOtherSpeed * CalibrationBaselineNs();
   };
   Clock::time_point enough = Clock::now();
   do {
-    std::vector<double>& round = yardsticks.emplace_back();
+    std::vector<double>& round = calibrations.emplace_back();
     for (const auto& subject : subjects) {
-      round.push_back(YardstickNs());
+      round.push_back(CalibrationNs());
       (*subject.*time)();
     }
-    round.push_back(YardstickNs());
+    round.push_back(CalibrationNs());
     slowest.push_back(std::ranges::max(round));
     if (slowest.size() <= wanted) enough = Clock::now();
-    kept = QuietRounds(slowest, YardstickAloneNs(), wanted);
+    kept = QuietRounds(slowest, CalibrationBaselineNs(), wanted);
   } while (slowest.size() < wanted ||
            (!std::ranges::all_of(kept, is_quiet) && SecondsSince(enough) < kPatience_s));
   std::vector<double> of_kept;
   for (const std::size_t round : kept) {
-    of_kept.insert(of_kept.end(), yardsticks[round].begin(), yardsticks[round].end());
+    of_kept.insert(of_kept.end(), calibrations[round].begin(), calibrations[round].end());
   }
   for (const auto& subject : subjects) {
     std::vector<double>& all = (*subject).*times;
@@ -296,8 +296,8 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
   const Rounds wall = TimeInTurn(static_cast<std::size_t>(experiment.timing.repeats), subjects,
                                  &Subject::TimeSimulation, &Subject::wall_s);
   Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
-  noise.Set("calibration_ns", rhs.yardstick);
-  noise.Set("calibration_wall_ns", wall.yardstick);
+  noise.Set("calibration_ns", rhs.calibration);
+  noise.Set("calibration_wall_ns", wall.calibration);
   noise.Set("discarded_repetitions", rhs.disturbed + wall.disturbed);
   std::vector<Record> records;
   for (std::size_t i = 0; i < group.cases.size(); ++i) {
@@ -312,11 +312,13 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
 namespace {
 
 /// Returns one system per timing: parts are not timed separately.
-MechanismDescription OneSystem(const Experiment& experiment, std::size_t scene) {
+MechanismDescription OneSystem(const Experiment& experiment, std::size_t problem) {
   CompileOptions options = experiment.compile;
   options.islands = false;
-  const MechanismFile& file = experiment.scenes[scene].mechanism;
-  return CompileScene(file.description, file.observe, options).compiled.parts.front().description;
+  const MechanismFile& file = experiment.problems[problem].mechanism;
+  return SimplifyProblem(file.description, file.observe, options)
+      .compiled.parts.front()
+      .description;
 }
 
 void SetTimingId(const std::string& content, Record* keys) {
@@ -331,16 +333,17 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Select
   // cases are ordered by problem and, within it, by horizon
   for (const Case& one : ExpandTiming(experiment)) {
     if (!Matches(one.keys, filter)) continue;
-    const bool is_next = groups.empty() || groups.back().cases.back().scene != one.scene ||
+    const bool is_next = groups.empty() || groups.back().cases.back().problem != one.problem ||
                          groups.back().cases.back().horizon != one.horizon;
     if (is_next) {
-      groups.push_back({one.mechanism,
-                        [&experiment, scene = one.scene] { return OneSystem(experiment, scene); },
-                        {},
-                        true});
+      groups.push_back(
+          {one.mechanism,
+           [&experiment, problem = one.problem] { return OneSystem(experiment, problem); },
+           {},
+           true});
     }
     groups.back().cases.push_back(one);
-    SetTimingId(SceneTimingContent(experiment, one), &groups.back().cases.back().keys);
+    SetTimingId(ProblemTimingContent(experiment, one), &groups.back().cases.back().keys);
   }
   if (experiment.timing.repeats == 0) return groups;
   for (const TimingFamily& family : experiment.timing.families) {
@@ -349,10 +352,10 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Select
                         [make = SizedFamilyOf(family.family).make, size] { return make(size); },
                         {},
                         false};
-      for (const Column& column : family.columns) {
+      for (const Method& method : family.methods) {
         Case one;
         one.mechanism = group.name;
-        one.column = column;
+        one.method = method;
         one.keys = CaseKeys(experiment, one);
         // a right-hand side has no tolerance and no horizon
         for (const char* key : {"integrator", "rtol", "atol", "horizon"}) {

@@ -4,10 +4,11 @@
 // machine affect all of them; minimum, median, 10th and 90th percentile are reported. The first
 // method of each mechanism is timed a second time without a name. The difference (`aa_spread`,
 // noise.h) is the smallest significant difference between methods. The calibration workload
-// (yardstick.h) measures the machine's speed, as the median between all rounds: `calibration_ns` of
-// right-hand sides, `calibration_wall_ns` of simulations. Rounds on a slowed machine are measured
-// again, for a second at most, and the quietest are kept; `discarded_repetitions` are left out.
-// Right-hand sides of problems are evaluated at states of a run; families at their moving start.
+// (calibration.h) measures the machine's speed, as the median between all rounds: `calibration_ns`
+// of right-hand sides, `calibration_wall_ns` of simulations. Rounds on a slowed machine are
+// measured again, for a second at most, and the quietest are kept; `discarded_repetitions` are left
+// out. Right-hand sides of problems are evaluated at states of a run; families at their moving
+// start.
 #pragma once
 
 #include <functional>

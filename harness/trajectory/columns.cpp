@@ -189,7 +189,7 @@ class RowOf final : public RowWriter {
         A_(user.bodies.size(), Acceleration<Space, double>::Zero()),
         applied_(user.bodies.size(), Wrench<Space, double>::Zero()) {}
 
-  void Write(const MomentOfRun& moment, std::vector<double>* row) override {
+  void Write(const RunSample& moment, std::vector<double>* row) override {
     row_ = row;
     row->assign(1, moment.t);
     mechanism_.Set(moment.t, moment.bodies);
@@ -228,7 +228,7 @@ class RowOf final : public RowWriter {
     row_->insert(row_->end(), v.data(), v.data() + Space::kLin);
   }
 
-  void Joints(const MomentOfRun& moment) {
+  void Joints(const RunSample& moment) {
     for (std::size_t j = 0; j < user_.joints.size(); ++j) {
       const auto words = ValueWords(user_.joints[j].type, user_.space, false);
       if (words.empty()) continue;
@@ -275,7 +275,7 @@ class RowOf final : public RowWriter {
     }
   }
 
-  void Bearings(const MomentOfRun& moment) {
+  void Bearings(const RunSample& moment) {
     for (std::size_t b = 1; b < user_.bodies.size(); ++b) {
       const Eigen::Vector3d a = moment.bodies[b].AccelerationAt(user_.bodies[b].com);
       const Eigen::Vector3d& alpha = moment.bodies[b].angular_acceleration;

@@ -55,7 +55,7 @@ std::vector<TrajectoryColumn> BodyColumns(const MechanismDescription& user, std:
 // One row of a trajectory: all quantities of the user's mechanism at one time.
 
 /// State of a mechanism at one time of a run.
-struct MomentOfRun {
+struct RunSample {
   double t = 0.0;
   std::vector<BodyMotion> bodies;  ///< by the user's body
   /// By the user's joint: its coordinate with full turns if the run integrates it, else NaN.
@@ -68,7 +68,7 @@ class RowWriter {
   virtual ~RowWriter() = default;
   /// Writes the quantities of TrajectoryColumns(), in their order. Spatial angles and signs of
   /// quaternions are continuous: closest to the last row, or to a followed coordinate.
-  virtual void Write(const MomentOfRun& moment, std::vector<double>* row) = 0;
+  virtual void Write(const RunSample& moment, std::vector<double>* row) = 0;
   /// Returns labels of reactions and drives that were not unique so far, with the number of rows.
   virtual std::vector<std::pair<std::string, std::int64_t>> Open() const = 0;
 };

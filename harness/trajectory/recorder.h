@@ -53,7 +53,7 @@ class Recorder {
   TrajectoryTask task_;
   TreeDynamics<Space, double> dynamics_;
   std::vector<Acceleration<Space, double>> A_;
-  MomentOfRun moment_;
+  RunSample moment_;
   std::optional<std::vector<BodyMotion>> lower_;  ///< motions of the state with the larger error
   std::vector<double> ydot_;
   std::vector<MeasuredPoint> points_;  ///< points for comparing interpolation degrees

@@ -108,8 +108,8 @@ bool TrajectoryReader::NextLine() {
     if (line_.empty()) continue;
     if (line_.front() != '#') return true;
     std::vector<std::string>& notes = columns_.empty() ? notes_ : later_notes_;
-    constexpr std::size_t kMostNotes = 1000;  // ignore further notes
-    if (notes.size() < kMostNotes) notes.push_back(line_.substr(line_.starts_with("# ") ? 2 : 1));
+    constexpr std::size_t kMaxNotes = 1000;  // ignore further notes
+    if (notes.size() < kMaxNotes) notes.push_back(line_.substr(line_.starts_with("# ") ? 2 : 1));
   }
   return false;
 }

@@ -99,9 +99,9 @@ class Follower {
 
   /// Runs Newton's method to the nearest closed position.
   bool Close() {
-    constexpr int kMostIterations = 12;
+    constexpr int kMaxIterations = 12;
     const double goal = 1e-10 * mechanism_.length();
-    for (int i = 0; i < kMostIterations; ++i) {
+    for (int i = 0; i < kMaxIterations; ++i) {
       const DirectionRows here = RowsOfDirections(kinematics_);
       if (!here.mismatch.allFinite()) return false;
       if (here.mismatch.size() == 0 || here.mismatch.norm() < goal) return true;
@@ -300,15 +300,15 @@ std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
                                        const Mechanism<Space, double>& mechanism,
                                        const VectorX<double>& q, std::string* left_out) {
   std::vector<PictureMotion> motions;
-  if (mechanism.num_rows() > 0 && mechanism.num_u() > kMostFollowed) {
+  if (mechanism.num_rows() > 0 && mechanism.num_u() > kMaxFollowed) {
     *left_out = fmt::format("motions: the loops have {} speeds, followed are up to {}",
-                            mechanism.num_u(), kMostFollowed);
+                            mechanism.num_u(), kMaxFollowed);
     return motions;
   }
   Follower<Space> follower(mechanism, q);
   // reduce frames rather than motions
   const auto bodies = description.bodies.size();
-  const std::size_t fit = kMostFrames / bodies;
+  const std::size_t fit = kMaxFrames / bodies;
   const auto frames_of = [&](std::size_t count, int wanted) {
     return std::min(wanted, static_cast<int>(fit / count));
   };
@@ -317,10 +317,10 @@ std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
   }
   constexpr int kFewest = 3;
   const std::size_t most =
-      std::clamp<std::size_t>(fit / (2 * (2 * kFewest + 1)), fit >= 7 ? 1 : 0, kMostMotions);
+      std::clamp<std::size_t>(fit / (2 * (2 * kFewest + 1)), fit >= 7 ? 1 : 0, kMaxMotions);
   if (most == 0) {
     *left_out = fmt::format("motions: {} bodies have no room in the {} places of all frames",
-                            bodies - 1, kMostFrames);
+                            bodies - 1, kMaxFrames);
     return motions;
   }
   const std::vector<MotionStart> beginnings = MotionStarts(follower, most);

@@ -19,8 +19,8 @@ namespace loopbench::harness {
 template <class Space>
 Poses PosesOf(const MechanismDescription& description, const Kinematics<Space, double>& kinematics);
 
-/// Finds at most kMostMotions motions from the closed position q in joint coordinates; none for
-/// loops with more than kMostFollowed speeds. `left_out` gives the reason.
+/// Finds at most kMaxMotions motions from the closed position q in joint coordinates; none for
+/// loops with more than kMaxFollowed speeds. `left_out` gives the reason.
 template <class Space>
 std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
                                        const Mechanism<Space, double>& mechanism,

@@ -51,7 +51,7 @@ std::string ForceText(const MechanismDescription& description, ForceDescription 
 
 /// Adds data of a mechanism that do not depend on the position: names and numbers.
 void AddItems(const MechanismDescription& description, Picture* picture) {
-  const bool detailed = description.bodies.size() <= kMostDetailed;
+  const bool detailed = description.bodies.size() <= kMaxDetailed;
   for (const BodyDescription& body : description.bodies) {
     picture->centres.push_back({.body = static_cast<int>(picture->items.size()), .at = body.com});
     PictureItem& item = picture->items.emplace_back(PictureItem{ItemKind::kBody, body.name});
@@ -155,9 +155,9 @@ class Maker {
         kinematics_(mechanism_) {}
 
   void Make() {
-    const bool analysed = mechanism_.num_rows() == 0 || mechanism_.num_u() <= kMostFollowed;
+    const bool analysed = mechanism_.num_rows() == 0 || mechanism_.num_u() <= kMaxFollowed;
     Structure structure;
-    if (analysed && mechanism_.num_u() <= kMostAnalysedSpeeds) {
+    if (analysed && mechanism_.num_u() <= kMaxAnalysedSpeeds) {
       structure = AnalyseStructure(description_);
       picture_->freedom = FreedomText(structure);
       MarkGone(description_, picture_);
@@ -166,7 +166,7 @@ class Maker {
       picture_->notes.push_back(fmt::format(
           "{} speeds: rank, redundant constraints and what a run leaves out are looked for up to "
           "{} of them; loopbench explain has more patience",
-          mechanism_.num_u(), mechanism_.num_rows() == 0 ? kMostAnalysedSpeeds : kMostFollowed));
+          mechanism_.num_u(), mechanism_.num_rows() == 0 ? kMaxAnalysedSpeeds : kMaxFollowed));
     }
     const Start<double>& start = structure.start;
     picture_->assembled = start.outcome != Outcome::kInconsistentStart;
@@ -192,8 +192,8 @@ class Maker {
     std::string left_out;
     picture_->motions = FindMotions(description_, mechanism_, start.q, &left_out);
     if (!left_out.empty()) picture_->notes.push_back(left_out);
-    if (picture_->motions.size() == kMostMotions) {
-      picture_->notes.push_back(fmt::format("motions: the first {}", kMostMotions));
+    if (picture_->motions.size() == kMaxMotions) {
+      picture_->notes.push_back(fmt::format("motions: the first {}", kMaxMotions));
     }
   }
 

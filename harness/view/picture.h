@@ -129,11 +129,11 @@ struct Picture {
 };
 
 /// Number of bodies above which centres of mass and numerical details are omitted.
-inline constexpr std::size_t kMostDetailed = 500;
+inline constexpr std::size_t kMaxDetailed = 500;
 /// Number of tree speeds above which no loop motion is followed and nothing is analysed.
-inline constexpr int kMostFollowed = 240;
+inline constexpr int kMaxFollowed = 240;
 /// Maximum number of motions, and of body poses in all of them.
-inline constexpr std::size_t kMostMotions = 12, kMostFrames = 40000;
+inline constexpr std::size_t kMaxMotions = 12, kMaxFrames = 40000;
 
 /// Assembles, analyses and draws. `file` is the displayed source. Throws std::invalid_argument for
 /// a description that Validate() rejects.
@@ -142,7 +142,7 @@ Picture MakePicture(const MechanismDescription& description, const std::string& 
 // Camera: an orthographic projection keeps parallel links parallel and lengths comparable.
 
 /// A point of the paper [px], y downwards, with its height towards the viewer [m].
-struct Spot {
+struct ProjectedPoint {
   double x = 0.0, y = 0.0, depth = 0.0;
 };
 
@@ -152,7 +152,7 @@ struct Camera {
   double scale = 1.0;                     ///< [px/m]
   double middle_x = 0.0, middle_y = 0.0;  ///< paper position of `centre` [px]
 
-  Spot See(const Eigen::Vector3d& p) const {
+  ProjectedPoint See(const Eigen::Vector3d& p) const {
     const Eigen::Vector3d v = R * (p - centre);
     return {middle_x + scale * v.x(), middle_y - scale * v.y(), v.z()};
   }

@@ -206,7 +206,7 @@ void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>
     pen.Add(ShapeKind::kDisc, ShapeStyle::kBody, {on_body(middle)}, 1.7);
   }
   item.anchor = on_body(middle);
-  if (picture->bodies > kMostDetailed) return;
+  if (picture->bodies > kMaxDetailed) return;
   // a line connects a centre of mass outside of the body
   const bool inside = std::ranges::any_of(
       points, [&](const Vector3d& p) { return (p - body.com).norm() <= 0.5 * pen.size(); });
@@ -346,8 +346,8 @@ void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {
     pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On(kGround, foot, points));
   };
   line({{from - 0.5, below, 0}, {to + 0.5, below, 0}});
-  constexpr int kMostHatches = 60;
-  const int hatches = std::clamp(static_cast<int>((to - from) / 0.8), 4, kMostHatches);
+  constexpr int kMaxHatches = 60;
+  const int hatches = std::clamp(static_cast<int>((to - from) / 0.8), 4, kMaxHatches);
   for (int i = 0; i <= hatches; ++i) {
     const double x = from + (to - from) * i / hatches;
     line({{x + 0.4, below, 0}, {x - 0.4, below + 0.8, 0}});

@@ -101,7 +101,7 @@ class Document {
       if (loop.redundant.empty()) continue;
       std::string path;
       for (const int joint : loop.joints) {
-        const Spot spot =
+        const ProjectedPoint spot =
             camera_.See(picture_.items[picture_.ItemOfJoint(joint)].anchor.In(picture_.start));
         path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", spot.x, spot.y);
       }
@@ -112,7 +112,7 @@ class Document {
     }
     for (const PictureItem& item : picture_.items) {
       if (item.redundant.empty()) continue;
-      const Spot spot = camera_.See(item.anchor.In(picture_.start));
+      const ProjectedPoint spot = camera_.See(item.anchor.In(picture_.start));
       body_ += fmt::format(
           "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" stroke=\"#b45309\" "
           "stroke-width=\"1.6\" stroke-dasharray=\"3 2\"/>\n",
@@ -125,8 +125,8 @@ class Document {
     const double least = (picture_.assembled ? 3.0 : 0.1) * picture_.symbol;
     for (const PictureLoop& loop : picture_.loops) {
       if (!(loop.gap > least)) continue;
-      const Spot a = camera_.See(loop.from.In(picture_.given)),
-                 b = camera_.See(loop.to.In(picture_.given));
+      const ProjectedPoint a = camera_.See(loop.from.In(picture_.given)),
+                           b = camera_.See(loop.to.In(picture_.given));
       body_ += fmt::format(
           "<path d=\"M{0:.1f} {1:.1f}L{2:.1f} {3:.1f}\" stroke=\"#c00000\" stroke-width=\"2\" "
           "stroke-dasharray=\"2 2\"/>\n<path d=\"M{4:.1f} {5:.1f}l7 7m0 -7l-7 7M{6:.1f} {7:.1f}l7 "
@@ -161,22 +161,22 @@ class Document {
   }
 
   void DrawNames() {
-    constexpr std::size_t kMostNames = 120;
-    if (picture_.bodies + picture_.joints > kMostNames) return;
+    constexpr std::size_t kMaxNames = 120;
+    if (picture_.bodies + picture_.joints > kMaxNames) return;
     const double pin = std::max(3.0, 1.1 * picture_.symbol * camera_.scale);
     const auto at = [&](const PictureItem& item) {
       return camera_.See(item.anchor.In(picture_.start));
     };
     for (const PictureItem& item : picture_.items) {
       if (item.kind == ItemKind::kForce) continue;
-      const Spot spot = at(item);
+      const ProjectedPoint spot = at(item);
       taken_.push_back(
           {spot.x - 0.7 * pin, spot.y - 0.7 * pin, spot.x + 0.7 * pin, spot.y + 0.7 * pin});
     }
     for (std::size_t i = 1; i < picture_.bodies + picture_.joints; ++i) {
       const PictureItem& item = picture_.items[i];
       const bool body = item.kind == ItemKind::kBody;
-      const Spot spot = at(item);
+      const ProjectedPoint spot = at(item);
       PlaceText(spot.x, spot.y, Shortened(item.name, 20), body ? "#1e3a5f" : "#111",
                 body ? 1.2 * pin : pin);
     }
@@ -222,7 +222,7 @@ class Document {
 
   /// Returns one line for each fact that cannot be drawn.
   std::vector<std::string> Legend(bool ghost) const {
-    constexpr std::size_t kMostLines = 10, kMostCharacters = 98;
+    constexpr std::size_t kMaxLines = 10, kMaxCharacters = 98;
     std::vector<std::string> lines;
     if (!picture_.assembled) {
       lines = {"NOT ASSEMBLED, drawn as the file says it; red: what should meet", picture_.message};
@@ -250,12 +250,12 @@ class Document {
     }
     for (const auto& [what, names] : gone)
       lines.push_back("dashed outline, " + what + ": " + names);
-    if (lines.size() > kMostLines) {
-      const std::size_t more = lines.size() - kMostLines + 1;
-      lines.resize(kMostLines - 1);
+    if (lines.size() > kMaxLines) {
+      const std::size_t more = lines.size() - kMaxLines + 1;
+      lines.resize(kMaxLines - 1);
       lines.push_back(fmt::format("and {} more lines: --format text has them", more));
     }
-    for (std::string& line : lines) line = Shortened(line, kMostCharacters);
+    for (std::string& line : lines) line = Shortened(line, kMaxCharacters);
     return lines;
   }
 
@@ -283,7 +283,7 @@ std::string ToSvg(const Picture& picture, const SvgOptions& options) {
 }
 namespace {
 
-using Spots = std::vector<Spot>;
+using ProjectedPoints = std::vector<ProjectedPoint>;
 
 /// Colours of a shape, and the line width [px].
 struct Ink {
@@ -330,9 +330,9 @@ std::string Decimal(double value) {
   return text == "-0" ? "0" : text;
 }
 
-std::string PathOf(const Spots& spots, bool closed) {
+std::string PathOf(const ProjectedPoints& spots, bool closed) {
   std::string path;
-  for (const Spot& spot : spots) {
+  for (const ProjectedPoint& spot : spots) {
     path += fmt::format("{}{} {}", path.empty() ? "M" : "L", Decimal(spot.x), Decimal(spot.y));
   }
   return closed ? path + "Z" : path;
@@ -351,7 +351,7 @@ std::string Path(const std::string& d, const Ink& ink, bool filled) {
 }
 
 /// Returns a line of width two radii with round ends and outline, or a polygon widened so.
-std::string Thick(const Spots& spots, bool closed, double radius, const Ink& ink) {
+std::string Thick(const ProjectedPoints& spots, bool closed, double radius, const Ink& ink) {
   const std::string d = PathOf(spots, closed);
   if (radius < 0.8) return Path(d, ink, closed);
   const auto stroked = [&](const char* colour, const char* fill, double width) {
@@ -368,24 +368,26 @@ std::string Thick(const Spots& spots, bool closed, double radius, const Ink& ink
 /// Points along the line from a to b and to its left, both in px.
 class Along {
  public:
-  Along(const Spot& a, const Spot& b) : a_(a), length_(std::hypot(b.x - a.x, b.y - a.y)) {
+  Along(const ProjectedPoint& a, const ProjectedPoint& b)
+      : a_(a), length_(std::hypot(b.x - a.x, b.y - a.y)) {
     if (length_ > 0.0) cos_ = (b.x - a.x) / length_, sin_ = (b.y - a.y) / length_;
   }
   double length() const { return length_; }
-  Spot At(double along, double left) const {
+  ProjectedPoint At(double along, double left) const {
     return {a_.x + cos_ * along + sin_ * left, a_.y + sin_ * along - cos_ * left, 0.0};
   }
 
  private:
-  Spot a_;
+  ProjectedPoint a_;
   double length_, cos_ = 1.0, sin_ = 0.0;
 };
 
-std::string Spring(const Spot& a, const Spot& b, double radius, double aside, const Ink& ink) {
+std::string Spring(const ProjectedPoint& a, const ProjectedPoint& b, double radius, double aside,
+                   const Ink& ink) {
   const Along way(a, b);
   const double lead = std::min(0.2 * way.length(), 2.0 * radius);
   const int coils = std::clamp(static_cast<int>((way.length() - 2 * lead) / (0.9 * radius)), 4, 24);
-  Spots spots = {way.At(0, 0), way.At(0, aside), way.At(lead, aside)};
+  ProjectedPoints spots = {way.At(0, 0), way.At(0, aside), way.At(lead, aside)};
   for (int i = 0; i < coils; ++i) {
     spots.push_back(way.At(lead + (way.length() - 2 * lead) * (i + 0.5) / coils,
                            aside + (i % 2 == 0 ? radius : -radius)));
@@ -395,10 +397,11 @@ std::string Spring(const Spot& a, const Spot& b, double radius, double aside, co
   return Path(PathOf(spots, false), ink, false);
 }
 
-std::string Damper(const Spot& a, const Spot& b, double radius, double aside, const Ink& ink) {
+std::string Damper(const ProjectedPoint& a, const ProjectedPoint& b, double radius, double aside,
+                   const Ink& ink) {
   const Along way(a, b);
   const double middle = 0.5 * way.length(), cup = std::min(1.6 * radius, 0.3 * way.length());
-  const auto line = [&](std::initializer_list<Spot> spots) {
+  const auto line = [&](std::initializer_list<ProjectedPoint> spots) {
     return Path(PathOf(spots, false), ink, false);
   };
   return line({way.At(0, 0), way.At(0, aside), way.At(middle - cup, aside)}) +
@@ -408,24 +411,24 @@ std::string Damper(const Spot& a, const Spot& b, double radius, double aside, co
          line({way.At(middle, aside), way.At(way.length(), aside), way.At(way.length(), 0)});
 }
 
-std::string Arrow(const Spots& spots, double size, const Ink& ink) {
-  const Spot& tip = spots.back();
+std::string Arrow(const ProjectedPoints& spots, double size, const Ink& ink) {
+  const ProjectedPoint& tip = spots.back();
   const Along way(spots[spots.size() - 2], tip);
   const double head = std::max(5.0, size);
-  const Spots triangle = {tip, way.At(way.length() - head, 0.45 * head),
-                          way.At(way.length() - head, -0.45 * head)};
+  const ProjectedPoints triangle = {tip, way.At(way.length() - head, 0.45 * head),
+                                    way.At(way.length() - head, -0.45 * head)};
   Ink plain = ink;
   plain.dash = "";
   return Path(PathOf(spots, false), ink, false) + Path(PathOf(triangle, true), plain, true);
 }
 
-std::string Disc(const Spot& c, double radius, const Ink& ink) {
+std::string Disc(const ProjectedPoint& c, double radius, const Ink& ink) {
   return fmt::format("<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{}\"{}/>\n", Decimal(c.x),
                      Decimal(c.y), Decimal(radius), ink.fill, Stroke(ink));
 }
 
 /// Returns a circle with two opposite quarters black.
-std::string Centre(const Spot& c, double r, const Ink& ink) {
+std::string Centre(const ProjectedPoint& c, double r, const Ink& ink) {
   const std::string x = Decimal(c.x), y = Decimal(c.y), left = Decimal(c.x - r),
                     right = Decimal(c.x + r), top = Decimal(c.y - r), bottom = Decimal(c.y + r),
                     radius = Decimal(r);
@@ -438,16 +441,16 @@ std::string Centre(const Spot& c, double r, const Ink& ink) {
 
 }  // namespace
 
-void SvgPen::Dot(const Spot& spot) {
+void SvgPen::Dot(const ProjectedPoint& spot) {
   const long x = std::lround(spot.x), y = std::lround(spot.y);
   if (cells_.insert(y * 100000L + x).second) dots_ += fmt::format("M{} {}h1", x, y);
 }
 
 void SvgPen::Draw(const PictureShape& shape, const Poses& poses) {
-  Spots spots;
+  ProjectedPoints spots;
   double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
   for (const PicturePlace& place : shape.places) {
-    const Spot& spot = spots.emplace_back(camera_.See(place.In(poses)));
+    const ProjectedPoint& spot = spots.emplace_back(camera_.See(place.In(poses)));
     if (!std::isfinite(spot.x + spot.y)) return;
     left = std::min(left, spot.x), right = std::max(right, spot.x);
     top = std::min(top, spot.y), bottom = std::max(bottom, spot.y);
@@ -511,7 +514,7 @@ void SvgPen::DrawGhost(const Poses& poses) {
     const bool outline = (shape.style == ShapeStyle::kBody && shape.kind == ShapeKind::kBar) ||
                          (area && shape.style != ShapeStyle::kGround);
     if (!outline || ++drawn > kMost) continue;
-    Spots spots;
+    ProjectedPoints spots;
     for (const PicturePlace& place : shape.places) spots.push_back(camera_.See(place.In(poses)));
     text_ +=
         Path(PathOf(spots, shape.kind == ShapeKind::kArea), {"#8a8a8a", "none", 1.0, "6 3"}, false);

@@ -38,7 +38,7 @@ class SvgPen {
 
  private:
   void Draw(const PictureShape& shape, const Poses& poses);
-  void Dot(const Spot& spot);
+  void Dot(const ProjectedPoint& spot);
 
   const Picture& picture_;
   const Camera& camera_;

@@ -13,7 +13,7 @@ namespace loopbench {
 namespace {
 
 /// Rows that a joint can have.
-constexpr int kMostRows = 6;
+constexpr int kMaxRows = 6;
 
 /// Blocks in the order of their elimination.
 std::vector<int> MinimumDegree(int blocks, std::span<const std::pair<int, int>> pairs) {
@@ -172,8 +172,8 @@ void BlockCholesky::Eliminate(int j) {
 namespace {
 
 /// The pivots of a diagonal block alone: of its factors L D L^T.
-void PivotsOf(const double* block, int n, std::array<double, kMostRows>& pivots) {
-  std::array<double, kMostRows * kMostRows> L;
+void PivotsOf(const double* block, int n, std::array<double, kMaxRows>& pivots) {
+  std::array<double, kMaxRows * kMaxRows> L;
   for (int c = 0; c < n; ++c) {
     for (int a = c; a < n; ++a) {
       double sum = block[a * n + c];
@@ -191,7 +191,7 @@ bool BlockCholesky::FactorColumn(int j) {
   const Column& column = columns_[j];
   const int n = kRows > 0 ? kRows : column.rows;
   double* diagonal = &L_[column.first_number];
-  std::array<double, kMostRows> before;
+  std::array<double, kMaxRows> before;
   PivotsOf(diagonal, n, before);
   Eliminate<kRows>(j);
   double least = 1.0;

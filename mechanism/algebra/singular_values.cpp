@@ -50,7 +50,7 @@ void SingularValues<S>::ComputeValues(const MatrixX<S>& A) {
 
 template <class S>
 void SingularValues<S>::Decompose(const MatrixX<S>& A, bool vectors) {
-  constexpr int kMostSweeps = 30;  // convergence is quadratic: three to six are usual
+  constexpr int kMaxSweeps = 30;  // convergence is quadratic: three to six are usual
   wide_ = A.rows() < A.cols();
   if (wide_) {
     qr_ = A.transpose();
@@ -73,7 +73,7 @@ void SingularValues<S>::Decompose(const MatrixX<S>& A, bool vectors) {
   if (vectors) J_.setIdentity(size, size);
   squares_.resize(size);
   for (Index j = 0; j < size; ++j) squares_[j] = Product(W_, j, j);
-  for (int sweep = 0; sweep < kMostSweeps && Sweep(vectors); ++sweep) {
+  for (int sweep = 0; sweep < kMaxSweeps && Sweep(vectors); ++sweep) {
   }
   Sort(vectors);
   if (vectors) Assemble();

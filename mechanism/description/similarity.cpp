@@ -17,17 +17,18 @@ void Scale(TimeFunctionDescription& function, double factor) {
 
 class Scaling {
  public:
-  Scaling(MechanismDescription& scene, double factor) : scene_(scene), factor_(factor) {}
+  Scaling(MechanismDescription& mechanism, double factor)
+      : description_(mechanism), factor_(factor) {}
 
   void Lengths() {
-    scene_.gravity *= factor_;
-    for (BodyDescription& body : scene_.bodies) {
+    description_.gravity *= factor_;
+    for (BodyDescription& body : description_.bodies) {
       body.com *= factor_;
       body.inertia *= factor_ * factor_;
       for (auto& [name, point] : body.points) point *= factor_;
     }
-    for (std::size_t index = 0; index < scene_.joints.size(); ++index) {
-      JointDescription& joint = scene_.joints[index];
+    for (std::size_t index = 0; index < description_.joints.size(); ++index) {
+      JointDescription& joint = description_.joints[index];
       joint.from.position *= factor_;
       joint.to.position *= factor_;
       const bool is_length = TraitsOf(joint.type).parameter.unit.starts_with('m');
@@ -36,15 +37,15 @@ class Scaling {
         if (IsLength(index, motion.coordinate, false)) Scale(motion.value, factor_);
       }
     }
-    for (ForceDescription& force : scene_.forces) Force(PartsOf(force));
-    Values(scene_.initial.coordinates, false);
-    Values(scene_.initial.speeds, true);
+    for (ForceDescription& force : description_.forces) Force(PartsOf(force));
+    Values(description_.initial.coordinates, false);
+    Values(description_.initial.speeds, true);
   }
 
  private:
   /// Returns true if a coordinate or speed is a length, false if it is an angle.
   bool IsLength(std::size_t joint, int coordinate, bool speeds) const {
-    const auto words = ValueWords(scene_.joints[joint].type, scene_.space, speeds);
+    const auto words = ValueWords(description_.joints[joint].type, description_.space, speeds);
     return coordinate < std::ssize(words) && words[coordinate].is_length();
   }
   void Force(const ForceParts& parts) const {
@@ -66,7 +67,7 @@ class Scaling {
     }
   }
 
-  MechanismDescription& scene_;
+  MechanismDescription& description_;
   double factor_;
 };
 

@@ -38,7 +38,7 @@ struct Conditioning {
 };
 
 /// Newton's method converges in two or three steps from the violation after one accepted step.
-inline constexpr int kMostProjections = 10;
+inline constexpr int kMaxProjections = 10;
 
 /// A counter of a solver, with its key in records.
 struct NamedCount {

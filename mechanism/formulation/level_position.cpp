@@ -54,7 +54,7 @@ class PositionLevel final : public Level<Space, S> {
     PositionViolation(kinematics, violation_, now);
     Correction<S>& correction = Level<Space, S>::correction_;
     correction = now;
-    for (int i = 0; i < kMostProjections && size(now) > goal_; ++i) {
+    for (int i = 0; i < kMaxProjections && size(now) > goal_; ++i) {
       if (const Outcome outcome = state.Correct(violation_, change_);
           outcome != Outcome::kFinished) {
         return outcome;

@@ -23,7 +23,7 @@ constexpr double kRegularWeight = 1.0 - 1e-6;
 /// Change of the direction of motion within 2 kBeside. On a smooth branch it is of the size of
 /// kBeside^2; beyond the turning point of a hyperbola it is of the size of one.
 constexpr double kTurned = 0.02;
-/// Least eigenvalue of regular positions, as a share of kSoftening. The parabola through three
+/// Least eigenvalue of regular positions, as a share of kRegularization. The parabola through three
 /// positions at a distance of kBeside has an error of some kBeside^3, 8e-9.
 constexpr double kPassed = 0.25;
 /// Eigenvalues up to six times this have weights below 1.
@@ -67,10 +67,10 @@ bool Passage<Space, S>::Move(const Kinematics<Space, S>& at, S step) {
 
 template <class Space, class S>
 S Passage<Space, S>::LeastEigenvalue() {
-  state_.kinematics().SetSoftening(kProbe);
+  state_.kinematics().SetRegularization(kProbe);
   state_.ForgetFactors();
   const bool known = state_.Factor() == Outcome::kFinished;
-  state_.kinematics().SetSoftening(kSoftening);
+  state_.kinematics().SetRegularization(kRegularization);
   state_.ForgetFactors();
   return known ? S(EigenvalueOf(solver_.conditioning().smallest_weight, kProbe)) : S(0);
 }
@@ -78,7 +78,7 @@ S Passage<Space, S>::LeastEigenvalue() {
 template <class Space, class S>
 Beside Passage<Space, S>::Judge(const Kinematics<Space, S>& at, S least, S step) {
   curve_.setZero();
-  const bool may_pass = least > S(kPassed * kSoftening);
+  const bool may_pass = least > S(kPassed * kRegularization);
   if (!Move(at, -step)) return Beside::kUnknown;
   moved_ = state_.q() - there_;
   const S before = may_pass ? LeastEigenvalue() : S(0);
@@ -91,7 +91,7 @@ Beside Passage<Space, S>::Judge(const Kinematics<Space, S>& at, S least, S step)
   // the lowest value of the parabola through the three
   const S bend = (before + after) / S(2) - least, slope = (after - before) / S(2);
   const S lowest = bend > S(0) ? least - slope * slope / (S(4) * bend) : least;
-  return lowest > S(kPassed * kSoftening) ? Beside::kRegular : Beside::kOneBranch;
+  return lowest > S(kPassed * kRegularization) ? Beside::kRegular : Beside::kOneBranch;
 }
 
 /// M udot + h of the accelerations there.
@@ -136,7 +136,7 @@ bool Passage<Space, S>::Interpolate(const Kinematics<Space, S>& at, S step) {
 template <class Space, class S>
 Beside Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
   const Mechanism<Space, S>& mechanism = at.mechanism();
-  const S least = S(EigenvalueOf(solver_.conditioning().smallest_weight, at.softening()));
+  const S least = S(EigenvalueOf(solver_.conditioning().smallest_weight, at.regularization()));
   S speed = S(0);
   for (const Velocity<Space, S>& V : at.motions()) {
     speed = std::max({speed, S(V.angular.norm()), S(V.linear.norm() / mechanism.length())});
@@ -144,7 +144,7 @@ Beside Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
   if (!(speed > S(0))) return Beside::kUnknown;
   mechanism.Rates(at.q(), at.u(), rates_);
   state_.kinematics() = at;  // measured angles continue from the same step
-  state_.kinematics().SetSoftening(kSoftening);
+  state_.kinematics().SetRegularization(kRegularization);
   state_.ForgetFactors();
   const Beside beside = Judge(at, least, S(kBeside) / speed);
   if (beside != Beside::kOneBranch) return beside;

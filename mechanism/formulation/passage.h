@@ -27,7 +27,7 @@ namespace loopbench {
 /// Shares of the largest eigenvalue (direction_weights.h) for regularization near a singular
 /// configuration: at regular positions, within a distance of 2e-5; in a passage with smooth forces,
 /// within 3.5e-4, because errors of stages increase with the inverse distance.
-inline constexpr double kLeastSoftening = 4e-10, kSmoothSoftening = 1.2e-7;
+inline constexpr double kMinRegularization = 4e-10, kSmoothRegularization = 1.2e-7;
 
 /// Positions ahead of and behind a regularized one.
 enum class Beside {
@@ -48,7 +48,7 @@ class Passage {
   /// J^T lambda of the constraints after Look() with kOneBranch.
   const VectorX<S>& Force() const { return force_; }
   /// Share for regularization together with this force.
-  double softening() const { return is_smooth_ ? kSmoothSoftening : kSoftening; }
+  double regularization() const { return is_smooth_ ? kSmoothRegularization : kRegularization; }
 
  private:
   static constexpr int kPairs = 3;

@@ -12,9 +12,9 @@ namespace loopbench {
 namespace {
 
 template <class Space, class S>
-void SetSoftening(FactoredState<Space, S>& state, double share) {
-  if (state.kinematics().softening() == share) return;
-  state.kinematics().SetSoftening(share);
+void SetRegularization(FactoredState<Space, S>& state, double share) {
+  if (state.kinematics().regularization() == share) return;
+  state.kinematics().SetRegularization(share);
   state.ForgetFactors();
 }
 
@@ -48,7 +48,7 @@ Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.SetTime(t);
   state_.ForgetReleased();
-  kinematics.SetSoftening(kSoftening);
+  kinematics.SetRegularization(kRegularization);
   state_.SetPositions(q);
   state_.SetSpeeds(u);
   kinematics.AcceptStep();
@@ -76,7 +76,7 @@ Outcome System<Space, S>::FromState(S t, std::span<const S> y) {
   step_end_version_ = -1;
   kinematics.SetTime(t);
   if (!known) {
-    kinematics.SetSoftening(kSoftening);
+    kinematics.SetRegularization(kRegularization);
     state_.SetPositions(q);
   }
   return level_->SetSpeeds(state_, speeds);
@@ -97,7 +97,7 @@ Outcome System<Space, S>::Look(S t, std::span<const S> y) {
     return FromState(t, y);
   }
   step_end_version_ = -1;
-  state_.kinematics().SetSoftening(kSoftening);
+  state_.kinematics().SetRegularization(kRegularization);
   state_.SetPositions(Eigen::Map<const VectorX<S>>(y.data(), mechanism_.num_q()));
   state_.SetSpeeds(Eigen::Map<const VectorX<S>>(rates.data(), mechanism_.num_u()));
   return Outcome::kFinished;
@@ -135,17 +135,17 @@ template <class Space, class S>
 Outcome System<Space, S>::FactorBranch() {
   carried_ = nullptr;
   const Outcome outcome = state_.Factor();
-  const bool is_softened = solver_->conditioning().smallest_weight < 1.0;
+  const bool is_regularized = solver_->conditioning().smallest_weight < 1.0;
   // prescribed motions do not continue along the present speeds, and have rules of their own
   if (!AtPassage() || drives_ != nullptr) return outcome;
-  if (outcome != Outcome::kFinished || !is_softened) return outcome;
+  if (outcome != Outcome::kFinished || !is_regularized) return outcome;
   if (passage_ == nullptr) passage_ = std::make_unique<Passage<Space, S>>(mechanism_, *solver_);
   const Beside beside = passage_->Look(kinematics());
   state_.ForgetFactors();
-  if (beside == Beside::kRegular) state_.kinematics().SetSoftening(kLeastSoftening);
+  if (beside == Beside::kRegular) state_.kinematics().SetRegularization(kMinRegularization);
   if (beside == Beside::kOneBranch) {
     carried_ = &passage_->Force();
-    state_.kinematics().SetSoftening(passage_->softening());
+    state_.kinematics().SetRegularization(passage_->regularization());
   }
   return state_.Factor();
 }
@@ -164,7 +164,7 @@ Outcome System<Space, S>::Accelerate() {
     if (const Outcome outcome = FactorBranch(); outcome != Outcome::kFinished) return outcome;
     SolveAccelerations(lambda);
     if (!udot_.allFinite()) return Outcome::kNonFinite;
-    if (solver_->conditioning().smallest_weight < 1.0) ++softened_evaluations_;
+    if (solver_->conditioning().smallest_weight < 1.0) ++regularized_evaluations_;
   }
   return drives_ == nullptr ? Outcome::kFinished : JudgeDrives();
 }
@@ -239,7 +239,7 @@ Outcome System<Space, S>::Evaluate(S t, const VectorX<S>& q, const VectorX<S>& u
   step_end_version_ = -1;
   derivative_version_ = -1;
   state_.kinematics().SetTime(t);
-  state_.kinematics().SetSoftening(kSoftening);
+  state_.kinematics().SetRegularization(kRegularization);
   state_.SetPositions(q);
   state_.SetSpeeds(u);
   outcome_ = Accelerate();
@@ -268,10 +268,10 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   if (AtPassage() && !is_projected && mechanism_.num_u() > 0) {
     FactorBranch();
     // the remaining constraints of a passage must hold positions, too
-    SetSoftening(state_, std::min(kinematics().softening(), kSoftening));
+    SetRegularization(state_, std::min(kinematics().regularization(), kRegularization));
   }
   const Accepted accepted = is_projected ? Accepted::kProjected : level_->Accept(state_, h);
-  SetSoftening(state_, kSoftening);
+  SetRegularization(state_, kRegularization);
   if (accepted == Accepted::kFailed) return false;  // as above
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();
@@ -311,7 +311,7 @@ Power<S> System<Space, S>::TotalPower() {
 
 template <class Space, class S>
 Diagnostics System<Space, S>::diagnostics() const {
-  return {solver_->conditioning(), outcome_, softened_evaluations_, mode_changes_};
+  return {solver_->conditioning(), outcome_, regularized_evaluations_, mode_changes_};
 }
 
 template <class Space, class S>

@@ -26,8 +26,8 @@ namespace loopbench {
 /// Diagnostics of the last evaluation.
 struct Diagnostics : Conditioning {
   Outcome outcome = Outcome::kFinished;
-  long softened_evaluations = 0;  ///< since the system was made
-  long mode_changes = 0;          ///< as above; projections do not count
+  long regularized_evaluations = 0;  ///< since the system was made
+  long mode_changes = 0;             ///< as above; projections do not count
 };
 
 template <class Space>
@@ -145,8 +145,8 @@ class System final : public Ode<S> {
   bool IsOffBranch() const;
   /// Rates of the works, if they are asked for, at the kinematics' speeds.
   void PutPower(std::span<S> rates);
-  /// Factors at the current positions; where directions are softened, looks at what is beside them
-  /// (passage.h), and softens less where they are regular.
+  /// Factors at the current positions; where directions are regularized, looks at what is beside
+  /// them (passage.h), and regularizes less where they are regular.
   Outcome FactorBranch();
   bool AtPassage() const { return options_.enforcement == Enforcement::kPosition; }
   /// udot_ and, unless null, lambda at the current state, with the shares of released directions.
@@ -167,7 +167,7 @@ class System final : public Ode<S> {
   TreeDynamics<Space, S> dynamics_;
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions
   std::unique_ptr<Passage<Space, S>> passage_;
-  const VectorX<S>* carried_ = nullptr;  ///< forces of softened constraints there, or null
+  const VectorX<S>* carried_ = nullptr;  ///< forces of regularized constraints there, or null
 
   VectorX<S> udot_, lambda_;
   VectorX<S> change_, lambda_change_;  ///< shares of released directions
@@ -184,7 +184,7 @@ class System final : public Ode<S> {
   bool by_short_cut_ = false;  ///< the last Derivative() was
   S accepted_t_ = S(0);
   Outcome outcome_ = Outcome::kFinished;
-  long softened_evaluations_ = 0, mode_changes_ = 0;
+  long regularized_evaluations_ = 0, mode_changes_ = 0;
   bool with_work_ = false;
 
   std::unique_ptr<CompiledDerivative> compiled_;

@@ -77,13 +77,13 @@ bool System<Space, S>::IsOffBranch() const {
 template <class Space, class S>
 Outcome System<Space, S>::JudgeDrives() {
   const Conditioning& found = solver_->conditioning();
-  const bool is_softened = found.smallest_weight < 1.0;
+  const bool is_regularized = found.smallest_weight < 1.0;
   const bool is_accepted = kinematics().time() == accepted_t_;
   const bool is_projected = options_.enforcement == Enforcement::kPosition;
-  if (is_projected && is_softened && !is_accepted) return Outcome::kFinished;
+  if (is_projected && is_regularized && !is_accepted) return Outcome::kFinished;
   if (drives_->has_left_branch()) return Outcome::kSingular;
   if (is_accepted && options_.solver == SolverKind::kRankRevealing && mechanism_.num_u() > 0) {
-    if (is_softened && drives_->usual_rank() == 0) NoteRankAhead();
+    if (is_regularized && drives_->usual_rank() == 0) NoteRankAhead();
     const bool has_left = drives_->NoteRank(found.rank);  // a singular start
     if (is_projected && (has_left || IsSingular())) {
       drives_->Followed(kinematics(), udot_, *feedback_);

@@ -45,9 +45,9 @@ void DirectionWeights<S>::Weigh(const VectorX<S>& lambda, S share) {
   using std::expm1;
   const Eigen::Index size = lambda.size();
   const S eps = std::numeric_limits<S>::epsilon();
-  largest_ = std::max(size > 0 ? lambda[size - 1] : S(0), S(kLeastResponse));
+  largest_ = std::max(size > 0 ? lambda[size - 1] : S(0), S(kMinResponse));
   const S theta = std::max(share, S(64) * eps) * largest_;
-  const S least = std::max(std::min(S(kLeastEigenvalue), share / S(100)), S(4) * eps) * largest_;
+  const S least = std::max(std::min(S(kMinEigenvalue), share / S(100)), S(4) * eps) * largest_;
   if (rows_.size() == 1) pivots_ = lambda;
   rank_ = 0;
   for (Eigen::Index i = 0; i < size; ++i) {

@@ -7,7 +7,7 @@
 //
 // with theta = (2e-4)^2 and lambda_least = (2e-6)^2 of the largest eigenvalue, which counts as 1e-2
 // at least because within a rigid part all of X_g is round-off. Both are smaller at positions that
-// are known to be regular (Kinematics::softening()).
+// are known to be regular (Kinematics::regularization()).
 //
 // The p_1 <= p_2 <= ... are the responses left to each joint once the joints before it are closed:
 // the eigenvalues of its block in the block Cholesky factorisation. They fall with the square of
@@ -32,11 +32,11 @@ class DirectionWeights {
  public:
   /// theta, or 64 eps if more: a narrow scalar's eigenvalues are round-off already above 4e-8.
   /// docs/theory/singular-configurations.md has the trials.
-  static constexpr double kTheta = kSoftening;
+  static constexpr double kTheta = kRegularization;
   /// lambda_least, or 4 eps if more; at most a hundredth of theta.
-  static constexpr double kLeastEigenvalue = 4e-12;
+  static constexpr double kMinEigenvalue = 4e-12;
   /// Free bodies respond with one, and round-off of some 100 eps stays far below kTheta of this.
-  static constexpr double kLeastResponse = 1e-2;
+  static constexpr double kMinResponse = 1e-2;
   /// Directions of less weight are left out: their eigenvalues are round-off.
   static constexpr double kLeast = 1e-16;
 

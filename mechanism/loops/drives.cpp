@@ -109,7 +109,7 @@ bool Drives<Space, S>::IsDrift(const Kinematics<Space, S>& kinematics) {
     missed =
         max(missed, SizeOf(kinematics, state.Sum(kinematics.ConstraintSpeed(index), state.rows())));
   }
-  return position * fastest_ + missed <= S(kMostDrift) * fastest_ &&
+  return position * fastest_ + missed <= S(kMaxDrift) * fastest_ &&
          worst_ <= S(kOfMismatch) * (position * size_ + missed * SpeedOf(kinematics));
 }
 

@@ -60,7 +60,7 @@ class Drives {
   /// A larger violation is no drift: contradictory drivers violate speeds in full. Stages of a step
   /// have violations of about 1e-5 at rtol 1e-9. Of 68 contradictions in 600 random mechanisms one
   /// was below 1e-2, none below this.
-  static constexpr double kMostDrift = 1e-3;
+  static constexpr double kMaxDrift = 1e-3;
 
   /// Largest residual in a singular configuration, relative to the largest term. Accepted steps
   /// leave up to 0.02 at rtol 1e-4.

@@ -56,7 +56,7 @@ void Excursion<Space>::Factor() {
   }
   // between rigid parts all is round-off
   const double largest = here_.rows.colwise().norm().maxCoeff();
-  const double counts = std::max(largest, std::sqrt(DirectionWeights<double>::kLeastResponse));
+  const double counts = std::max(largest, std::sqrt(DirectionWeights<double>::kMinResponse));
   if (!(largest > kRankRatio * counts)) here_.rows.setZero();  // nothing is constrained
   solver_.setThreshold(std::min(0.5, kRankRatio * counts / largest));
   solver_.compute(here_.rows);
@@ -90,11 +90,11 @@ bool Excursion<Space>::Close(int rank, double distance, const VectorX<double>& u
   travelled = u;
   // quadratic where the loops are regular; where they are not, the way left halves each time, and
   // too long a step back may miss by more than before
-  constexpr int kMostIterations = 60, kMostHalvings = 8;
+  constexpr int kMaxIterations = 60, kMaxHalvings = 8;
   kinematics_.UpdatePosition(q);
   DirectionRows here = RowsOfDirections(kinematics_);
   bool closed = here.mismatch.norm() < closed_;
-  for (int i = 0; i < kMostIterations && !closed; ++i) {
+  for (int i = 0; i < kMaxIterations && !closed; ++i) {
     // far below the least singular value on approach to a singular configuration
     double threshold = 1e-9;
     if (rank > 0 && rank < std::min(here.rows.rows(), here.rows.cols())) {
@@ -112,7 +112,7 @@ bool Excursion<Space>::Close(int rank, double distance, const VectorX<double>& u
     here.mass.matrixU().solveInPlace(back);
     const double before = here.mismatch.norm();
     bool nearer = false;
-    for (int halving = 0; halving < kMostHalvings && !nearer; ++halving, back *= 0.5) {
+    for (int halving = 0; halving < kMaxHalvings && !nearer; ++halving, back *= 0.5) {
       if (Size(back) > distance) continue;
       const VectorX<double> trial = Moved(q, back);
       kinematics_.UpdatePosition(trial);

@@ -12,7 +12,7 @@
 namespace loopbench {
 
 /// Speeds of the forest above which rank is not analysed: the matrices are dense.
-inline constexpr int kMostAnalysedSpeeds = 2000;
+inline constexpr int kMaxAnalysedSpeeds = 2000;
 
 enum class StepKind {
   kMoved,      ///< to another position that closes all loops

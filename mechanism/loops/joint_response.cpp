@@ -197,7 +197,7 @@ void JointResponse<Space>::Solve(std::span<const Acceleration<Space, double>> b,
 
 template <class Space>
 bool AreIndependent(const Kinematics<Space, double>& kinematics) {
-  const auto response = JointResponse<Space>::Make(kinematics.mechanism(), kMostOfResponse);
+  const auto response = JointResponse<Space>::Make(kinematics.mechanism(), kMaxOfResponse);
   return response != nullptr && response->Factor(kinematics, Masses::kGeometric);
 }
 

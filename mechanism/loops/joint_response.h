@@ -21,7 +21,7 @@
 namespace loopbench {
 
 /// Numbers beyond which X is not sparse: 1.6 GB.
-inline constexpr double kMostOfResponse = 2e8;
+inline constexpr double kMaxOfResponse = 2e8;
 
 template <class Space>
 class JointResponse {

@@ -97,7 +97,7 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
 /// "geometric": K_g^-1 X_g K_g^-T = U diag(lambda) U^T and the weights w_i; inverse_norms_ are
 /// sqrt(w_i / lambda_i), so that T = diag(inverse_norms_) U^T K_g^-1.
 template <class S>
-void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric, double softening) {
+void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric, double regularization) {
   using std::sqrt;
   form_ = Form::kGeometric;
   const auto scaled = Scaled(X_geometric);
@@ -105,7 +105,7 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric, double softenin
   work = scaled;
   weights_.FindPivots(work, scratch_->rotated.topLeftCorner(size_, size_));
   SymmetricEigen<S>(scaled, directions_, eigenvalues_);
-  weights_.Weigh(eigenvalues_, S(softening));
+  weights_.Weigh(eigenvalues_, S(regularization));
   for (int i = 0; i < size_; ++i) {
     inverse_norms_[i] = weights_.IsLeftOut(i) ? S(0) : S(sqrt(weights_[i] / eigenvalues_[i]));
   }
@@ -115,9 +115,9 @@ void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric, double softenin
 /// Regularized: U and w_i are geometric. The diagonal of R + diag(R_ii (1 / w_i - 1)) is R_ii / w_i
 /// = N_i^2, so dividing by N from both sides leaves ones on it. inverse_norms_ are the 1 / N_i.
 template <class S>
-bool LoopSolver<S>::FactorSoftened(const ConstRef& X) {
+bool LoopSolver<S>::FactorRegularized(const ConstRef& X) {
   using std::sqrt;
-  form_ = Form::kSoftened;
+  form_ = Form::kRegularized;
   const auto scaled = Scaled(X);
   auto work = scratch_->work.topLeftCorner(size_, size_);
   auto rotated = scratch_->rotated.topLeftCorner(size_, size_);

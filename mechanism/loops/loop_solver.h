@@ -84,10 +84,10 @@ class LoopSolver {
   /// Scaled Cholesky. False when suspicious; nothing can be applied then.
   bool FactorScaled(const ConstRef& X);
   /// Eigen-decomposition of the geometric response; sets rank and weights.
-  void FactorGeometric(const ConstRef& X_geometric, double softening = kSoftening);
+  void FactorGeometric(const ConstRef& X_geometric, double regularization = kRegularization);
   /// After FactorGeometric with the same scale. False when masses are so unequal that rounding
   /// leaves X without a Cholesky factor.
-  bool FactorSoftened(const ConstRef& X);
+  bool FactorRegularized(const ConstRef& X);
 
   /// B := T B, in place.
   void Apply(Eigen::Ref<MatrixX<S>> B) const;
@@ -106,8 +106,8 @@ class LoopSolver {
     int row = 0, rows = 0;
     int scale = 0;  ///< first number in inverse_scales_
   };
-  enum class Form { kNone, kPlain, kScaled, kGeometric, kSoftened };
-  bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kSoftened; }
+  enum class Form { kNone, kPlain, kScaled, kGeometric, kRegularized };
+  bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kRegularized; }
   /// K^-1 X K^-T, in the scratch.
   auto Scaled(const ConstRef& X);
   /// Factors A = L L^T; returns its smallest pivot (smallest diagonal squared), or 0 on failure.

@@ -44,7 +44,7 @@ Scaling Scale(const Kinematics<Space, double>& kinematics) {
 }
 
 double Largest(const Eigen::VectorXd& singular_values) {
-  return std::max(singular_values[0], std::sqrt(DirectionWeights<double>::kLeastResponse));
+  return std::max(singular_values[0], std::sqrt(DirectionWeights<double>::kMinResponse));
 }
 
 int Rank(const Eigen::VectorXd& singular_values) {

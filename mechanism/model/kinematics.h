@@ -14,8 +14,8 @@
 
 namespace loopbench {
 
-/// Eigenvalues of loops below this share of the largest are softened (direction_weights.h).
-inline constexpr double kSoftening = 4e-8;
+/// Eigenvalues of loops below this share of the largest are regularized (direction_weights.h).
+inline constexpr double kRegularization = 4e-8;
 
 /// A joint at the current position and speed.
 template <class Space, class S>
@@ -67,9 +67,9 @@ class Kinematics {
   /// Motions and g from u; positions must be current.
   void UpdateVelocity(const Eigen::Ref<const VectorX<S>>& u);
 
-  /// That share at these positions. Stands until it is set again.
-  void SetSoftening(double share) { softening_ = share; }
-  double softening() const { return softening_; }
+  /// Sets this share for the present positions; it remains until the next call.
+  void SetRegularization(double share) { regularization_ = share; }
+  double regularization() const { return regularization_; }
 
   const VectorX<S>& q() const { return q_; }  ///< of the last UpdatePosition()
   const VectorX<S>& u() const { return u_; }  ///< of the last UpdateVelocity()
@@ -181,7 +181,7 @@ class Kinematics {
   std::vector<Released> released_;
   VectorX<S> q_, u_;
   S time_ = S(0);
-  double softening_ = kSoftening;
+  double regularization_ = kRegularization;
   long position_version_ = 0;
 };
 

@@ -33,7 +33,7 @@ class KindCheck {
 
  private:
   static constexpr double kRound = 1e-12;
-  static constexpr int kMostCoordinates = 7;
+  static constexpr int kMaxCoordinates = 7;
 
   std::string Sizes() const {
     const int q = kind_.num_q, u = kind_.num_u;
@@ -41,7 +41,7 @@ class KindCheck {
         !dual_.coordinates || !dual_.rates) {
       return "no transform, coordinates or rates";
     }
-    if (u < 0 || u > Space::kDim || q > kMostCoordinates || (q != u && (q != u + 1 || q < 4))) {
+    if (u < 0 || u > Space::kDim || q > kMaxCoordinates || (q != u && (q != u + 1 || q < 4))) {
       return "numbers of coordinates and speeds that differ by other than a quaternion";
     }
     const SpaceKind space = Space::kRot == 3 ? SpaceKind::kSpatial : SpaceKind::kPlanar;
@@ -83,7 +83,7 @@ class KindCheck {
   }
 
   void At(int sample) {
-    double q[kMostCoordinates + 1], u[Space::kDim + 1], qdot[kMostCoordinates + 1];
+    double q[kMaxCoordinates + 1], u[Space::kDim + 1], qdot[kMaxCoordinates + 1];
     double length = 0.0;
     for (int i = 0; i < kind_.num_q; ++i) q[i] = std::sin(1.7 * (i + 1) + 0.9 * sample);
     for (int i = 0; i < 4; ++i) length += kind_.has_quaternion() ? q[i] * q[i] : 0.25;
@@ -91,7 +91,7 @@ class KindCheck {
     for (int k = 0; k < kind_.num_u; ++k) u[k] = std::cos(2.3 * k + sample);
 
     // derivatives along each speed by itself
-    Dual along[kMostCoordinates + 1];
+    Dual along[kMaxCoordinates + 1];
     for (int i = 0; i < kind_.num_q; ++i) along[i] = Dual(q[i]);
     for (int k = 0; k < kind_.num_u; ++k) {
       double unit[Space::kDim + 1] = {};

@@ -43,8 +43,9 @@ void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carri
   carrier->mass = mass;
 }
 
-MechanismDescription Attach(const MechanismDescription& description,
-                            const std::vector<Attachment>& attachments, Renumbering* renumbering) {
+MechanismDescription MergeRigidBodies(const MechanismDescription& description,
+                                      const std::vector<Attachment>& attachments,
+                                      Renumbering* renumbering) {
   MechanismDescription changed = description;
   const std::size_t num_bodies = description.bodies.size();
   std::vector<int> carrier(num_bodies);

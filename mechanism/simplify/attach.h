@@ -28,7 +28,8 @@ void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carri
 /// first body gains mass, an explicit free joint of that body's name takes the virtual one's place.
 ///
 /// `attachments` has one entry per body.
-MechanismDescription Attach(const MechanismDescription& description,
-                            const std::vector<Attachment>& attachments, Renumbering* renumbering);
+MechanismDescription MergeRigidBodies(const MechanismDescription& description,
+                                      const std::vector<Attachment>& attachments,
+                                      Renumbering* renumbering);
 
 }  // namespace loopbench

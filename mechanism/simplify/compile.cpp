@@ -75,7 +75,7 @@ class Compiler {
     }
     Renumbering renumbering;
     const MechanismDescription before = whole();
-    MechanismDescription after = Attach(before, attachments, &renumbering);
+    MechanismDescription after = MergeRigidBodies(before, attachments, &renumbering);
     if (!KeepsCuts(before, after, renumbering)) {
       result_.report.push_back("bodies that could be " + how +
                                " to others are kept: a joint with an initial value would have to "

@@ -122,7 +122,7 @@ class Freezing {
     if (!any) return "no joint stands still";
     if (sets.AllStandStill()) return "nothing would move";
     attachments_ = Attachments(d_, sets, starts_);
-    result_.parts = {Attach(d_, attachments_, &renumbering_)};
+    result_.parts = {MergeRigidBodies(d_, attachments_, &renumbering_)};
     return StartAt(starts_, &result_.parts.front());
   }
 

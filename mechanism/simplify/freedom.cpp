@@ -30,8 +30,8 @@ class Measuring {
     freedom.shares.assign(description_.bodies.size(), 0.0);
     freedom.mobility.assign(description_.forces.size(), 0.0);
     freedom.travel = freedom.mobility;
-    if (mechanism_.num_u() > kMostAnalysedSpeeds) {
-      freedom.why = "it has more than " + std::to_string(kMostAnalysedSpeeds) + " speeds";
+    if (mechanism_.num_u() > kMaxAnalysedSpeeds) {
+      freedom.why = "it has more than " + std::to_string(kMaxAnalysedSpeeds) + " speeds";
       return freedom;
     }
     const Start<double> start = Assemble<Space>(description_, mechanism_);
@@ -180,7 +180,7 @@ template <class Space>
 std::vector<bool> StillIn(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   std::vector<bool> still(description.joints.size(), false);
-  if (mechanism.num_u() > kMostAnalysedSpeeds) return still;
+  if (mechanism.num_u() > kMaxAnalysedSpeeds) return still;
   const Start<double> start = Assemble<Space>(description, mechanism);
   if (start.outcome != Outcome::kFinished) return still;
   Kinematics<Space, double> kinematics(mechanism);

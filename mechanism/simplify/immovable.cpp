@@ -145,7 +145,7 @@ template <class Space>
 std::vector<Attachment> FindIn(const MechanismDescription& description) {
   const std::vector<Attachment> none(description.bodies.size());
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
-  if (mechanism.num_u() > kMostSpeedsForImmovable) return none;
+  if (mechanism.num_u() > kMaxSpeedsForImmovable) return none;
   const Start<double> start = Assemble<Space>(description, mechanism);
   if (start.outcome != Outcome::kFinished) return none;
   return Search<Space>(description, mechanism, start).Run();

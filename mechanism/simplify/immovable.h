@@ -9,7 +9,7 @@ namespace loopbench {
 
 /// Speeds of the forest above which nothing is looked for: the test is dense and runs before every
 /// run.
-inline constexpr int kMostSpeedsForImmovable = 200;
+inline constexpr int kMaxSpeedsForImmovable = 200;
 
 /// Smallest over largest singular value of a sub-structure's constraints that counts as certain.
 /// The assembled start is accurate to about 1e-13; a singular configuration would be below 1e-6.

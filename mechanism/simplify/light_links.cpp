@@ -126,7 +126,7 @@ MechanismDescription WithRod(const MechanismDescription& description, const Link
 }
 
 /// Describes the losses of the rod: undistributed mass, and the inertia of the link's rotation.
-std::string Lost(const BodyDescription& body, const Link& link, Lumping lumping) {
+std::string LumpingRemainder(const BodyDescription& body, const Link& link, Lumping lumping) {
   const auto [first, second] = Lumps(body, link, lumping);
   const double left = body.mass * (1.0 - first - second);
   const Eigen::Vector3d along = (link.own[1].position - link.own[0].position) / link.length;
@@ -191,7 +191,7 @@ Simplified LightenLinks(const MechanismDescription& description, const ShortRun&
     candidate->taken = true;
     result.done.push_back(Named(model, *link) + " is a massless rod of " +
                           NumberText(link->length, 4) + " m");
-    result.dropped.push_back(Lost(model.bodies[link->body], *link, options.lumping));
+    result.dropped.push_back(LumpingRemainder(model.bodies[link->body], *link, options.lumping));
     model = std::move(with_rod);
   }
   if (result.candidates.empty()) {

@@ -75,7 +75,7 @@ Simplified Redundant(const MechanismDescription& description, const ShortRun&,
 }
 
 /// Appends the result of a rule on the last model, if it applies.
-void Append(const Idea& idea, const ShortRun& run, const SimplifyOptions& options,
+void Append(const SimplificationRule& idea, const ShortRun& run, const SimplifyOptions& options,
             Simplified* model) {
   Simplified next = idea.apply(model->parts.front(), run, options);
   if (!next.applies() || next.parts.size() > 1) return;
@@ -91,8 +91,8 @@ void Append(const Idea& idea, const ShortRun& run, const SimplifyOptions& option
 
 }  // namespace
 
-const std::vector<Idea>& Ideas() {
-  static const std::vector<Idea> ideas = {
+const std::vector<SimplificationRule>& SimplificationRules() {
+  static const std::vector<SimplificationRule> ideas = {
       {.name = "welds",
        .is_exact = true,
        .sentence = "bodies joined by welds become one body",
@@ -142,16 +142,17 @@ const std::vector<Idea>& Ideas() {
   return ideas;
 }
 
-Simplified Combine(const MechanismDescription& description, const std::vector<const Idea*>& ideas,
-                   const ShortRun& run, const SimplifyOptions& options) {
+Simplified Combine(const MechanismDescription& description,
+                   const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
+                   const SimplifyOptions& options) {
   if (const std::string error = Validate(description); !error.empty()) {
     throw std::invalid_argument(error);
   }
   Simplified model;
   model.parts = {description};
-  for (const Idea* idea : ideas) Append(*idea, run, options, &model);
+  for (const SimplificationRule* idea : ideas) Append(*idea, run, options, &model);
   // simplified bodies may allow further welds and immovable bodies
-  for (const Idea* idea : ideas) {
+  for (const SimplificationRule* idea : ideas) {
     if (idea->is_exact && !model.ideas.empty()) Append(*idea, run, options, &model);
   }
   if (model.ideas.empty()) model.why_not = "no rule applies";

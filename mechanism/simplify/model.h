@@ -64,17 +64,17 @@ struct Candidate {
   std::string why;  ///< text besides the number: the change made, or the obstacle
 };
 
-struct Idea;
+struct SimplificationRule;
 
 struct Simplified {
   /// One description; several if a model consists of unconnected parts.
   std::vector<MechanismDescription> parts;
   Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();  ///< their ground axes in the given ones
   std::vector<Candidate> candidates;
-  std::vector<std::string> done;     ///< sentences
-  std::vector<std::string> dropped;  ///< removed objects
-  std::vector<const Idea*> ideas;    ///< rules that apply, if several are combined
-  std::string why_not;               ///< why nothing applies; empty where something does
+  std::vector<std::string> done;                 ///< sentences
+  std::vector<std::string> dropped;              ///< removed objects
+  std::vector<const SimplificationRule*> ideas;  ///< rules that apply, if several are combined
+  std::string why_not;  ///< why nothing applies; empty where something does
 
   bool applies() const { return why_not.empty(); }
 };
@@ -83,7 +83,7 @@ struct Simplified {
 inline constexpr std::string_view kNothingOfTheKind = "there is nothing of the kind";
 
 /// A simplification: a row.
-struct Idea {
+struct SimplificationRule {
   std::string_view name;  ///< on the command line, and of files
   bool is_exact = false;
   std::string_view sentence = "";    ///< description
@@ -96,14 +96,15 @@ struct Idea {
 };
 
 /// Returns all rules in the order in which they are combined.
-const std::vector<Idea>& Ideas();
+const std::vector<SimplificationRule>& SimplificationRules();
 
 /// Applies the rules in order, each to the result of the previous ones. Unconnected parts stay in
 /// one description.
 ///
 /// @throws std::invalid_argument for a description that Validate() rejects.
-Simplified Combine(const MechanismDescription& description, const std::vector<const Idea*>& ideas,
-                   const ShortRun& run, const SimplifyOptions& options);
+Simplified Combine(const MechanismDescription& description,
+                   const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
+                   const SimplifyOptions& options);
 
 /// A named point of a body, found by name in a simplified model: on that body if it is there, else
 /// under "<body>.<point>" on the body that took its place.

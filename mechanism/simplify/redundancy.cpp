@@ -27,12 +27,12 @@ constexpr double kProbe = 0.01, kRoundedProbe = 0.05;
 template <class Space>
 bool IsRegular(const Excursion<Space>& position, double probe) {
   constexpr int kProbes = 3;
-  constexpr double kMostBend = 0.2;
+  constexpr double kMaxBend = 0.2;
   for (int k = 1; k <= kProbes; ++k) {
     Excursion<Space> there = position;
     there.TurnAnywhere();
     if (there.Step(probe, 100 + k) != StepKind::kMoved) return false;
-    if (there.bend() > kMostBend || there.rank() != position.rank()) return false;
+    if (there.bend() > kMaxBend || there.rank() != position.rank()) return false;
   }
   return true;
 }
@@ -94,7 +94,7 @@ Redundancy Find(const MechanismDescription& description) {
   Kinematics<Space, double> undriven(mechanism);
   undriven.UpdatePosition(q);
   const bool independent = AreIndependent(undriven);
-  if (!independent && mechanism.num_u() > kMostAnalysedSpeeds) return result;
+  if (!independent && mechanism.num_u() > kMaxAnalysedSpeeds) return result;
   result.rows = result.rank = result.rank_at_start = mechanism.num_rows();
   if (independent) return result;
   // rounded axes leave no motion, or none that closes to round-off

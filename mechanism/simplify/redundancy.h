@@ -31,7 +31,7 @@ struct Redundancy {
 };
 
 /// Returns the sum over the parts of a description, each analysed separately. Only `cut` is known
-/// of parts whose initial assembly fails, and of parts above kMostAnalysedSpeeds unless all their
+/// of parts whose initial assembly fails, and of parts above kMaxAnalysedSpeeds unless all their
 /// constraints are independent at the start (joint_response.h). Prescribed motions are left free:
 /// their contradictions are not structural.
 Redundancy FindRedundancy(const MechanismDescription& description);

@@ -127,7 +127,7 @@ MechanismDescription Held(const MechanismDescription& description, const std::ve
   const std::vector<Attachment> attachments = FindWelded(changed, held);
   if (std::ranges::none_of(attachments, &Attachment::attached)) return changed;
   Renumbering renumbering;
-  return Attach(changed, attachments, &renumbering);
+  return MergeRigidBodies(changed, attachments, &renumbering);
 }
 
 /// Returns the reason why a spring cannot become rigid, for any stiffness; "" if it can.

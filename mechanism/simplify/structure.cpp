@@ -56,7 +56,7 @@ class Analysis {
     Kinematics<Space, double> kinematics(mechanism_);
     kinematics.UpdatePosition(result_.start.q);
     for (int index : mechanism_.constraints()) result_.loops.push_back(FindLoop(index, kinematics));
-    result_.analysed = result_.joint_u <= kMostAnalysedSpeeds;
+    result_.analysed = result_.joint_u <= kMaxAnalysedSpeeds;
     if (!result_.analysed) {
       result_.analysed = AreIndependent(kinematics);
       if (result_.analysed) result_.rank = result_.rank_nearby = result_.loop_rows;

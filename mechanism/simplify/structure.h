@@ -50,7 +50,7 @@ struct Structure {
   bool analysed = false;  ///< true if the following members are known
   int rank = 0;           ///< of the cut joints' constraints at the start
   int rank_nearby = 0;    ///< at generic positions; `rank` where motions are prescribed
-  /// Singular values of the scaled loops at the start, falling; empty above kMostAnalysedSpeeds,
+  /// Singular values of the scaled loops at the start, falling; empty above kMaxAnalysedSpeeds,
   /// where `analysed` means that all constraints are independent.
   Eigen::VectorXd singular_values;
   /// Constraints that can be dropped together; loop_rows - rank_nearby.

@@ -23,7 +23,7 @@ constexpr int kStarts = 48;
 constexpr double kNearer = 1e-6;
 /// Work after which no further start is tried, about a second, and after which the last one is
 /// given up; of a step, of an entry of J, and of a product in J J^T.
-constexpr double kMostWork = 1e6, kLastWork = 1e8;
+constexpr double kMaxWork = 1e6, kLastWork = 1e8;
 constexpr double kWorkOfStep = 10.0, kWorkOfEntry = 1.0, kWorkOfProduct = 0.02;
 /// Values of mu, and iterations at each; iterations of a closure from the last.
 constexpr double kPulls[] = {1.0, 0.3, 0.1, 0.03, 0.01};
@@ -242,7 +242,7 @@ class Closure {
     const std::vector<int>& loops = mechanism_.constraints();
     work_ = 0.0;
     searching_ = true;
-    for (int start = 0, in_vain = 0; in_vain < kStarts && work_ < kMostWork; ++start, ++in_vain) {
+    for (int start = 0, in_vain = 0; in_vain < kStarts && work_ < kMaxWork; ++start, ++in_vain) {
       Vector d = Vector::Zero(mechanism_.num_u()), q = guess_;
       const double most = kPi * random();
       const auto draw = [&](int column) {

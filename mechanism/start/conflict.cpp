@@ -9,7 +9,7 @@ namespace loopbench {
 
 namespace {
 
-constexpr std::size_t kMostNames = 4;
+constexpr std::size_t kMaxNames = 4;
 /// Smaller residuals, relative to the largest, are left by any finished iteration.
 constexpr double kSmallest = 1e-3;
 
@@ -21,7 +21,7 @@ std::string Short(double value) {
 
 /// "a, b and c", and how many more there are.
 std::string Listed(const std::vector<std::string>& names) {
-  const std::size_t shown = std::min(names.size(), kMostNames), left = names.size() - shown;
+  const std::size_t shown = std::min(names.size(), kMaxNames), left = names.size() - shown;
   std::string text;
   for (std::size_t i = 0; i < shown; ++i) {
     const bool last = i + 1 == shown && left == 0;
@@ -42,7 +42,7 @@ template <class Space>
 class Conflict {
  public:
   Conflict(const MechanismDescription& description, const Kinematics<Space, double>& kinematics,
-           const Unmet& unmet)
+           const UnsatisfiedConstraints& unmet)
       : description_(description),
         mechanism_(kinematics.mechanism()),
         kinematics_(kinematics),
@@ -145,7 +145,7 @@ class Conflict {
   const MechanismDescription& description_;
   const Mechanism<Space, double>& mechanism_;
   const Kinematics<Space, double>& kinematics_;
-  const Unmet& unmet_;
+  const UnsatisfiedConstraints& unmet_;
   std::vector<OfJoint> found_;
 };
 
@@ -153,13 +153,16 @@ class Conflict {
 
 template <class Space>
 std::string DescribeConflict(const MechanismDescription& description,
-                             const Kinematics<Space, double>& kinematics, const Unmet& unmet) {
+                             const Kinematics<Space, double>& kinematics,
+                             const UnsatisfiedConstraints& unmet) {
   return Conflict<Space>(description, kinematics, unmet).Describe();
 }
 
 template std::string DescribeConflict(const MechanismDescription&,
-                                      const Kinematics<Planar, double>&, const Unmet&);
+                                      const Kinematics<Planar, double>&,
+                                      const UnsatisfiedConstraints&);
 template std::string DescribeConflict(const MechanismDescription&,
-                                      const Kinematics<Spatial, double>&, const Unmet&);
+                                      const Kinematics<Spatial, double>&,
+                                      const UnsatisfiedConstraints&);
 
 }  // namespace loopbench

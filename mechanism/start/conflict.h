@@ -15,7 +15,7 @@ struct OfCutJoint {
 
 /// Residuals of a failed assembly: a number per constraint row and, below them, one per entry of
 /// `extra`.
-struct Unmet {
+struct UnsatisfiedConstraints {
   VectorX<double> rows;                ///< in units
   VectorX<double> units;               ///< [m] or [rad] each
   bool speeds = false;                 ///< of speeds: all of it per second
@@ -29,6 +29,7 @@ struct Unmet {
 /// residuals.
 template <class Space>
 std::string DescribeConflict(const MechanismDescription& description,
-                             const Kinematics<Space, double>& kinematics, const Unmet& unmet);
+                             const Kinematics<Space, double>& kinematics,
+                             const UnsatisfiedConstraints& unmet);
 
 }  // namespace loopbench

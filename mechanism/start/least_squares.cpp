@@ -14,7 +14,7 @@ constexpr double kSmall = 1e5;
 /// Entries of J below which rough solutions gain nothing from sparse factors.
 constexpr double kTiny = 1e3;
 /// Least pivot of J J^T over its original entry: solutions keep at least six digits.
-constexpr double kLeastPivot = 1e-10;
+constexpr double kMinPivot = 1e-10;
 /// Share of r that a step of an iteration may leave; the next step removes it.
 constexpr double kStepLeaves = 1e-3;
 /// Number of corrections of a solution, each by all digits of the factors, and their goal:
@@ -46,7 +46,7 @@ bool LeastSquares::Factor(double damping) {
   if (factors_.info() != Eigen::Success) return false;
   if (care_ == Care::kRough) return true;
   const Eigen::VectorXd before = factors_.permutationP() * Eigen::VectorXd(JJt_.diagonal());
-  return (factors_.vectorD().array() >= kLeastPivot * (before.array() + shift)).all();
+  return (factors_.vectorD().array() >= kMinPivot * (before.array() + shift)).all();
 }
 
 Eigen::MatrixXd LeastSquares::Dense(double numbers) const {

@@ -24,7 +24,7 @@ constexpr double kTrialDistance = 0.02;
 constexpr double kRoundedDistance = 0.15;
 
 /// Maximum number of self-stresses and free speeds that are tried: both are squared.
-constexpr Eigen::Index kMostTried = 64;
+constexpr Eigen::Index kMaxTried = 64;
 
 /// Returns true if a self-stress s of the constraints e proves that nothing moves. Along every
 /// speed v with J v = 0 the second derivative of s^T e then has the same sign. Accelerations cannot
@@ -34,7 +34,7 @@ template <class Space>
 bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                           int rank) {
   const Eigen::Index free = mechanism.num_u() - rank;
-  if (free > kMostTried || mechanism.num_rows() - rank > kMostTried) return false;
+  if (free > kMaxTried || mechanism.num_rows() - rank > kMaxTried) return false;
   Kinematics<Space, double> kinematics(mechanism);
   TreeDynamics<Space, double> dynamics(mechanism);
   kinematics.UpdatePosition(q);
@@ -101,7 +101,7 @@ std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<do
   Kinematics<Space, double> here(mechanism);
   here.UpdatePosition(q);
   if (AreIndependent(here)) return n > mechanism.num_rows() ? "" : all_taken;
-  if (n > kMostAnalysedSpeeds) return "";
+  if (n > kMaxAnalysedSpeeds) return "";
   Excursion<Space> excursion(mechanism, q);
   const int first_order = excursion.freedom();
   if (first_order == 0) return all_taken;
@@ -131,7 +131,7 @@ template <class Space>
 std::string WhyLocked(const MechanismDescription& description,
                       const Mechanism<Space, double>& mechanism, const VectorX<double>& q) {
   const std::string nothing = "nothing can move: ";
-  const bool analysed = mechanism.num_u() <= kMostAnalysedSpeeds;
+  const bool analysed = mechanism.num_u() <= kMaxAnalysedSpeeds;
   const std::vector<Part> parts = analysed ? SplitByJoints(description) : std::vector<Part>();
   if (parts.size() < 2) {
     const std::string why = WhyStuck(mechanism, q, description.accuracy);

@@ -9,7 +9,7 @@ namespace loopbench {
 
 /// Returns the reason why a mechanism in joint coordinates, compiled from `description`, is locked
 /// at the position q, or "" if it is not locked or motions are prescribed. Not analysed above
-/// kMostAnalysedSpeeds unless all constraints are independent (joint_response.h). Locked means that
+/// kMaxAnalysedSpeeds unless all constraints are independent (joint_response.h). Locked means that
 /// nothing can move, or that a part is in a singular configuration that it cannot leave and would
 /// start along infinitesimal motions. A rigid part without such speeds locks nothing: it stays in
 /// place regardless of others.

@@ -20,7 +20,7 @@ using namespace loopbench::testing;  // NOLINT: the oracle's words
 using Bits = std::vector<double>;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-constexpr int kMostShown = 3;  ///< violations of one promise
+constexpr int kMaxShown = 3;  ///< violations of one promise
 /// One with every kind of joint, one with drives, two without either.
 constexpr std::uint64_t kSeeds[] = {1, 2, 3, 4};
 
@@ -29,14 +29,14 @@ class Findings {
  public:
   void Expect(bool kept, const std::string& promise, const std::string& found,
               const std::string& where) {
-    if (kept || ++counts_[promise] > kMostShown) return;
+    if (kept || ++counts_[promise] > kMaxShown) return;
     sentences_.push_back(fmt::format("{}: {} ({})", promise, found, where));
   }
   std::vector<std::string> Sentences() const {
     std::vector<std::string> all = sentences_;
     for (const auto& [promise, count] : counts_) {
-      if (count > kMostShown) {
-        all.push_back(fmt::format("{}: {} more", promise, count - kMostShown));
+      if (count > kMaxShown) {
+        all.push_back(fmt::format("{}: {} more", promise, count - kMaxShown));
       }
     }
     return all;

@@ -222,7 +222,7 @@ TEST(RedundancyTest, MultipliersKeepTheBoundOfOverconstrainedGraphs) {
   }
 }
 
-TEST(AllocationTest, SofteningDoesNotAllocate) {
+TEST(AllocationTest, RegularizationDoesNotAllocate) {
   if (CountAllocations() < 0) GTEST_SKIP() << "allocations cannot be counted in this build";
   const MechanismDescription ladder = RandomLadder(4, SpaceKind::kPlanar, 1);
   const Mechanism<Spatial, double> mechanism(ladder, Coordinates::kJoint);

@@ -27,9 +27,9 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using harness::Column;
+using harness::Method;
 
-constexpr int kMostColumns = 12;
+constexpr int kMaxColumns = 12;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 /// One column of a Jacobian by differences, and what each entry may be wrong by.
@@ -149,7 +149,7 @@ void CompareAt(const MechanismDescription& description, System<Space, double>& f
   const double relative = 100 * kEpsilon * formulation.mechanism().num_bodies() / (rcond * cancels);
   const double noise = relative * f0.cwiseAbs().maxCoeff();
   // of large states some columns, other ones for every method
-  const int stride = 1 + n / kMostColumns;
+  const int stride = 1 + n / kMaxColumns;
   for (int j = worst.comparisons++ % stride; j < n; j += stride) {
     const Quotient quotient = f.Differentiate(y, j, widest, noise);
     const double size = std::max(1.0, quotient.value.cwiseAbs().maxCoeff());
@@ -166,7 +166,7 @@ void CompareAt(const MechanismDescription& description, System<Space, double>& f
 }
 
 template <class Space>
-void Compare(const MechanismDescription& description, const Column& column, double t,
+void Compare(const MechanismDescription& description, const Method& column, double t,
              const VectorXd& q, const VectorXd& u, Worst& worst) {
   SCOPED_TRACE(ToString(column));
   const Mechanism<Space, double> mechanism(description, column.coordinates);
@@ -195,7 +195,7 @@ Worst CompareAll(const MechanismDescription& description, double t, const Vector
     for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
       for (Enforcement level :
            {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kBaumgarte}) {
-        Column column{formulation, level, coordinates, SolverKind::kRankRevealing};
+        Method column{formulation, level, coordinates, SolverKind::kRankRevealing};
         if (level == Enforcement::kBaumgarte) column.gains = BaumgarteGains{3.0, 4.0};
         Compare<Space>(description, column, t, q, u, worst);
       }

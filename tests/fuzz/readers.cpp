@@ -16,7 +16,7 @@
 #include "harness/config/published_series.h"
 #include "harness/exchange/import.h"
 #include "harness/judge/claims.h"
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/record/record.h"
 #include "harness/store/measurements.h"
 #include "harness/store/result_store.h"
@@ -33,14 +33,14 @@ void CheckMessage(const std::string& message) {
   if (message.find("json.exception") != std::string::npos) {
     throw std::logic_error("the parser's own words: " + message);
   }
-  constexpr std::size_t kLongestLine = 4000, kMostLines = 250;
+  constexpr std::size_t kLongestLine = 4000, kMaxLines = 250;
   std::size_t length = 0, lines = 1, following = 0;
   for (const char c : message) {
     const auto byte = static_cast<unsigned char>(c);
     length = c == '\n' ? 0 : length + 1;
     lines += c == '\n' ? 1 : 0;
     if (length > kLongestLine) throw std::logic_error("an endless line: " + message.substr(0, 200));
-    if (lines > kMostLines) throw std::logic_error("too many lines: " + message.substr(0, 200));
+    if (lines > kMaxLines) throw std::logic_error("too many lines: " + message.substr(0, 200));
     if (byte < 0x20 && c != '\n') throw std::logic_error("a control character: " + message);
     const bool continues = (byte & 0xC0u) == 0x80u;
     if (continues != (following > 0)) throw std::logic_error("no UTF-8: " + message);

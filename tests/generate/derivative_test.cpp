@@ -34,7 +34,7 @@ const std::string kFormulations[] = {"odca", "lagrange", "reduction"};
 /// The description of a shipped mechanism as it is run.
 MechanismDescription Shipped(const std::string& name) {
   const harness::MechanismFile file = harness::ReadMechanism(kMechanisms / (name + ".json"));
-  return harness::CompileScene(file.description, file.observe, {})
+  return harness::SimplifyProblem(file.description, file.observe, {})
       .compiled.parts.front()
       .description;
 }
@@ -429,7 +429,7 @@ TEST(GeneratedDerivativeTest, WhereAComparisonFlipsTheLibraryEvaluatesWithEqualR
   };
   derivative(library.y());
   EXPECT_EQ(system.compiled()->misses(), 0);
-  // bars in line: the loop's pivot is lost, and the general text softens a direction
+  // bars in line: the loop's pivot is lost, and the general text regularizes a direction
   std::vector<double> line = library.y();
   for (int i = 0; i < system.mechanism().num_q(); ++i) line[static_cast<std::size_t>(i)] = 0.0;
   const std::vector<double> found = derivative(line);

@@ -36,14 +36,14 @@ class LawfulBench final : public TrialBench {
     trial.rhs_evaluations = 100;
     return trial;
   }
-  void TimeAgain(Trial* trial) override {
+  void Remeasure(Trial* trial) override {
     trial->wall_s = std::min(trial->wall_s, WallOf(trial->choice));
   }
   /// The least error of any way within so many seconds, tolerances only.
   static double BestWithin(double wall_s) {
     double best = 1.0;
     for (const std::string& profile : ProfileNames()) {
-      const double order = OrderOf({.column = {}, .integrator = profile});
+      const double order = OrderOf({.method = {}, .integrator = profile});
       best = std::min(best, 10 * std::pow(kUnit_s / wall_s, order));
     }
     return best;
@@ -57,7 +57,7 @@ class LawfulBench final : public TrialBench {
            static_cast<double>((std::ranges::find(names, choice.integrator) - names.begin()) % 6);
   }
   static double WallOf(const Choice& choice) {
-    const double dear = choice.column.formulation == "lagrange" ? 1.0 : 1.5;
+    const double dear = choice.method.formulation == "lagrange" ? 1.0 : 1.5;
     if (choice.step > 0.0) return dear * 3 * kUnit_s / choice.step;
     return dear * kUnit_s * std::pow(choice.rtol, -1 / OrderOf(choice));
   }
@@ -90,8 +90,8 @@ class AdviceTest : public testing::Test {
     ASSERT_EQ(reference_.trust_horizon, horizon);
   }
   Advice Ask(const AdviceRequest& request) {
-    const TrialScene scene{file_.description, reference_, horizon_, {}};
-    const auto bench = MakeTrialBench(scene);
+    const TrialProblem problem{file_.description, reference_, horizon_, {}};
+    const auto bench = MakeTrialBench(problem);
     return Advise(request, *bench, horizon_, LinkLength(file_.description), [](Trial&) {});
   }
 
@@ -109,7 +109,7 @@ TEST_F(AdviceTest, KeepsTheErrorInARunOfItsOwn) {
       const Trial& best = advice.finalists.front();
       EXPECT_LE(best.error, kErrorShare * error);
       const Experiment experiment = reference::Single(file_);
-      Case one = reference::CaseOf(experiment, file_.description.name, best.choice.column,
+      Case one = reference::CaseOf(experiment, file_.description.name, best.choice.method,
                                    best.choice.rtol, horizon_);
       one.integrator = best.choice.integrator;
       const Record record = RunCase(experiment, one, &reference_);
@@ -140,8 +140,8 @@ TEST_F(AdviceTest, SpendsABudgetOnAccuracy) {
 
 TEST_F(AdviceTest, SweepTriesTheWholeProduct) {
   Load("pendulum", 0.5);
-  const TrialScene scene{file_.description, reference_, horizon_, {}};
-  const auto bench = MakeTrialBench(scene);
+  const TrialProblem problem{file_.description, reference_, horizon_, {}};
+  const auto bench = MakeTrialBench(problem);
   const Advice sweep =
       Sweep({.error = 1e-6, .budget = {}, .cpu_s = 60.0}, *bench, horizon_, 1.0, [](Trial&) {});
   EXPECT_TRUE(sweep.reached);
@@ -149,16 +149,17 @@ TEST_F(AdviceTest, SweepTriesTheWholeProduct) {
   EXPECT_EQ(sweep.trials, 3 * 3 * 2 * static_cast<int>(ProfileNames().size()) * 13);
 }
 
-TEST_F(AdviceTest, DoubtfulWaysAreNoAdvice) {
+TEST_F(AdviceTest, FlaggedWaysAreNoAdvice) {
   Load("four-bar", 1.0);
-  const TrialScene scene{file_.description, reference_, horizon_, {}};
-  const auto bench = MakeTrialBench(scene);
+  const TrialProblem problem{file_.description, reference_, horizon_, {}};
+  const auto bench = MakeTrialBench(problem);
   int asked = 0;
-  const Advice advice = Advise({.error = 1e-5, .budget = {}, .cpu_s = 60.0}, *bench, horizon_, 1.0,
-                               [&](Trial& trial) { trial.doubts = ++asked == 1 ? "energy" : ""; });
+  const Advice advice =
+      Advise({.error = 1e-5, .budget = {}, .cpu_s = 60.0}, *bench, horizon_, 1.0,
+             [&](Trial& trial) { trial.warnings = ++asked == 1 ? "energy" : ""; });
   ASSERT_GE(advice.finalists.size(), 2u);
-  EXPECT_EQ(advice.finalists[0].doubts, "");
-  EXPECT_EQ(advice.finalists[1].doubts, "energy");
+  EXPECT_EQ(advice.finalists[0].warnings, "");
+  EXPECT_EQ(advice.finalists[1].warnings, "energy");
 }
 
 TEST(AdviceByLaw, KeepsAMarginInARunWithAllObserversToo) {

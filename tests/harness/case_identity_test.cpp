@@ -162,8 +162,8 @@ TEST_F(CaseIdentity, WhateverDecidesARunChangesEveryCaseId) {
                                    "/limits/memory_mb=1024", "/preprocess={\"welds\":false}"}) {
     const std::vector<std::string> changed = ids(change);
     for (std::size_t i = 0; i < plain.size(); ++i) {
-      const bool of_a_scene = i < 3;
-      EXPECT_EQ(changed[i] != plain[i], of_a_scene || change != mass) << i << " " << change;
+      const bool of_a_problem = i < 3;
+      EXPECT_EQ(changed[i] != plain[i], of_a_problem || change != mass) << i << " " << change;
     }
   }
   for (const char* change :

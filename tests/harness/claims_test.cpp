@@ -41,7 +41,7 @@ Check DriftCheck(const std::string& mechanism) {
   return check;
 }
 
-ClaimRule TwoScenes() {
+ClaimRule TwoProblems() {
   ClaimRule rule;
   rule.id = "two";
   rule.claim = "Drift is small.";
@@ -52,7 +52,7 @@ ClaimRule TwoScenes() {
 }
 
 TEST(Claims, TheVerdictTurnsWithTheData) {
-  const ClaimRule rule = TwoScenes();
+  const ClaimRule rule = TwoProblems();
   const auto verdict = [&](double square, double general) {
     return Evaluate(rule, std::vector<Record>{RunOf("square", "drift", square),
                                               RunOf("general", "drift", general)})
@@ -66,7 +66,7 @@ TEST(Claims, TheVerdictTurnsWithTheData) {
 }
 
 TEST(Claims, AMissingConditionIsNeverSilentlyTrue) {
-  const ClaimRule rule = TwoScenes();
+  const ClaimRule rule = TwoProblems();
   const ClaimResult half = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1e-14)});
   EXPECT_EQ(half.verdict, Verdict::kOnlyUnder);
   EXPECT_EQ(half.text, "partially reproduced: square problem. Not measured: general problem");
@@ -203,10 +203,10 @@ TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
   check.relative_to = {{"mechanism", {"ladder-100"}}};
   check.demand.measure = "rhs_ns_median";
   check.demand.number = 12.0;
-  const auto state = [&](double slower, double ratio, double yardstick) {
+  const auto state = [&](double slower, double ratio, double calibration) {
     std::vector<Record> records = {RunOf("ladder-100", "rhs_ns_median", 1e5 * slower),
                                    RunOf("ladder-1000", "rhs_ns_median", 1e5 * ratio)};
-    records[0].Set("calibration_ns", 7000.0 * yardstick);
+    records[0].Set("calibration_ns", 7000.0 * calibration);
     records[1].Set("calibration_ns", 7000.0);
     const CheckResult result = Evaluate(check, records);
     EXPECT_EQ(result.state == CheckState::kNotMeasured, Contains(result.reason, "calibration_ns"));
@@ -228,7 +228,7 @@ TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
 
 TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {
   const std::vector<ClaimResult> results = {
-      Evaluate(TwoScenes(), std::vector<Record>{RunOf("square", "drift", 1e-14)})};
+      Evaluate(TwoProblems(), std::vector<Record>{RunOf("square", "drift", 1e-14)})};
   const std::string markdown = ClaimsMarkdown(results, {"command: loopbench run"});
   EXPECT_TRUE(Contains(markdown, "| two | section 4.1 | Drift is small. | partially reproduced |"));
   EXPECT_TRUE(Contains(markdown,

@@ -72,11 +72,11 @@ TEST_F(SimplifyTest, WritesModelsAnExperimentAndAPageThatWork) {
   EXPECT_EQ(FilesIn(".").size(), 7u) << "nothing is left beside it";
   const Experiment experiment = ReadExperiment(folder_ / "ladder/hall-models.json");
   EXPECT_EQ(experiment.name, "hall-models");
-  ASSERT_EQ(experiment.scenes.size(), 7u);
-  EXPECT_EQ(experiment.scenes[0].name, "hall");
-  EXPECT_EQ(experiment.scenes[1].name, "hall-welds");
-  for (const ExperimentScene& scene : experiment.scenes) {
-    EXPECT_EQ(scene.horizons, std::vector<double>{0.2});
+  ASSERT_EQ(experiment.problems.size(), 7u);
+  EXPECT_EQ(experiment.problems[0].name, "hall");
+  EXPECT_EQ(experiment.problems[1].name, "hall-welds");
+  for (const ExperimentProblem& problem : experiment.problems) {
+    EXPECT_EQ(problem.horizons, std::vector<double>{0.2});
   }
   EXPECT_FALSE(experiment.compile.welds) << "the whole model would not be whole";
   ExpectEnding(Call("check ladder/full.json ladder/combined.json ladder/hall-models.json"), 0, {});

@@ -156,7 +156,7 @@ TEST_F(CommandLineTest, TablesInEveryFormatNameTheCommandAndTheCommit) {
   EXPECT_EQ(ReadFile(folder_ / "out/drift.csv").find("# date"), std::string::npos);
 }
 
-TEST_F(CommandLineTest, DoubtsAreSaidBelowTheTableAndFailTheGate) {
+TEST_F(CommandLineTest, WarningsAreSaidBelowTheTableAndFailTheGate) {
   ExpectEnding(Call("run tiny.json --out out --fail-on warnings"), 0, {"  ok  "});
   ExpectEnding(Call("table out --fail-on warnings"), 0, {"  ok  "});
   Write("parallelogram.json", ReadFile(kConfigs / "mechanisms/parallelogram.json"));

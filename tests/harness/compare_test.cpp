@@ -108,7 +108,7 @@ TEST(Compare, TakesCountsHashesAndOutcomesExactly) {
   ExpectChange("outcome", std::string("singular"), Judgement::kWorse);
 }
 
-TEST(Compare, CatchesNewDoubtsAndFailedMembers) {
+TEST(Compare, CatchesNewWarningsAndFailedMembers) {
   const ComparisonReport report =
       Compare(Sound(), With("singularity_crossings", std::int64_t{3}), {});
   EXPECT_EQ(Only(report, Judgement::kWorse).measure.key, "warnings");

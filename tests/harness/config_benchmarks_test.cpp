@@ -37,7 +37,7 @@ TEST(BenchmarkSet, IsReadWithMembersKindsAndColumns) {
   EXPECT_EQ(set.groups[1].members[1].name, "grid/2");
   EXPECT_EQ(set.groups[1].members[1].Make().bodies.size(), 11u);  // 2 x 5 bars and ground
   EXPECT_EQ(set.groups[1].kinds.size(), 2u);
-  EXPECT_EQ(BenchmarkName(BenchmarkKind::kStep, set.groups[1].members[1], set.groups[1].columns[0]),
+  EXPECT_EQ(BenchmarkName(BenchmarkKind::kStep, set.groups[1].members[1], set.groups[1].methods[0]),
             "step/grid/2/lagrange/velocity/joint/rank-revealing");
 }
 
@@ -66,7 +66,7 @@ TEST(BenchmarkSet, OfTheRepositoryReachesAThousandBodies) {
     for (const BenchmarkGroup& group : set.groups) {
       for (const BenchmarkMember& member : group.members) {
         if (member.family != family) continue;
-        const bool is_odca = group.columns[0].formulation == "odca";
+        const bool is_odca = group.methods[0].formulation == "odca";
         std::size_t& largest = is_odca ? odca : dense;
         largest = std::max(largest, member.Make().bodies.size() - 1);
       }
@@ -152,13 +152,13 @@ TEST(Subject, IsMeasuredAtAMovingStateThatIsTheSavedOne) {
   const BenchmarkSet set = ReadBenchmarks(kConfigs / "benchmarks/default.json");
   for (const BenchmarkGroup& group : set.groups) {
     const BenchmarkMember& member = group.members.front();
-    const Column& column = group.columns.front();
+    const Method& method = group.methods.front();
     const MechanismDescription description = member.Make();
-    const BenchmarkState state = ComputeState(description, column.coordinates);
+    const BenchmarkState state = ComputeState(description, method.coordinates);
     ASSERT_EQ(state.outcome, Outcome::kFinished) << member.name;
     EXPECT_GT(state.u.cwiseAbs().maxCoeff(), 0.01) << member.name;
     EXPECT_EQ(state.hash, set.states.at(member.name + "/joint"));
-    const auto subject = MakeSubject(description, column, state, set.integrator, set.step);
+    const auto subject = MakeSubject(description, method, state, set.integrator, set.step);
     // the same work each time: neither derivatives nor steps leave anything behind
     ASSERT_EQ(subject->Derivative(), Outcome::kFinished) << member.name;
     const std::string first = HashExact(subject->derivative());

@@ -14,7 +14,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
 #include "harness/judge/claims.h"
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/text/files.h"
 #include "tests/harness/places.h"
 

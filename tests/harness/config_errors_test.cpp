@@ -261,8 +261,8 @@ INSTANTIATE_TEST_SUITE_P(
                 {"/integrator: found \"ode46\"", "(did you mean \"ode45\"?)"}}));
 
 TEST(ExperimentErrors, TheSameTwiceIsRefused) {
-  const std::string scene = R"({"mechanism": "mechanisms/pendulum.json", "horizon": 10})";
-  ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", scene, scene + ", " + scene, {}})),
+  const std::string problem = R"({"mechanism": "mechanisms/pendulum.json", "horizon": 10})";
+  ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", problem, problem + ", " + problem, {}})),
               {"/problems/1: found problem \"pendulum\" again"});
   const std::string column = R"({"formulation": "odca", "enforcement": "acceleration"})";
   ExpectWords(ExperimentError(Edited(kTinyExperiment, {"", column, column + ", " + column, {}})),

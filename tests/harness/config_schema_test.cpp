@@ -17,7 +17,7 @@
 #include "harness/config/published_series.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims.h"
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/text/files.h"
 #include "tests/harness/places.h"
 
@@ -42,8 +42,8 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "mechanisms/independent-component",
       "mechanisms/independent-owner",
       "mechanisms/point-force-on-ground",
-      "experiments/ensemble-unknown-scene",
-      "experiments/series-unknown-scene",
+      "experiments/ensemble-unknown-problem",
+      "experiments/series-unknown-problem",
       "series/quantity-twice",
       "claims/id-twice",
       "claims/label-twice",
@@ -54,7 +54,7 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "maps/not-applicable-unknown",
       "experiments/ensemble-unused-tolerance",
       "experiments/ensemble-between-unheld",
-      "experiments/scene-twice",
+      "experiments/problem-twice",
       "experiments/ensemble-tolerance-of-fixed-steps",
       "experiments/exclude-unknown-key",
       "experiments/sweep-same-name"}},
@@ -93,12 +93,12 @@ const std::map<std::string, std::set<std::string>> kBeyondSchemas = {
       "experiments/family-too-large",
       "experiments/cases-too-many",
       "experiments/sweep-too-many",
-      "experiments/series-one-for-two-scenes",
+      "experiments/series-one-for-two-problems",
       "series/lengths",
       "series/times-falling",
       "series/times-not-rising"}},
     {"equal after expansion, or without effect",
-     {"experiments/column-twice", "experiments/gains-of-position",
+     {"experiments/method-twice", "experiments/gains-of-position",
       "experiments/ensemble-matches-nothing", "experiments/exclude-everything",
       "experiments/exclude-matches-nothing", "experiments/exclude-step-of-no-case",
       "experiments/sweep-value-again", "experiments/sweep-same-field",

@@ -16,7 +16,7 @@
 namespace loopbench::harness {
 namespace config_sweep_test {
 
-/// A small experiment with one scene, and whatever else a test adds.
+/// A small experiment with one problem, and whatever else a test adds.
 std::string Text(const std::string& more,
                  const std::string& mechanism = "\"mechanisms/four-bar.json\"",
                  const std::string& tolerances = "[1e-6, 1e-8]") {
@@ -45,8 +45,8 @@ void ExpectWords(const std::string& error, const std::vector<std::string>& words
   }
 }
 
-const MechanismDescription& Described(const Experiment& experiment, std::size_t scene = 0) {
-  return experiment.scenes.at(scene).mechanism.description;
+const MechanismDescription& Described(const Experiment& experiment, std::size_t problem = 0) {
+  return experiment.problems.at(problem).mechanism.description;
 }
 
 TEST(Ranges, AreEvenlySpacedWithExactEnds) {
@@ -78,7 +78,7 @@ TEST(Ranges, ThatAreNoneAreRefused) {
 
 TEST(Families, MakeTheMechanismsOfTheLibrary) {
   const Experiment chain = Read(Text("", R"({"family": "chain", "bars": 10})")).front();
-  EXPECT_EQ(chain.scenes.front().name, "chain-10");
+  EXPECT_EQ(chain.problems.front().name, "chain-10");
   const MechanismDescription expected = Chain(10);
   EXPECT_EQ(Described(chain).bodies.size(), expected.bodies.size());
   EXPECT_EQ(Described(chain).initial.coordinates.size(), expected.initial.coordinates.size());
@@ -88,27 +88,27 @@ TEST(Families, MakeTheMechanismsOfTheLibrary) {
       Read(Text("",
                 R"({"family": "grid", "storeys": 3, "windows": 4, "angle": -1.0, "speed": 0.5})"))
           .front();
-  EXPECT_EQ(grid.scenes.front().name, Grid(3, 4, -1.0, 0.5).name);
+  EXPECT_EQ(grid.problems.front().name, Grid(3, 4, -1.0, 0.5).name);
   EXPECT_EQ(Described(grid).initial.coordinates.front().values,
             Grid(3, 4, -1.0, 0.5).initial.coordinates.front().values);
   EXPECT_EQ(Described(grid).initial.held.size(), 3u);
 }
 
-TEST(Families, WithSeveralCountsAreSeveralScenes) {
+TEST(Families, WithSeveralCountsAreSeveralProblems) {
   const Experiment ladders =
       Read(Text("", R"({"family": "ladder", "windows": {"log": [1, 100, 3]}})")).front();
-  ASSERT_EQ(ladders.scenes.size(), 3u);
-  EXPECT_EQ(ladders.scenes[1].name, "ladder-10");
+  ASSERT_EQ(ladders.problems.size(), 3u);
+  EXPECT_EQ(ladders.problems[1].name, "ladder-10");
   EXPECT_EQ(Described(ladders, 2).bodies.size(), Ladder(100, 1.0, 1.0).bodies.size());
   const Experiment named = Read(Text("", R"({"family": "grid", "storeys": [1, 2], "windows": 3},
       "name": "wall")"))
                                .front();
-  ASSERT_EQ(named.scenes.size(), 2u);
-  EXPECT_EQ(named.scenes[1].name, "wall-2x3");
-  EXPECT_NE(named.scenes[0].mechanism.canonical, named.scenes[1].mechanism.canonical);
+  ASSERT_EQ(named.problems.size(), 2u);
+  EXPECT_EQ(named.problems[1].name, "wall-2x3");
+  EXPECT_NE(named.problems[0].mechanism.canonical, named.problems[1].mechanism.canonical);
 }
 
-TEST(Families, RunLikeOtherScenes) {
+TEST(Families, RunLikeOtherProblems) {
   const Experiment experiment = Read(Text("", R"({"family": "ladder", "windows": 2})")).front();
   for (const Case& one : Expand(experiment)) {
     EXPECT_EQ(RunCase(experiment, one).Text("outcome"), "finished");
@@ -130,9 +130,9 @@ TEST(InlineMechanism, IsReadWhereItStands) {
     "bodies": [{"name": "bar", "mass": 2, "inertia": 1, "com": [0, -1]}],
     "joints": [{"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "bar"}}]})";
   const Experiment experiment = Read(Text("", pendulum)).front();
-  EXPECT_EQ(experiment.scenes.front().name, "p");
+  EXPECT_EQ(experiment.problems.front().name, "p");
   EXPECT_EQ(Described(experiment).bodies[1].mass, 2.0);
-  EXPECT_TRUE(experiment.scenes.front().path.empty());
+  EXPECT_TRUE(experiment.problems.front().path.empty());
   std::string broken = pendulum;
   broken.replace(broken.find("\"mass\": 2"), 9, "\"mass\": 0");
   ExpectWords(ErrorOf(Text("", broken)),
@@ -191,8 +191,8 @@ TEST(Sweep, ValuesMayBeOfAnyKind) {
       "values": [[{"mechanism": "mechanisms/pendulum.json", "horizon": 1}],
                  [{"mechanism": {"family": "chain", "bars": 3}, "horizon": 2}]]}])"));
   ASSERT_EQ(experiments.size(), 2u);
-  EXPECT_EQ(experiments[0].scenes.front().name, "pendulum");
-  EXPECT_EQ(experiments[1].scenes.front().name, "chain-3");
+  EXPECT_EQ(experiments[0].problems.front().name, "pendulum");
+  EXPECT_EQ(experiments[1].problems.front().name, "chain-3");
   EXPECT_EQ(experiments[1].parameters.Text("problem").substr(0, 14), "[{\"mechanism\":");
 }
 
@@ -272,7 +272,7 @@ TEST(Settings, ChangeFieldsBeforeReading) {
                                    {"/problems/0/mechanism/gravity/1", "-1.5"},
                                    {"/integrator", "cash-karp"}})
                        .front();
-  EXPECT_EQ(one.scenes.front().horizons, (std::vector<double>{2.0, 3.0}));
+  EXPECT_EQ(one.problems.front().horizons, (std::vector<double>{2.0, 3.0}));
   EXPECT_EQ(one.limits.memory_mb, 512.0);
   EXPECT_EQ(Described(one).gravity.y(), -1.5);
   EXPECT_EQ(one.integrators, std::vector<std::string>{"cash-karp"});

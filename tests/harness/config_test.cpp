@@ -48,8 +48,8 @@ TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
     const MechanismDescription mechanism = ReadMechanism(file).description;
     const bool revolute = std::ranges::all_of(
         mechanism.joints, [](const auto& joint) { return joint.type == JointType::kRevolute; });
-    // Grueebler's count for planar revolute joints; it holds for all of these scenes but two, whose
-    // loop is redundant. The others are run (tests/reference/shipped_mechanisms_test.cpp).
+    // Grueebler's count for planar revolute joints; it holds for all of these problems but two,
+    // whose loop is redundant. The others are run (tests/reference/shipped_mechanisms_test.cpp).
     if (mechanism.space != SpaceKind::kPlanar || !revolute) continue;
     if (mechanism.name == "locomotive" || mechanism.name == "three-cranks") continue;
     const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
@@ -201,12 +201,12 @@ TEST(MechanismReader, FillsEveryFieldOfASpatialMechanism) {
 }
 
 TEST(MechanismReader, ReadsWhatObserversCompareWith) {
-  const SceneObservation toggle = Shipped("toggle").observe;
+  const ObservedQuantities toggle = Shipped("toggle").observe;
   ASSERT_EQ(toggle.branch_invariants.size(), 2u);
   EXPECT_EQ(toggle.branch_invariants[0], (AngleCombination{{"bar1", 1.0}, {"bar2", -1.0}}));
   ASSERT_TRUE(toggle.closed_form.has_value());
   EXPECT_DOUBLE_EQ(toggle.closed_form->frequency_squared, 9.81 / 2.5);
-  const SceneObservation parallelogram = Shipped("parallelogram").observe;
+  const ObservedQuantities parallelogram = Shipped("parallelogram").observe;
   EXPECT_EQ(parallelogram.closed_form->body, "bar1");
   EXPECT_DOUBLE_EQ(parallelogram.closed_form->frequency_squared, 2.0 * 9.81 / 3.5);
   EXPECT_DOUBLE_EQ(parallelogram.closed_form->down_angle, -std::acos(0.0));
@@ -228,38 +228,38 @@ TEST(ShippedExperiments, AllReadAndExpand) {
   EXPECT_GE(count, 4);
 }
 
-TEST(ShippedExperiments, PaperRunsEverySceneColumnToleranceAndHorizon) {
+TEST(ShippedExperiments, PaperRunsEveryProblemColumnToleranceAndHorizon) {
   const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
   const std::vector<Case> cases = Expand(paper);
-  // Five scenes with two horizons and five with one; 12 columns and, but for the long runs, 3 at
+  // Five problems with two horizons and five with one; 12 methods and, but for the long runs, 3 at
   // level projection; 4 tolerances.
-  EXPECT_EQ(paper.columns.size(), 15u);
+  EXPECT_EQ(paper.methods.size(), 15u);
   EXPECT_EQ(cases.size(), ((5u * 2u + 5u) * 12u + 10u * 3u) * 4u);
   const auto ensembles =
       std::count_if(cases.begin(), cases.end(), [](const Case& one) { return one.ensemble == 16; });
-  // Long runs of five scenes; the 6 plain columns; 3 tolerances.
+  // Long runs of five problems; the 6 plain methods; 3 tolerances.
   EXPECT_EQ(ensembles, 5 * 6 * 3);
   EXPECT_EQ(ExpandTiming(paper).size(), 10u * 15u);
 }
 
 TEST(ShippedExperiments, LevelsCrossesEveryFactorOnce) {
   const Experiment levels = ReadExperiment(kConfigs / "experiments/paper/levels.json");
-  std::set<std::string> columns;
-  for (const Column& column : levels.columns) columns.insert(ToString(column));
-  EXPECT_EQ(columns.size(), 3u * 2u * 2u);
+  std::set<std::string> methods;
+  for (const Method& method : levels.methods) methods.insert(ToString(method));
+  EXPECT_EQ(methods.size(), 3u * 2u * 2u);
   EXPECT_EQ(Expand(levels).size(), 4u * 2u * 12u);
   EXPECT_TRUE(ExpandTiming(levels).empty());
 }
 
-TEST(Expand, KeepsTheOrderSceneHorizonColumnTolerance) {
+TEST(Expand, KeepsTheOrderProblemHorizonColumnTolerance) {
   const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
   const std::vector<Case> cases = Expand(paper);
   EXPECT_EQ(cases[0].mechanism, "square-four-bar");
-  EXPECT_EQ(ToString(cases[0].column), "odca/acceleration/joint/plain");
+  EXPECT_EQ(ToString(cases[0].method), "odca/acceleration/joint/plain");
   EXPECT_EQ(cases[1].rtol, 1e-8);
-  EXPECT_EQ(ToString(cases[4].column), "odca/acceleration/joint/rank-revealing");
+  EXPECT_EQ(ToString(cases[4].method), "odca/acceleration/joint/rank-revealing");
   EXPECT_EQ(cases[15 * 4].horizon, 100.0);
-  EXPECT_EQ(cases[(15 + 12) * 4].scene, 1u);
+  EXPECT_EQ(cases[(15 + 12) * 4].problem, 1u);
   for (const Case& one : cases) {
     EXPECT_EQ(one.rtol, one.atol);
     EXPECT_EQ(one.limits.cpu_s, 10.0);
@@ -273,12 +273,12 @@ TEST(ExperimentReader, DefaultsAreTheRecommendedOnes) {
     "problems": [{"mechanism": "mechanisms/pendulum.json", "horizon": 10, "name": "p"}],
     "methods": {"formulation": "odca", "enforcement": "velocity"}})",
                                                 kConfigs / "small.json");
-  ASSERT_EQ(experiment.columns.size(), 1u);
-  EXPECT_EQ(ToString(experiment.columns[0]), "odca/velocity/joint/rank-revealing");
+  ASSERT_EQ(experiment.methods.size(), 1u);
+  EXPECT_EQ(ToString(experiment.methods[0]), "odca/velocity/joint/rank-revealing");
   EXPECT_EQ(experiment.integrators, std::vector<std::string>{"ode45"});
   EXPECT_EQ(experiment.series_points, 200);
-  EXPECT_EQ(experiment.scenes[0].name, "p");
-  EXPECT_EQ(experiment.timing.columns, experiment.columns);
+  EXPECT_EQ(experiment.problems[0].name, "p");
+  EXPECT_EQ(experiment.timing.methods, experiment.methods);
   EXPECT_EQ(Expand(experiment)[0].ensemble, 1);
 }
 

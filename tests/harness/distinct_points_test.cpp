@@ -64,14 +64,14 @@ TEST(DistinctPoints, StandForAllOthersOnEitherAxis) {
   }
 }
 
-TEST(DistinctPoints, LoseNoCurveNoFailureAndNoDoubt) {
+TEST(DistinctPoints, LoseNoCurveNoFailureAndNoWarning) {
   DistinctPoints points(Wanted(), kMost);
   for (int i = 0; i < 5000; ++i) points.Add(Point(i, i));
-  Record failed = Point(2500.0, 2500.0), doubted = failed;
+  Record failed = Point(2500.0, 2500.0), flagged = failed;
   failed.Set("outcome", std::string("step-limit"));
-  doubted.Set("warnings", std::string("energy"));
+  flagged.Set("warnings", std::string("energy"));
   for (int times = 0; times < 3; ++times) {
-    for (const Record& one : {failed, doubted, Point(2500.0, 2500.0, "lagrange")}) points.Add(one);
+    for (const Record& one : {failed, flagged, Point(2500.0, 2500.0, "lagrange")}) points.Add(one);
   }
   const auto count = [&points](const char* key, const std::string& text) {
     return std::ranges::count_if(points.records(),

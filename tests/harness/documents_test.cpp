@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/doubts.h"
-#include "harness/judge/failure_map.h"
+#include "harness/analysis/warnings.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/record/measures.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
@@ -110,10 +110,10 @@ TEST_F(DocumentsTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
 
 TEST(Documents, EveryOutcomeAndWarningHasASection) {
   const std::string text = ReadFile(kRoot / "docs/reference/outcomes-and-warnings.md");
-  std::vector<std::string> names = {kEnergyDoubt,       kSingularDoubt, kSoftenedDoubt,
-                                    kDriftDoubt,        kMembersDoubt,  kExponentDoubt,
-                                    kDisagreementDoubt, kErrorDoubt,    kRefinementDoubt,
-                                    kDriveDoubt,        kStepsDoubt};
+  std::vector<std::string> names = {kEnergyWarning,       kSingularWarning, kRegularizedWarning,
+                                    kDriftWarning,        kMembersWarning,  kExponentWarning,
+                                    kDisagreementWarning, kErrorWarning,    kRefinementWarning,
+                                    kDriveWarning,        kStepsWarning};
   for (const RunEnding& ending : kRunEndings) names.emplace_back(ending.word);
   for (const std::string& name : names) {
     EXPECT_NE(text.find("\n### `" + name + "`\n"), std::string::npos) << name;

@@ -114,8 +114,8 @@ TEST(MemberStart, ThatCannotBeReachedSaysSoItself) {
   EXPECT_FALSE(assembled.message.empty());
 }
 
-Case ParallelogramCase(const Experiment& experiment, const Column& column) {
-  Case one = CaseOf(experiment, "parallelogram", column, 1e-8, 5.0);
+Case ParallelogramCase(const Experiment& experiment, const Method& method) {
+  Case one = CaseOf(experiment, "parallelogram", method, 1e-8, 5.0);
   one.ensemble = 8;
   one.seed = 1;
   one.between = {{"OA", -1.4, -0.6}};
@@ -123,7 +123,7 @@ Case ParallelogramCase(const Experiment& experiment, const Column& column) {
 }
 
 TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
-  const Column published = Published("lagrange", Coordinates::kJoint);
+  const Method published = Published("lagrange", Coordinates::kJoint);
   const Record lost = RunCase(Paper(), ParallelogramCase(Paper(), published));
   EXPECT_EQ(lost.Number("ensemble_size"), 8);
   EXPECT_EQ(lost.Number("ensemble_started_off"), 0);
@@ -131,7 +131,7 @@ TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
   EXPECT_LT(lost.Number("ensemble_branch_kept") + lost.Number("ensemble_failed"), 8);
   EXPECT_GT(lost.Number("ensemble_branch_error_max"), 0.1);
 
-  Column position = Published("odca", Coordinates::kJoint);
+  Method position = Published("odca", Coordinates::kJoint);
   position.enforcement = Enforcement::kPosition;
   position.solver = SolverKind::kRankRevealing;
   Case one = ParallelogramCase(Paper(), position);
@@ -149,14 +149,14 @@ TEST(Ensemble, CountsTheRunsThatStayOnTheirBranch) {
 /// Right-hand sides of several members are evaluated in lanes, projections of each by itself.
 TEST(Ensemble, IsThatOfItsMembersOneByOneOnAnyNumberOfThreads) {
   for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition}) {
-    Column column = Published("odca", Coordinates::kJoint);
-    column.enforcement = level;
-    column.solver = SolverKind::kRankRevealing;
-    Case one = CaseOf(Paper(), "four-bar", column, 1e-7, 2.0);
+    Method method = Published("odca", Coordinates::kJoint);
+    method.enforcement = level;
+    method.solver = SolverKind::kRankRevealing;
+    Case one = CaseOf(Paper(), "four-bar", method, 1e-7, 2.0);
     one.ensemble = 21;
     one.perturb = 0.3;
     Experiment experiment = Paper();
-    MechanismDescription& description = experiment.scenes[one.scene].mechanism.description;
+    MechanismDescription& description = experiment.problems[one.problem].mechanism.description;
     const MechanismDescription nominal = description;
     double energy = 0.0, drift = 0.0;
     for (int member = 0; member < one.ensemble; ++member) {
@@ -177,7 +177,7 @@ TEST(Ensemble, IsThatOfItsMembersOneByOneOnAnyNumberOfThreads) {
   }
 }
 
-TEST(Ensemble, KnowsNothingOfABranchWhereTheSceneDoesNot) {
+TEST(Ensemble, KnowsNothingOfABranchWhereTheProblemDoesNot) {
   Case one = CaseOf(Paper(), "four-bar", Published("odca", Coordinates::kJoint), 1e-6, 0.1);
   one.ensemble = 2;
   one.perturb = 0.02;

@@ -70,8 +70,9 @@ TEST(Estimate, AReferenceThatTakesAWiderScalarHasAPilotOfThatToo) {
       ReadExperiment(LOOPBENCH_SOURCE_DIR "/configs/experiments/examples/report.json")};
   for (const auto& [mechanism, pilots] : {std::pair("four-bar", 1u), {"parallelogram", 2u}}) {
     const std::vector<Case> cases = SelectCases(experiments[0], {});
-    const auto one = std::ranges::find_if(
-        cases, [&](const Case& any) { return experiments[0].scenes[any.scene].name == mechanism; });
+    const auto one = std::ranges::find_if(cases, [&](const Case& any) {
+      return experiments[0].problems[any.problem].name == mechanism;
+    });
     ASSERT_NE(one, cases.end());
     Estimate estimate(experiments, {});
     EXPECT_GT(estimate.OfReference(0, ReferenceOf(experiments[0], *one, "results.jsonl")), 0.0);

@@ -36,7 +36,7 @@ std::vector<std::string> Missing(const MechanismDescription& mechanism,
                                  const ExportFormat& format) {
   try {
     exchange::Export(mechanism, format);
-  } catch (const exchange::NotThere& missing) {
+  } catch (const exchange::Unsupported& missing) {
     return missing.parts();
   }
   return {};

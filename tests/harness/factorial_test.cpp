@@ -74,7 +74,7 @@ TEST(Factorial, AFactorWithoutEffectHasRatioOne) {
   EXPECT_EQ(row.Number("exponent_difference"), 0.0);
 }
 
-TEST(Factorial, CoordinatesMatterOnSquareScenesOnly) {
+TEST(Factorial, CoordinatesMatterOnSquareProblemsOnly) {
   const Table table = FactorialTable(Planted());
   const Record square = RowOf(table, "coordinates", "absolute", "square");
   EXPECT_EQ(square.Number("pairs"), 12);

@@ -201,7 +201,7 @@ TEST_F(FiguresTest, AFigureWithoutPointsIsAReason) {
   EXPECT_TRUE(Contains(*error, "no curve has a point to draw"));
 }
 
-TEST(FigureRecipes, OneFigureOfMotionPerSceneAndOneOfDriftPerTolerance) {
+TEST(FigureRecipes, OneFigureOfMotionPerProblemAndOneOfDriftPerTolerance) {
   Record coarse = RunOf("odca", "joint", 2.0);
   coarse.Set("rtol", 1e-6);
   Record singular = RunOf("odca", "joint", 2.0);
@@ -298,7 +298,7 @@ TEST(FigureRecipes, EveryWayOfKeepingLoopsClosedLooksItsOwn) {
   std::set<std::string> looks;
   for (const Curve& curve : DriftFigure(AllMethods()).curves) {
     const CurveStyle& style = curve.style;
-    EXPECT_FALSE(style.doubtful);
+    EXPECT_FALSE(style.flagged);
     looks.insert(style.color + ' ' + std::to_string(style.dash) + ' ' +
                  std::to_string(style.width) + std::to_string(static_cast<int>(style.shape)));
   }
@@ -392,7 +392,7 @@ TEST_F(FiguresTest, CurvesThatCoincideAreDrawnOnceAndListed) {
   const std::string svg = Draw(figure);
   EXPECT_TRUE(Contains(svg, "coincide: A: odca = lagrange, joint;  B: odca = lagrange, absolute"));
   EXPECT_TRUE(Contains(svg, "<text>A 2.00?</text>"));
-  // a doubtful run is never hidden by a sound one, nor is one that failed
+  // a flagged run is never hidden by a sound one, nor is one that failed
   records[0].Set("warnings", std::string("energy"));
   records[2].Set("outcome", std::string("singular"));
   EXPECT_EQ(MergedCurves(DriftFigure(records), FigureSize::kTwoColumn).size(), 4u);
@@ -491,7 +491,7 @@ TEST_F(FiguresTest, HostileNamesAreDrawnAsTheyAre) {
   EXPECT_FALSE(std::filesystem::exists("pwned"));
 }
 
-TEST_F(FiguresTest, DoubtfulRunsHaveHollowMarks) {
+TEST_F(FiguresTest, FlaggedRunsHaveHollowMarks) {
   std::vector<Record> records = {RunOf("odca", "absolute", 2.0), RunOf("reduction", "joint", 2.5)};
   EXPECT_FALSE(Contains(Draw(DriftFigure(records)), "flagged"));
   records[1].Set("warnings", std::string("drift"));

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
@@ -173,13 +173,13 @@ Record FixedRun(const std::string& level, double drift) {
 }
 
 /// Nothing is promised of a fixed step's errors, so that only a loop that is none any more is
-/// doubted; what a projection leaves does not depend on the step.
+/// flagged; what a projection leaves does not depend on the step.
 TEST(FixedSteps, PromiseNothingButTheProjection) {
-  EXPECT_EQ(OwnDoubts(FixedRun("acceleration", 0.19)), "");
-  EXPECT_EQ(OwnDoubts(FixedRun("acceleration", 0.21)), "drift");  // a tenth of a link
-  EXPECT_EQ(OwnDoubts(FixedRun("acceleration", NAN)), "drift");
-  EXPECT_EQ(OwnDoubts(FixedRun("projection", 9e-14)), "");  // 25 goals are 1e-13
-  EXPECT_EQ(OwnDoubts(FixedRun("projection", 2e-13)), "drift");
+  EXPECT_EQ(OwnWarnings(FixedRun("acceleration", 0.19)), "");
+  EXPECT_EQ(OwnWarnings(FixedRun("acceleration", 0.21)), "drift");  // a tenth of a link
+  EXPECT_EQ(OwnWarnings(FixedRun("acceleration", NAN)), "drift");
+  EXPECT_EQ(OwnWarnings(FixedRun("projection", 9e-14)), "");  // 25 goals are 1e-13
+  EXPECT_EQ(OwnWarnings(FixedRun("projection", 2e-13)), "drift");
 }
 
 /// A tolerance says which differences are small; a step does not.
@@ -191,9 +191,9 @@ TEST(FixedSteps, NeitherJudgeNorAreJudgedByTheEndsOfOthers) {
     records.back().Set("step", Value());
   }
   const std::vector<Agreement> agreements = CompareFinalPoses(records);
-  EXPECT_FALSE(agreements[0].doubted || agreements[1].doubted);
+  EXPECT_FALSE(agreements[0].flagged || agreements[1].flagged);
   EXPECT_EQ(agreements[0].cluster, 0);
-  EXPECT_TRUE(agreements[2].doubted && agreements[3].doubted);
+  EXPECT_TRUE(agreements[2].flagged && agreements[3].flagged);
 }
 
 /// Of one integrator all end alike, of the other none: the first decide at their own tolerance.
@@ -207,16 +207,16 @@ TEST(Integrators, ThoseThatAllEndAlikeDecide) {
   };
   std::vector<Record> records = {run("a", "acceleration", 0.0), run("a", "projection", 0.0),
                                  run("b", "acceleration", 0.1), run("b", "projection", 0.2)};
-  const auto doubted = [&] {
+  const auto flagged = [&] {
     std::string text;
-    for (const Agreement& one : CompareFinalPoses(records)) text += one.doubted ? "x" : "-";
+    for (const Agreement& one : CompareFinalPoses(records)) text += one.flagged ? "x" : "-";
     return text;
   };
-  EXPECT_EQ(doubted(), "--xx");
+  EXPECT_EQ(flagged(), "--xx");
   records[3] = run("b", "projection", 0.1);
-  EXPECT_EQ(doubted(), "xxxx") << "two integrators decide differently: numbers do not tell";
+  EXPECT_EQ(flagged(), "xxxx") << "two integrators decide differently: numbers do not tell";
   records[1] = run("a", "acceleration", 0.0);
-  EXPECT_EQ(doubted(), "xx--") << "equations of one kind decide nothing";
+  EXPECT_EQ(flagged(), "xx--") << "equations of one kind decide nothing";
 }
 
 class FixedStepsProgram : public CommandLineTest {};

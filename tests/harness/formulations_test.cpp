@@ -89,8 +89,8 @@ TEST(FormulationsTest, ANewNameIsValidWhereverTheOthersAre) {
   InChild([] {
     RegisterFormulation(Echo());
     const Experiment experiment = Asking("acceleration");
-    ASSERT_EQ(experiment.columns.size(), 2u);
-    EXPECT_EQ(ToString(experiment.columns[1]), "echo/acceleration/joint/rank-revealing");
+    ASSERT_EQ(experiment.methods.size(), 2u);
+    EXPECT_EQ(ToString(experiment.methods[1]), "echo/acceleration/joint/rank-revealing");
     std::vector<Record> records;
     for (const Case& one : Expand(experiment)) records.push_back(RunCase(experiment, one));
     EXPECT_EQ(records[1].Text("formulation"), "echo");

@@ -104,7 +104,7 @@ TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   EXPECT_NE(script.find("failed run"), std::string::npos);
 }
 
-TEST(FreeFigure, DoubtedRunsAreHollowAndCounted) {
+TEST(FreeFigure, FlaggedRunsAreHollowAndCounted) {
   std::vector<Record> runs = Runs();
   runs[1].Set("warnings", std::string("energy"));
   for (Record& run : runs) {
@@ -120,7 +120,7 @@ TEST(FreeFigure, DoubtedRunsAreHollowAndCounted) {
   const FreeFigureResult series = MakeFreeFigure(
       runs, {.x = "series.drift_t", .y = "series.drift", .group = "rtol", .log = ""});
   EXPECT_EQ(std::ranges::count_if(series.figure.curves,
-                                  [](const Curve& curve) { return curve.style.doubtful; }),
+                                  [](const Curve& curve) { return curve.style.flagged; }),
             1);
 }
 
@@ -145,7 +145,7 @@ TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
   EXPECT_EQ(LabelsDrawn(joined), names);
   EXPECT_EQ(MergedCurves(joined, FigureSize::kTwoColumn)[0].style.color, "#000000");
   EXPECT_NE(GnuplotScript(joined).commands.find("\"lagrange = odca\""), std::string::npos);
-  // doubtful runs keep their hollow marks, failed ones their crosses, in the colour of each
+  // flagged runs keep their hollow marks, failed ones their crosses, in the colour of each
   runs[0].Set("warnings", std::string("energy"));
   runs[4].Set("warnings", std::string("energy"));
   for (const std::size_t failed : {2u, 5u}) {

@@ -19,12 +19,12 @@ constexpr std::size_t kCommits = 200, kCases = 8;
 using ByCase = std::vector<std::vector<double>>;  ///< [case][commit]
 /// What a machine does to times that are the same.
 struct Machine {
-  ByCase noise;       ///< of their logarithms
-  ByCase yardsticks;  ///< [ns]; none where it is not known how fast the machine was
+  ByCase noise;         ///< of their logarithms
+  ByCase calibrations;  ///< [ns]; none where it is not known how fast the machine was
 };
 
 /// What a file of noise says of a machine whose cores others share, about the medians: for each
-/// record the times of a right-hand side and of a simulation, then their yardsticks.
+/// record the times of a right-hand side and of a simulation, then their calibrations.
 Machine SharedMachine(const char* noise = "timing-noise.csv") {
   std::ifstream file(fs::path(LOOPBENCH_SOURCE_DIR) / "tests/harness" / noise);
   Machine machine{ByCase(kCases), ByCase(kCases)};
@@ -33,7 +33,7 @@ Machine SharedMachine(const char* noise = "timing-noise.csv") {
     std::istringstream cells(line);
     std::string cell;
     for (std::size_t record = 0; record < kCases / 2; ++record) {
-      for (ByCase* columns : {&machine.noise, &machine.yardsticks}) {
+      for (ByCase* columns : {&machine.noise, &machine.calibrations}) {
         for (const std::size_t one : {2 * record, 2 * record + 1}) {
           std::getline(cells, cell, ',');
           (*columns)[one].push_back(std::stod(cell));
@@ -97,8 +97,8 @@ class PlantedHistory : public HistoryOf {
                                    static_cast<std::int64_t>(1000 + k),
                                    {time, 1.1 * time, 1.5 * time}));
         records.back().Set("instructions", std::round(1e6 * size * at("instructions")));
-        if (machine.yardsticks.empty()) continue;
-        records.back().Set("calibration_wall_ns", machine.yardsticks[k][commit]);
+        if (machine.calibrations.empty()) continue;
+        records.back().Set("calibration_wall_ns", machine.calibrations[k][commit]);
       }
       Add(static_cast<int>(commit), records);
     }
@@ -209,10 +209,10 @@ TEST_F(PlantedHistory, NothingIsMadeUpOnAMachineThatOthersKeepBusy) {
   EXPECT_LE(false_alarms_.size(), 1u) << testing::PrintToString(false_alarms_);
 }
 
-// The same times without the yardstick that was measured beside them: they hide what is in them.
-TEST_F(PlantedHistory, WithoutAYardstickASharedMachineHidesThem) {
+// The same times without the calibration that was measured beside them: they hide what is in them.
+TEST_F(PlantedHistory, WithoutACalibrationASharedMachineHidesThem) {
   Machine machine = SharedMachine();
-  machine.yardsticks.clear();
+  machine.calibrations.clear();
   Follow(machine);
   EXPECT_EQ(Found("drift_position_max"), 5);
   EXPECT_EQ(Found("instructions"), 5);

@@ -230,7 +230,8 @@ TEST(ImportSdf, ACanonicalLinkIsNoNews) {
 
 TEST(ImportSdf, EveryKindOfDroppedElementHasItsNote) {
   const Imported imported = ImportText(
-      "<sdf version=\"1.6\"><world name=\"w\"><physics/><scene/><state/><plugin/><wind/><strange/>"
+      "<sdf version=\"1.6\"><world "
+      "name=\"w\"><physics/><problem/><state/><plugin/><wind/><strange/>"
       "<model name=\"m\"><self_collide>0</self_collide><plugin/><link name=\"a\">"
       "<kinematic>true</kinematic><velocity_decay/><visual name=\"v\"/><collision name=\"c\"/>"
       "<sensor name=\"s\"/></link>" +

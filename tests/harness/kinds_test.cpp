@@ -122,10 +122,10 @@ TEST(OtherJoints, BuiltInKindsWouldPass) {
 }
 
 /// All formulations in both coordinate sets, which may have redundant loops.
-std::vector<Column> RankRevealingColumns() {
-  std::vector<Column> columns = PublishedColumns();
-  for (Column& column : columns) column.solver = SolverKind::kRankRevealing;
-  return columns;
+std::vector<Method> RankRevealingMethods() {
+  std::vector<Method> methods = PublishedMethods();
+  for (Method& method : methods) method.solver = SolverKind::kRankRevealing;
+  return methods;
 }
 
 std::string TextOf(const std::filesystem::path& path) {
@@ -134,10 +134,10 @@ std::string TextOf(const std::filesystem::path& path) {
   return text.str();
 }
 
-Record RunText(const std::string& text, const Column& column, const std::string& profile) {
+Record RunText(const std::string& text, const Method& method, const std::string& profile) {
   const MechanismFile file = ParseMechanism(text, "test.json");
   const Experiment experiment = Single(file);
-  Case one = CaseOf(experiment, file.description.name, column, 1e-6, 0.1);
+  Case one = CaseOf(experiment, file.description.name, method, 1e-6, 0.1);
   one.integrator = profile;
   return RunCase(experiment, one);
 }
@@ -159,11 +159,11 @@ TEST(OtherKinds, UnderAnotherNameGiveTheSameBits) {
           std::regex_replace(std::regex_replace(text, std::regex("\"revolute\""), "\"hinge\""),
                              std::regex("joint_spring"), "echo_spring");
       ASSERT_NE(other, text);
-      for (const Column& column : PublishedColumns()) {
+      for (const Method& method : PublishedMethods()) {
         for (const char* profile : {"dormand-prince", "kvaerno-54"}) {
-          const Record a = RunText(text, column, profile), b = RunText(other, column, profile);
+          const Record a = RunText(text, method, profile), b = RunText(other, method, profile);
           EXPECT_EQ(a.Text("outcome"), "finished") << a.Text("message");
-          EXPECT_EQ(a.Text("state_hash"), b.Text("state_hash")) << name << ToString(column);
+          EXPECT_EQ(a.Text("state_hash"), b.Text("state_hash")) << name << ToString(method);
           EXPECT_EQ(a.Number("energy_error_max"), b.Number("energy_error_max"));
         }
       }
@@ -230,16 +230,16 @@ TEST(OtherKinds, AWheelRollsAsItsClosedFormSays) {
          {with("planar", false, false), with("planar", true, false), with("planar", false, true),
           with("planar", true, true), with("spatial", false, false), with("spatial", true, true)}) {
       const double a = 2.0 * 3.5 / (3.5 + 0.3 / (0.25 * 0.25));
-      for (const Column& column : RankRevealingColumns()) {
-        const Record record = RunFile(file, column, 1e-10, 2.0);
+      for (const Method& method : RankRevealingMethods()) {
+        const Record record = RunFile(file, method, 1e-10, 2.0);
         ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
         const auto* x = std::get_if<std::vector<double>>(record.Find("series.displacement.rail"));
         const auto* turn = std::get_if<std::vector<double>>(record.Find("series.angle.axle"));
-        ASSERT_NE(turn, nullptr) << ToString(column);
+        ASSERT_NE(turn, nullptr) << ToString(method);
         // the motion is a parabola, which the method integrates but for round-off of 100 steps
-        EXPECT_NEAR(turn->back(), -2.0 - a * 2.0 / 0.25, 1e-8) << ToString(column);
+        EXPECT_NEAR(turn->back(), -2.0 - a * 2.0 / 0.25, 1e-8) << ToString(method);
         if (x == nullptr) continue;  // the rail is cut
-        EXPECT_NEAR(x->back(), 0.5 + a * 2.0, 1e-9) << ToString(column);
+        EXPECT_NEAR(x->back(), 0.5 + a * 2.0, 1e-9) << ToString(method);
       }
     }
   });
@@ -285,11 +285,11 @@ TEST(OtherKinds, TheExampleKeepsItsBalance) {
     RegisterForce<own::Friction>();
     const MechanismFile file = ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /
                                              "examples/own-parts/mechanism.json");
-    for (const Column& column : RankRevealingColumns()) {
-      const Record record = RunFile(file, column, 1e-9, 2.0);
+    for (const Method& method : RankRevealingMethods()) {
+      const Record record = RunFile(file, method, 1e-9, 2.0);
       ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
       // 1e3 tolerances, for the some hundred steps of a motion with sharp friction
-      EXPECT_LE(record.Number("energy_error_max"), 1e-6) << ToString(column);
+      EXPECT_LE(record.Number("energy_error_max"), 1e-6) << ToString(method);
       EXPECT_GT(record.Number("energy_dissipated"), 0.01);
     }
   });

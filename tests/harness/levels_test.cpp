@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "examples/own-parts/half_velocity.h"
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/cli/schema.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/suite/reference_cases.h"
@@ -170,7 +170,7 @@ TEST(LevelsTest, ADerivativeIsThatOfTheGains) {
   InChild([] {
     RegisterLevel(Feedback());
     Experiment experiment = Asking(R"("spring", "baumgarte")", R"(, "integrator": "trbdf2")");
-    experiment.columns[1].gains = {3.0, 4.0};
+    experiment.methods[1].gains = {3.0, 4.0};
     const std::vector<Record> records = RecordsOf(experiment);
     EXPECT_EQ(records[0].Text("state_hash"), records[1].Text("state_hash"));
     EXPECT_EQ(records[0].Number("newton_failures"), records[1].Number("newton_failures"));
@@ -203,7 +203,7 @@ TEST(LevelsTest, RunsInSeveralScalarsKnowTheBuiltInOnes) {
     const std::string mistake =
         MistakeOf("\"half-velocity\"", R"(, "precision": {"scalars": ["float", "double"]})");
     ExpectPart(mistake, "found lagrange/half-velocity/joint/rank-revealing");
-    ExpectPart(mistake, "expected columns at levels that come with Loopbench");
+    ExpectPart(mistake, "expected methods at levels that come with Loopbench");
   });
 }
 

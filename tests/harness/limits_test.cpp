@@ -98,9 +98,9 @@ TEST(PrintedFromAChild, AreItsLinesHoweverItEnds) {
 TEST(TimingFamilies, AreMadeWhereTheyAreTimed) {
   Experiment experiment =
       ReadExperiment(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/experiments/paper/paper.json");
-  const Column column;
-  experiment.timing.families = {{"chain", {3, 1'000'000}, {column}},
-                                {"ladder", {1, 1'000'000}, {column}}};
+  const Method method;
+  experiment.timing.families = {{"chain", {3, 1'000'000}, {method}},
+                                {"ladder", {1, 1'000'000}, {method}}};
   const double before = PeakMemory();
   std::size_t members = 0;
   for (const TimingGroup& group : TimingGroups(experiment)) {

@@ -154,12 +154,12 @@ std::set<std::string> RowsIn(const std::string& text) {
   return rows;
 }
 
-TEST_F(LongSweeps, TablesSceneBySceneHaveTheRowsOfOneThatIsHeld) {
+TEST_F(LongSweeps, TablesProblemByProblemHaveTheRowsOfOneThatIsHeld) {
   Call("run long.json --out held");
   Call("run long.json --filter 'mass<1.1' --rerun all --out held");  // some cases twice
   Call("table held --format csv --out held.csv");
   Call("table held --format json --out held.json");
-  const SceneReader reader(folder_ / "held", {});
+  const ProblemReader reader(folder_ / "held", {});
   EXPECT_EQ(reader.samples().size(), 1u) << "all have the same keys";
   std::vector<std::string> warnings;
   int parts = 0;
@@ -202,7 +202,7 @@ TEST_F(LongSweeps, LateParametersHaveColumns) {
   last.Set("case_id", std::string("0123456789abcdef"));
   last.Set("problem_id", std::string("fedcba9876543210"));
   std::ofstream(folder_ / "late/results.jsonl", std::ios::app) << ToJsonLine(last) << "\n";
-  const SceneReader reader(folder_ / "late", {});
+  const ProblemReader reader(folder_ / "late", {});
   EXPECT_EQ(reader.samples().size(), 2u);
   TableCommand command;
   command.store = folder_ / "late";

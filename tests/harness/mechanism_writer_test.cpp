@@ -101,7 +101,7 @@ std::string Everything(const MechanismDescription& d) {
   return text + fmt::format("{} accuracy {}", fmt::join(independent, " "), accuracy);
 }
 
-std::string Everything(const SceneObservation& observe) {
+std::string Everything(const ObservedQuantities& observe) {
   const auto& [branch, form, length] = observe;
   std::string text = fmt::format("length {}", length);
   for (const AngleCombination& combination : branch) {
@@ -123,7 +123,7 @@ MechanismDescription AsInFiles(MechanismDescription d) {
   return d;
 }
 
-void ExpectRoundTrip(const MechanismDescription& d, const SceneObservation& observe = {}) {
+void ExpectRoundTrip(const MechanismDescription& d, const ObservedQuantities& observe = {}) {
   SCOPED_TRACE(d.name);
   const std::string text = MechanismText(d, observe, "any words");
   const MechanismFile read = ParseMechanism(text, "written");
@@ -173,11 +173,11 @@ TEST(MechanismWriter, RandomMechanismsReadBackTheSame) {
 std::string HashOfRun(const MechanismFile& mechanism) {
   Experiment experiment =
       ReadExperiments(kConfigs / "experiments/examples/published-problems.json").front();
-  ExperimentScene scene;
-  scene.name = mechanism.description.name;
-  scene.mechanism = mechanism;
-  scene.horizons = {0.02};
-  experiment.scenes = {scene};
+  ExperimentProblem problem;
+  problem.name = mechanism.description.name;
+  problem.mechanism = mechanism;
+  problem.horizons = {0.02};
+  experiment.problems = {problem};
   Case one = Expand(experiment).front();
   one.rtol = one.atol = 1e-6;
   one.horizon = 0.02;

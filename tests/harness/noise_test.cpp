@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
+#include "harness/timing/calibration.h"
 #include "harness/timing/time_cases.h"
-#include "harness/timing/yardstick.h"
 
 namespace loopbench::harness {
 namespace noise_test {
@@ -81,15 +81,15 @@ TEST(Noise, QuietRoundsAreTheFirstUndisturbedAndThenTheLeastDisturbed) {
   EXPECT_EQ(QuietRounds({150, 140}, 100.0, 3), (Rounds{0, 1}));
 }
 
-TEST(Noise, TheYardstickKnowsItsLeast) {
-  const double one = YardstickNs();
-  EXPECT_LE(YardstickAloneNs(), one);
-  const double known = YardstickAloneNs();
+TEST(Noise, TheCalibrationKnowsItsLeast) {
+  const double one = CalibrationNs();
+  EXPECT_LE(CalibrationBaselineNs(), one);
+  const double known = CalibrationBaselineNs();
   for (int i = 0; i < 10; ++i) {
-    const double again = YardstickNs();
-    EXPECT_GE(again, YardstickAloneNs());
+    const double again = CalibrationNs();
+    EXPECT_GE(again, CalibrationBaselineNs());
   }
-  EXPECT_LE(YardstickAloneNs(), known);
+  EXPECT_LE(CalibrationBaselineNs(), known);
 }
 
 TEST(Noise, TheMachineHasProcessorsAndALoad) {
@@ -103,7 +103,7 @@ TEST(Noise, TheMachineHasProcessorsAndALoad) {
 TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
   Experiment experiment =
       ReadExperiment(std::string(LOOPBENCH_SOURCE_DIR) + "/configs/experiments/paper/paper.json");
-  experiment.scenes.resize(1);
+  experiment.problems.resize(1);
   experiment.timing.horizon = 0.1;
   experiment.timing.repeats = 3;
   experiment.timing.families.clear();
@@ -123,9 +123,9 @@ TEST(TimeTogether, RecordsHoldOrderedStatisticsAndTheAaPair) {
     EXPECT_GE(record.Number("aa_spread_wall"), 0.0);
     EXPECT_EQ(record.Number("aa_spread"), records[0].Number("aa_spread"));
     EXPECT_GE(record.Number("load1"), 0.0);
-    for (const char* yardstick : {"calibration_ns", "calibration_wall_ns"}) {
-      EXPECT_GT(record.Number(yardstick), 1e3);  // 16000 sums of numbers cannot be had in less
-      EXPECT_EQ(record.Number(yardstick), records[0].Number(yardstick));
+    for (const char* calibration : {"calibration_ns", "calibration_wall_ns"}) {
+      EXPECT_GT(record.Number(calibration), 1e3);  // 16000 sums of numbers cannot be had in less
+      EXPECT_EQ(record.Number(calibration), records[0].Number(calibration));
     }
     EXPECT_EQ(record.Number("repeats"), 3);
     EXPECT_GE(record.Number("discarded_repetitions"), 0.0);

@@ -42,7 +42,7 @@ TEST(PeersTest, AreColumnsWithAnIntegratorOfTheirOwn) {
   ASSERT_EQ(cases.size(), 2u);
   EXPECT_EQ(cases[0].keys.Text("integrator"), "trbdf2");
   EXPECT_EQ(cases[0].keys.Text("jacobian"), "forward");
-  EXPECT_EQ(ToString(cases[1].column), "peer/simbody/projection/joint/rank-revealing");
+  EXPECT_EQ(ToString(cases[1].method), "peer/simbody/projection/joint/rank-revealing");
   EXPECT_EQ(cases[1].keys.Text("integrator"), "simbody-merson");
   EXPECT_EQ(cases[1].keys.Find("jacobian"), nullptr);
 }
@@ -50,9 +50,9 @@ TEST(PeersTest, AreColumnsWithAnIntegratorOfTheirOwn) {
 TEST(PeersTest, ThatABuildDoesNotHaveAreNamedWithTheirPlace) {
   Experiment experiment = Read(Asking());
   ExpectPart(Refusal(experiment), "peers.json: /methods: " + std::string(kMessage));
-  experiment.columns.resize(1);
+  experiment.methods.resize(1);
   ExpectPart(Refusal(experiment), "peers.json: /timing/methods: " + std::string(kMessage));
-  experiment.timing.columns.resize(1);
+  experiment.timing.methods.resize(1);
   EXPECT_EQ(Refusal(experiment), "none");
   experiment.timing.families = {{"chain", {3}, {{"peer/simbody", Enforcement::kPosition}}}};
   ExpectPart(Refusal(experiment), "peers.json: /timing/families: " + std::string(kMessage));

@@ -11,7 +11,7 @@
 namespace loopbench::harness {
 namespace precision_report_test {
 
-Record Rung(const std::string& scalar, double rtol, const std::string& outcome = "finished") {
+Record SweepLevel(const std::string& scalar, double rtol, const std::string& outcome = "finished") {
   Record record;
   record.Set("kind", std::string("precision"));
   record.Set("mechanism", std::string("four-bar"));
@@ -30,15 +30,15 @@ Record Rung(const std::string& scalar, double rtol, const std::string& outcome =
 }
 
 std::vector<Record> Ladder() {
-  Record reference = Rung("float128", 1e-25);
+  Record reference = SweepLevel("float128", 1e-25);
   reference.Set("integrator", std::string("gragg"));
   return {reference,
-          Rung("float", 1e-4),
-          Rung("float", 1e-8, "step-too-small"),
-          Rung("float128", 1e-4),
-          Rung("float128", 1e-8),
-          Rung("double", 1e-4),
-          Rung("double", 1e-8)};
+          SweepLevel("float", 1e-4),
+          SweepLevel("float", 1e-8, "step-too-small"),
+          SweepLevel("float128", 1e-4),
+          SweepLevel("float128", 1e-8),
+          SweepLevel("double", 1e-4),
+          SweepLevel("double", 1e-8)};
 }
 
 TEST(PrecisionReportTest, ScalarsStandSideBySideAndTheReferenceLast) {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/reference/cases.h"
@@ -28,20 +28,20 @@ struct Held {
   Record Run(double rtol, double horizon, const std::string& profile = "ode45",
              Coordinates coordinates = Coordinates::kJoint) const {
     Case one = CaseOf(
-        experiment, experiment.scenes.front().name,
+        experiment, experiment.problems.front().name,
         {.formulation = "odca", .enforcement = Enforcement::kVelocity, .coordinates = coordinates},
         rtol, horizon);
     one.integrator = profile;
     return RunCase(experiment, one);
   }
-  PublishedSeries& series() { return *experiment.scenes.front().series; }
+  PublishedSeries& series() { return *experiment.problems.front().series; }
 };
 
 Held Against(const std::string& mechanism, const std::string& series) {
   Held held{Single(ReadMechanism(kConfigs / "mechanisms" / (mechanism + ".json")))};
-  ExperimentScene& scene = held.experiment.scenes.front();
-  scene.series = ReadPublishedSeries(kConfigs / "references" / (series + ".json"),
-                                     &scene.mechanism.description);
+  ExperimentProblem& problem = held.experiment.problems.front();
+  problem.series = ReadPublishedSeries(kConfigs / "references" / (series + ".json"),
+                                       &problem.mechanism.description);
   return held;
 }
 
@@ -72,7 +72,7 @@ TEST(PublishedSeries, PrintedDigitsAreMetAndTellACoarseRunFromTheTruth) {
       EXPECT_EQ(fine.Text("reference"), "published");
       EXPECT_EQ(fine.Text("reference_runs").find(problem.series), 0u);
       EXPECT_EQ(fine.Number("reference_valid_until"), problem.horizon);
-      EXPECT_FALSE(HasDoubt(fine, kErrorDoubt)) << problem.series << fine.Text("warnings");
+      EXPECT_FALSE(HasWarning(fine, kErrorWarning)) << problem.series << fine.Text("warnings");
     }
     const Record coarse = held.Run(problem.coarse, problem.horizon);
     EXPECT_GT(coarse.Number("error_over_uncertainty"), 1.0) << problem.series;
@@ -100,42 +100,44 @@ TEST(PublishedSeries, IsUsedAsFarAsTheHorizonGoesAndChangesNoBit) {
   const Record none = held.Run(1e-8, 0.25);
   EXPECT_EQ(none.Text("reference"), "none: \"iftomm-a01\" begins at 0.5 s, behind the horizon");
   EXPECT_EQ(ErrorsOf(none).size(), 0u);
-  held.experiment.scenes.front().series.reset();
+  held.experiment.problems.front().series.reset();
   const Record alone = held.Run(1e-8, 1.2);
   for (const char* key : {"state_hash", "steps", "rhs_evaluations"}) {
     EXPECT_EQ(alone.Text(key), part.Text(key)) << key;
   }
 }
 
-TEST(PublishedSeries, PlantedErrorsAreMeasuredAndDoubted) {
+TEST(PublishedSeries, PlantedErrorsAreMeasuredAndFlagged) {
   Held held = Against("simple-pendulum", "iftomm-a01");
   held.series().quantities[0].values[1] += 1e-3;
   // the rest is within the printed digits, 7e-7 m
   const Record fine = held.Run(1e-8, 10.0);
   EXPECT_NEAR(fine.Number("error_position_max"), 1e-3, 2e-6);
-  EXPECT_TRUE(HasDoubt(fine, kErrorDoubt)) << "100 times a thousand tolerances";
-  EXPECT_FALSE(HasDoubt(held.Run(1e-5, 10.0), kErrorDoubt)) << "a tenth of a thousand tolerances";
+  EXPECT_TRUE(HasWarning(fine, kErrorWarning)) << "100 times a thousand tolerances";
+  EXPECT_FALSE(HasWarning(held.Run(1e-5, 10.0), kErrorWarning))
+      << "a tenth of a thousand tolerances";
   held.series().quantities[0].accuracy = 2e-3;
   const Record blunt = held.Run(1e-8, 10.0);
-  EXPECT_FALSE(HasDoubt(blunt, kErrorDoubt)) << "it was claimed to no more";
+  EXPECT_FALSE(HasWarning(blunt, kErrorWarning)) << "it was claimed to no more";
   EXPECT_LE(blunt.Number("error_over_uncertainty"), 1.0);
 
   Held turned = Against("andrews-squeezer", "andrews-squeezer");
   turned.series().quantities[4].values[0] += 1e-3;
   const Record angle = turned.Run(1e-8, 0.03);
   EXPECT_NEAR(angle.Number("error_angle_max"), 1e-3, 1e-5);
-  EXPECT_TRUE(HasDoubt(angle, kErrorDoubt));
+  EXPECT_TRUE(HasWarning(angle, kErrorWarning));
   turned.series().quantities[4].values[0] += 2 * std::acos(-1.0) - 1e-3;
   EXPECT_LT(turned.Run(1e-8, 0.03).Number("error_angle_max"), 1e-4) << "a whole turn is none";
 }
 
-TEST(PublishedSeries, ClearsNoOtherDoubt) {
+TEST(PublishedSeries, ClearsNoOtherWarning) {
   // it ends at the horizon and the run meets it; a singular passage remains one all the same
   Record record = Against("simple-pendulum", "iftomm-a01").Run(1e-9, 10.0);
   record.Set("singularity_crossings", std::int64_t{1});
-  EXPECT_TRUE(OwnDoubts(record).find(kSingularDoubt) != std::string::npos);
+  EXPECT_TRUE(OwnWarnings(record).find(kSingularWarning) != std::string::npos);
   record.Set("reference", std::string("long-double"));
-  EXPECT_EQ(OwnDoubts(record).find(kSingularDoubt), std::string::npos) << "a certified one does";
+  EXPECT_EQ(OwnWarnings(record).find(kSingularWarning), std::string::npos)
+      << "a certified one does";
 }
 
 TEST(PublishedSeries, SpeedsAreThoseOfPointsAndJoints) {
@@ -150,8 +152,8 @@ TEST(PublishedSeries, SpeedsAreThoseOfPointsAndJoints) {
       {"body": "crank0", "axis": "angle", "values": [1.5707963267948966], "uncertainty": 1e-12},
       {"joint": "O0", "speed": true, "values": [-1], "uncertainty": 1e-12},
       {"joint": "T1", "speed": true, "values": [0], "uncertainty": 10}]})");
-  ExperimentScene& scene = held.experiment.scenes.front();
-  scene.series = ReadPublishedSeries(file, &scene.mechanism.description);
+  ExperimentProblem& problem = held.experiment.problems.front();
+  problem.series = ReadPublishedSeries(file, &problem.mechanism.description);
   const Record record = held.Run(1e-8, 0.01);
   EXPECT_LE(record.Number("error_over_uncertainty"), 1.0);
   for (const char* key : {"error_velocity_max", "error_angular_velocity_max"}) {

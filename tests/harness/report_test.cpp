@@ -9,12 +9,12 @@
 #include <random>
 
 #include "harness/config/formulations.h"
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/report/html.h"
 #include "harness/report/report_data.h"
 #include "harness/tables/table_view.h"
 #include "tests/harness/cli_fixture.h"
-#include "tests/harness/tradeoff_records.h"
+#include "tests/harness/work_precision_records.h"
 
 namespace loopbench::harness {
 namespace report_test {
@@ -23,10 +23,10 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kHostile =
     "</script><script>alert(1)</script>\"'<b>&`$/\n\xe2\x80\xa8\xff{}\\";
 
-/// Runs with series and timings; the last but one failed, the last is doubted.
+/// Runs with series and timings; the last but one failed, the last is flagged.
 std::vector<Record> SomeRecords() {
   std::vector<Record> records =
-      tradeoff_records::Store({1e-3, 1e-4, 1e-5, 1e-6, 1e-7}, {1, 2, 3, 4, 5});
+      work_precision_records::Store({1e-3, 1e-4, 1e-5, 1e-6, 1e-7}, {1, 2, 3, 4, 5});
   for (Record& record : records) {
     if (record.Text("kind") != "accuracy") continue;
     record.Set("series.drift_t", std::vector<double>{0.0, 1.0, 10.0});
@@ -144,7 +144,7 @@ TEST(Report, CountsAreThoseOfTheTables) {
   const ReportData data = MakeReport(records, {.store = "here"});
   EXPECT_EQ(data.runs, 5u);
   EXPECT_EQ(data.failed, 1u);
-  EXPECT_EQ(data.doubted, 1u);
+  EXPECT_EQ(data.flagged, 1u);
   ASSERT_EQ(data.tables.size(), 2u);
   for (const ReportTable& table : data.tables) {
     EXPECT_EQ(table.rows.size(), MakeTable(records, {.kind = table.kind}).rows.size());
@@ -156,34 +156,34 @@ TEST(Report, CountsAreThoseOfTheTables) {
   EXPECT_EQ(data.findings[0].filter, "outcome=singular");
   EXPECT_EQ(data.findings[1].filter, "warnings~drift");
   ASSERT_EQ(data.costs.size(), 1u);
-  const Tradeoff judged = MakeTradeoff(records, {.error = "error_position_max"});
-  ASSERT_EQ(data.costs[0].tradeoff.problems.size(), judged.problems.size());
+  const WorkPrecision judged = MakeTradeoff(records, {.error = "error_position_max"});
+  ASSERT_EQ(data.costs[0].work_precision.problems.size(), judged.problems.size());
   for (std::size_t i = 0; i < judged.problems[0].rows.size(); ++i) {
-    EXPECT_EQ(data.costs[0].tradeoff.problems[0].rows[i].on_front,
+    EXPECT_EQ(data.costs[0].work_precision.problems[0].rows[i].on_front,
               judged.problems[0].rows[i].on_front);
   }
 }
 
-// Rows are told apart by what differs, and every row is of a scene.
+// Rows are told apart by what differs, and every row is of a problem.
 TEST(Report, NamesSayWhatDiffers) {
   std::vector<Record> records = SomeRecords();
   const ReportData data = MakeReport(records, {.store = "here"});
-  for (const std::string& scene : data.tables[0].scenes) EXPECT_EQ(scene, "four-bar, 10 s");
+  for (const std::string& problem : data.tables[0].problems) EXPECT_EQ(problem, "four-bar, 10 s");
   std::vector<std::string> names = data.tables[0].names;
   std::ranges::sort(names);
   EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
-  // equal names, other mechanisms: two scenes
+  // equal names, other mechanisms: two problems
   records[0].Set("problem_id", std::string("another"));
   const ReportData two = MakeReport(records, {.store = "here"});
-  EXPECT_EQ(two.scenes.size(), 2u);
+  EXPECT_EQ(two.problems.size(), 2u);
 }
 
 TEST(Report, WithoutMotionSaysHowToGetOne) {
   const ReportData data = MakeReport(SomeRecords(), {.store = "nowhere"});
-  ASSERT_EQ(data.scenes.size(), 1u);
-  EXPECT_FALSE(data.scenes[0].picture.has_value());
-  EXPECT_NE(data.scenes[0].missing.find("\"output\""), std::string::npos);
-  EXPECT_NE(data.scenes[0].missing.find("\"reference\""), std::string::npos);
+  ASSERT_EQ(data.problems.size(), 1u);
+  EXPECT_FALSE(data.problems[0].picture.has_value());
+  EXPECT_NE(data.problems[0].missing.find("\"output\""), std::string::npos);
+  EXPECT_NE(data.problems[0].missing.find("\"reference\""), std::string::npos);
 }
 
 // What is drawn is stated where it is less than what there is.
@@ -228,7 +228,7 @@ TEST(Report, HostileNamesAreText) {
     EXPECT_EQ(Count(page, "\xe2\x80\xa8"), 0u);
   }
   const ReportData data = MakeReport(records, {.store = "here"});
-  for (const ReportScene& scene : data.scenes) EXPECT_FALSE(scene.picture.has_value());
+  for (const ReportProblem& problem : data.problems) EXPECT_FALSE(problem.picture.has_value());
 }
 
 TEST(Report, NumbersThatAreNoneAreGaps) {
@@ -266,7 +266,7 @@ TEST(Report, TheMapIsTheJudges) {
   const std::vector<Record> records = SomeRecords();
   const ReportData data = MakeReport(records, {.store = "here", .rules = rules});
   ASSERT_TRUE(data.map.has_value());
-  const FailureMap judged = MakeFailureMap(rules, records);
+  const RobustnessMap judged = MakeRobustnessMap(rules, records);
   for (std::size_t c = 0; c < 2; ++c) {
     EXPECT_EQ(data.map->cells[0][0][c].state, judged.cells[0][0][c].state);
     EXPECT_EQ(data.map->cells[0][0][c].reason, judged.cells[0][0][c].reason);

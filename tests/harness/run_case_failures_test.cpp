@@ -17,7 +17,7 @@ namespace run_case_failures_test {
 using namespace reference;
 
 constexpr double kTolerance = 1e-8;
-const Column kOdcaJoint = Published("odca", Coordinates::kJoint);
+const Method kOdcaJoint = Published("odca", Coordinates::kJoint);
 
 bool IsMeasured(const Record& record, std::string_view key) {
   return IsSet(record, key) && !std::isnan(record.Number(key));
@@ -33,14 +33,14 @@ MechanismFile FourBarWithGround(double length) {
   return file;
 }
 
-class SingularStart : public testing::TestWithParam<Column> {};
+class SingularStart : public testing::TestWithParam<Method> {};
 
 TEST_P(SingularStart, EndsAsSingularAtTimeZero) {
-  for (const char* scene : {"parallelogram-singular-start", "toggle-singular-start"}) {
-    const Record record = RunPaper(scene, GetParam(), kTolerance, 1.0);
-    EXPECT_EQ(record.Text("outcome"), "singular") << scene;
-    EXPECT_EQ(record.Number("t_reached"), 0.0) << scene;
-    EXPECT_NE(record.Text("message").find("singular"), std::string::npos) << scene;
+  for (const char* problem : {"parallelogram-singular-start", "toggle-singular-start"}) {
+    const Record record = RunPaper(problem, GetParam(), kTolerance, 1.0);
+    EXPECT_EQ(record.Text("outcome"), "singular") << problem;
+    EXPECT_EQ(record.Number("t_reached"), 0.0) << problem;
+    EXPECT_NE(record.Text("message").find("singular"), std::string::npos) << problem;
   }
 }
 
@@ -62,13 +62,13 @@ TEST_P(SingularStart, KeepsTheConditionOfTheMatrixThatFailed) {
   EXPECT_LE(record.Number("rcond_min"), 13 * 13 * std::numeric_limits<double>::epsilon());
 }
 
-INSTANTIATE_TEST_SUITE_P(AsPublished, SingularStart, testing::ValuesIn(PublishedColumns()),
-                         [](const auto& column) { return NameOf(column.param); });
+INSTANTIATE_TEST_SUITE_P(AsPublished, SingularStart, testing::ValuesIn(PublishedMethods()),
+                         [](const auto& method) { return NameOf(method.param); });
 
 TEST(UnreachableAssembly, IsARowThatNamesTheLoop) {
   // three bars of 1 m cannot span 5 m
-  for (const Column& column : PublishedColumns()) {
-    const Record record = RunFile(FourBarWithGround(5.0), column, kTolerance, 1.0);
+  for (const Method& method : PublishedMethods()) {
+    const Record record = RunFile(FourBarWithGround(5.0), method, kTolerance, 1.0);
     EXPECT_EQ(record.Text("outcome"), "inconsistent-start");
     EXPECT_NE(record.Text("message").find("\"OC\""), std::string::npos) << record.Text("message");
     EXPECT_NE(record.Text("message").find("residual"), std::string::npos);
@@ -118,11 +118,11 @@ TEST(Limits, OfCpuTimeEndTheRunWhereItStands) {
 
 // What the reader takes a run takes; at the bound itself both refuse (config corpus, Integrator).
 TEST(Limits, OfTolerancesAreThoseOfRuns) {
-  const double least = std::nextafter(kLeastTolerance, 1.0);
+  const double least = std::nextafter(kMinTolerance, 1.0);
   const Record record = RunCase(Paper(), CaseOf(Paper(), "four-bar", kOdcaJoint, least, 0.1));
   EXPECT_NE(record.Text("outcome"), "");
   EXPECT_NE(record.Text("outcome"), "integrator-error") << record.Text("message");
-  EXPECT_THROW(RunCase(Paper(), CaseOf(Paper(), "four-bar", kOdcaJoint, kLeastTolerance, 0.1)),
+  EXPECT_THROW(RunCase(Paper(), CaseOf(Paper(), "four-bar", kOdcaJoint, kMinTolerance, 0.1)),
                std::invalid_argument);
 }
 

@@ -23,7 +23,7 @@ namespace run_case_test {
 using namespace reference;
 
 constexpr double kTolerance = 1e-8;
-const Column kOdcaJoint = Published("odca", Coordinates::kJoint);
+const Method kOdcaJoint = Published("odca", Coordinates::kJoint);
 
 /// A bar that swings about the origin like a point mass at 1 m, released at `angle` from +x.
 MechanismFile BarAt(double angle) {
@@ -39,9 +39,9 @@ MechanismFile BarAt(double angle) {
 }
 
 TEST(FinishedCase, HasAValueInEveryColumnOfTheDriftTable) {
-  // the one scene kind that has a branch and a closed form as well
-  for (const Column& column : PublishedColumns()) {
-    const Record record = RunPaper("parallelogram", column, kTolerance, 0.5);
+  // the one problem kind that has a branch and a closed form as well
+  for (const Method& method : PublishedMethods()) {
+    const Record record = RunPaper("parallelogram", method, kTolerance, 0.5);
     ASSERT_EQ(record.Text("outcome"), "finished");
     EXPECT_EQ(record.Number("t_reached"), 0.5);
     for (const TableColumn& table_column : DriftColumns()) {
@@ -67,7 +67,7 @@ TEST(FinishedCase, MeasuresFiniteNumbers) {
 }
 
 TEST(FinishedCase, RankIsThatOfTheLoopsAndOfAllConstraintsOfTheSet) {
-  Column absolute = kOdcaJoint;
+  Method absolute = kOdcaJoint;
   absolute.coordinates = Coordinates::kAbsolute;
   const Record record = RunPaper("seven-bar", absolute, kTolerance, 0.5);
   EXPECT_EQ(record.Number("rank_min"), 4) << "as in joint coordinates";
@@ -78,7 +78,7 @@ TEST(FinishedCase, RankIsThatOfTheLoopsAndOfAllConstraintsOfTheSet) {
 /// one a step is enough at this tolerance, and what it takes away neither grows nor fades, while
 /// the energy's error, which nothing takes away, grows with time.
 TEST(FinishedCase, CountsProjectionsAndTheirGrowth) {
-  const Column position{.formulation = "odca", .enforcement = Enforcement::kPosition};
+  const Method position{.formulation = "odca", .enforcement = Enforcement::kPosition};
   const Record record = RunPaper("four-bar", position, kTolerance, 300.0);
   ASSERT_EQ(record.Text("outcome"), "finished");
   const double steps = record.Number("steps"), iterations = record.Number("projection_iterations");
@@ -158,18 +158,18 @@ TEST(FinishedCase, KeepsAnglesAndDisplacementsApart) {
 }
 
 TEST(FinishedCase, GivesTheSameBitsTwice) {
-  for (Column column : PublishedColumns()) {
+  for (Method method : PublishedMethods()) {
     for (const SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
-      column.solver = solver;
-      Record first = RunPaper("seven-bar", column, kTolerance, 3.0);
-      Record second = RunPaper("seven-bar", column, kTolerance, 3.0);
-      EXPECT_EQ(first.Text("state_hash"), second.Text("state_hash")) << ToString(column);
+      method.solver = solver;
+      Record first = RunPaper("seven-bar", method, kTolerance, 3.0);
+      Record second = RunPaper("seven-bar", method, kTolerance, 3.0);
+      EXPECT_EQ(first.Text("state_hash"), second.Text("state_hash")) << ToString(method);
       // time alone may differ; in text, where undefined exponents are equal too
       for (const char* time : {"wall_s", "cpu_s"}) {
         first.Set(time, 0.0);
         second.Set(time, 0.0);
       }
-      EXPECT_EQ(ToJsonLine(first), ToJsonLine(second)) << ToString(column);
+      EXPECT_EQ(ToJsonLine(first), ToJsonLine(second)) << ToString(method);
     }
   }
 }

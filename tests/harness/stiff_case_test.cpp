@@ -15,10 +15,11 @@ namespace stiff_case_test {
 
 using namespace reference;
 
-Record RunStiff(const std::string& scene, const Column& column, const std::string& profile,
+Record RunStiff(const std::string& problem, const Method& method, const std::string& profile,
                 double tolerance, double horizon, JacobianKind jacobian = JacobianKind::kForward) {
-  const Experiment experiment = Single(ReadMechanism(kConfigs / "mechanisms" / (scene + ".json")));
-  Case one = CaseOf(experiment, scene, column, tolerance, horizon);
+  const Experiment experiment =
+      Single(ReadMechanism(kConfigs / "mechanisms" / (problem + ".json")));
+  Case one = CaseOf(experiment, problem, method, tolerance, horizon);
   one.integrator = profile;
   one.jacobian = jacobian;
   one.keys = CaseKeys(experiment, one);
@@ -29,7 +30,7 @@ double LastAngle(const Record& record, const std::string& joint) {
   return record.Numbers("series.angle." + joint).back();
 }
 
-class StiffCase : public testing::TestWithParam<Column> {};
+class StiffCase : public testing::TestWithParam<Method> {};
 
 INSTANTIATE_TEST_SUITE_P(EveryFormulation, StiffCase,
                          testing::Values(Published("odca", Coordinates::kJoint),
@@ -60,21 +61,21 @@ TEST_P(StiffCase, ImplicitProfilesFollowTheRigidMotionInFewSteps) {
 // from; a run of some hundred steps adds up to the tolerance.
 TEST_P(StiffCase, JacobiansOfBothKindsGiveTheSameMotionForwardOnesWithFewerEvaluations) {
   struct Run {
-    std::string scene, angle;
+    std::string problem, angle;
     double horizon;
   };
   for (const Run& run : {Run{"elastic-crank", "OA", 0.5}, {"flyball-governor", "Z", 0.5}}) {
     for (const Enforcement level :
          {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
-      Column column = GetParam();
-      column.enforcement = level;
+      Method method = GetParam();
+      method.enforcement = level;
       const auto with = [&](JacobianKind kind) {
         const Record record =
-            RunStiff(run.scene, column, "kennedy-carpenter-43", 1e-7, run.horizon, kind);
+            RunStiff(run.problem, method, "kennedy-carpenter-43", 1e-7, run.horizon, kind);
         EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
         return record;
       };
-      SCOPED_TRACE(run.scene + ", " + ToString(column));
+      SCOPED_TRACE(run.problem + ", " + ToString(method));
       const Record forward = with(JacobianKind::kForward);
       const Record quotients = with(JacobianKind::kFiniteDifference);
       if (HasFailure()) return;
@@ -85,7 +86,7 @@ TEST_P(StiffCase, JacobiansOfBothKindsGiveTheSameMotionForwardOnesWithFewerEvalu
       EXPECT_EQ(forward.Number("newton_rhs_evaluations"), 0);
       EXPECT_LT(evaluations(forward), evaluations(quotients));
       EXPECT_LE(forward.Number("newton_failures"), quotients.Number("newton_failures") + 1);
-      std::cout << run.scene << " " << ToString(column) << ": steps " << forward.Number("steps")
+      std::cout << run.problem << " " << ToString(method) << ": steps " << forward.Number("steps")
                 << " and " << quotients.Number("steps") << ", evaluations " << evaluations(forward)
                 << " and " << evaluations(quotients) << "\n";
     }
@@ -93,21 +94,21 @@ TEST_P(StiffCase, JacobiansOfBothKindsGiveTheSameMotionForwardOnesWithFewerEvalu
 }
 
 TEST(StiffRecords, RecordsOfImplicitProfilesCountNewton) {
-  const Column column = Published("odca", Coordinates::kJoint);
-  const Record record = RunStiff("elastic-crank", column, "kvaerno-54", 1e-6, 0.1);
+  const Method method = Published("odca", Coordinates::kJoint);
+  const Record record = RunStiff("elastic-crank", method, "kvaerno-54", 1e-6, 0.1);
   EXPECT_EQ(record.Text("jacobian"), "forward");
   EXPECT_GE(record.Number("newton_jacobians"), record.Number("steps"));
   // eight components, eight columns at once
   EXPECT_EQ(record.Number("newton_rhs_evaluations"), 0);
   EXPECT_EQ(record.Number("newton_dual_evaluations"), record.Number("newton_jacobians"));
   const Record quotients =
-      RunStiff("elastic-crank", column, "kvaerno-54", 1e-6, 0.1, JacobianKind::kFiniteDifference);
+      RunStiff("elastic-crank", method, "kvaerno-54", 1e-6, 0.1, JacobianKind::kFiniteDifference);
   EXPECT_EQ(quotients.Text("jacobian"), "finite-difference");
   EXPECT_EQ(quotients.Number("newton_rhs_evaluations"), 8 * quotients.Number("newton_jacobians"));
   EXPECT_EQ(quotients.Number("newton_dual_evaluations"), 0);
   EXPECT_GT(record.Number("newton_iterations"), record.Number("steps"));
   EXPECT_GE(record.Number("newton_failures"), 0);
-  const Record plain = RunStiff("four-bar", column, "ode45", 1e-6, 0.1);
+  const Record plain = RunStiff("four-bar", method, "ode45", 1e-6, 0.1);
   EXPECT_EQ(plain.Find("newton_iterations"), nullptr);
   EXPECT_EQ(plain.Find("jacobian"), nullptr);
 }

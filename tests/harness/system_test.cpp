@@ -21,10 +21,10 @@ using namespace reference;
 
 /// A shipped planar mechanism with a formulation at its start.
 struct Scene {
-  explicit Scene(const std::string& name, const Column& column)
+  explicit Scene(const std::string& name, const Method& method)
       : description(ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description),
-        mechanism(description, column.coordinates),
-        system(MakeFormulation<Planar>(column, mechanism)) {
+        mechanism(description, method.coordinates),
+        system(MakeFormulation<Planar>(method, mechanism)) {
     const Start<double> start = Assemble<Planar>(description, mechanism);
     EXPECT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
     y.resize(static_cast<std::size_t>(system->state_size()));
@@ -40,7 +40,7 @@ struct Scene {
   std::vector<double> y;
 };
 
-const Column kColumn{"odca", Enforcement::kAcceleration, Coordinates::kJoint,
+const Method kColumn{"odca", Enforcement::kAcceleration, Coordinates::kJoint,
                      SolverKind::kRankRevealing};
 
 TEST(SystemTest, EvaluatesAfreshForAJacobianWhereItHasMovedAway) {

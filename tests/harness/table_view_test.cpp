@@ -199,11 +199,11 @@ TEST(TableView, WhatChosenColumnsHideIsSaidInEveryFormat) {
       MakeTable(std::vector<Record>{Ensemble()}, {.columns = {"growth_exponent"}}).notes.empty());
 }
 
-TEST(TableView, DoubtfulRowsHaveTheMarkOfTheCaptionAndTheirReasonsInTheDocument) {
-  Record doubtful = SingleRun();
-  doubtful.Set("warnings", std::string("energy"));
-  doubtful.Set("energy_error_relative", 0.03);
-  const std::vector<Record> records = {Ensemble(), doubtful};
+TEST(TableView, FlaggedRowsHaveTheMarkOfTheCaptionAndTheirReasonsInTheDocument) {
+  Record flagged = SingleRun();
+  flagged.Set("warnings", std::string("energy"));
+  flagged.Set("energy_error_relative", 0.03);
+  const std::vector<Record> records = {Ensemble(), flagged};
   const TableView bare{.compact = true, .columns = {"formulation", "growth_exponent"}};
   const std::string text = ToLatex(MakeTable(records, bare));
   EXPECT_NE(text.find("1 of 2 rows"), std::string::npos) << text;

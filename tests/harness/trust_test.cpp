@@ -1,4 +1,4 @@
-// Planted wrong results: each is doubted, by the reference where there is one and by what runs say
+// Planted wrong results: each is flagged, by the reference where there is one and by what runs say
 // of themselves and of each other where there is none; and right ones are not.
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/doubts.h"
 #include "harness/analysis/model_warnings.h"
+#include "harness/analysis/warnings.h"
 #include "harness/reference/error_meter.h"
 #include "harness/run/case_identity.h"
 #include "harness/text/files.h"
@@ -26,16 +26,16 @@ MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
 }
 
-Record RunOne(const MechanismFile& file, const Column& column, double rtol, double horizon,
+Record RunOne(const MechanismFile& file, const Method& method, double rtol, double horizon,
               const Reference* reference = nullptr) {
   const Experiment experiment = Single(file);
-  return RunCase(experiment, CaseOf(experiment, file.description.name, column, rtol, horizon),
+  return RunCase(experiment, CaseOf(experiment, file.description.name, method, rtol, horizon),
                  reference);
 }
 
-const Column kOdca{.formulation = "odca"};
-const Column kOdcaPosition{.formulation = "odca", .enforcement = kPosition};
-const Column kMultipliers{.formulation = "lagrange", .enforcement = kVelocity};
+const Method kOdca{.formulation = "odca"};
+const Method kOdcaPosition{.formulation = "odca", .enforcement = kPosition};
+const Method kMultipliers{.formulation = "lagrange", .enforcement = kVelocity};
 
 /// `wrong` with the name of what it pretends to be.
 Record Disguised(Record wrong, const Record& as) {
@@ -45,19 +45,19 @@ Record Disguised(Record wrong, const Record& as) {
   return wrong;
 }
 
-/// The runs of two columns at three tolerances.
+/// The runs of two methods at three tolerances.
 std::vector<Record> Good(const MechanismFile& file, double horizon,
                          const Reference* reference = nullptr) {
   std::vector<Record> records;
-  for (const Column& column : {kOdcaPosition, kMultipliers}) {
+  for (const Method& method : {kOdcaPosition, kMultipliers}) {
     for (const double rtol : {1e-6, 1e-8, 1e-10}) {
-      records.push_back(RunOne(file, column, rtol, horizon, reference));
+      records.push_back(RunOne(file, method, rtol, horizon, reference));
     }
   }
   return records;
 }
 
-std::string AllDoubts(const std::vector<Record>& records) {
+std::string AllWarnings(const std::vector<Record>& records) {
   std::string all;
   for (const Record& record : records) all += "[" + record.Text("warnings") + "]";
   return all;
@@ -72,14 +72,14 @@ MechanismFile Driven(double torque) {
 
 TEST(Trust, TorqueOfTheWrongSignInOneColumn) {
   std::vector<Record> records = Good(Driven(0.5), 2.0);
-  SetDoubts(&records);
-  EXPECT_EQ(AllDoubts(records), "[][][][][][]");
-  // the finest of the second column
+  SetWarnings(&records);
+  EXPECT_EQ(AllWarnings(records), "[][][][][][]");
+  // the finest of the second method
   records[5] = Disguised(RunOne(Driven(-0.5), kMultipliers, 1e-10, 2.0), records[5]);
-  SetDoubts(&records);
-  EXPECT_TRUE(HasDoubt(records[5], kDisagreementDoubt)) << AllDoubts(records);
-  // and with it the column's runs at no finer tolerance come nearer to it
-  EXPECT_TRUE(HasDoubt(records[4], kRefinementDoubt)) << AllDoubts(records);
+  SetWarnings(&records);
+  EXPECT_TRUE(HasWarning(records[5], kDisagreementWarning)) << AllWarnings(records);
+  // and with it the method's runs at no finer tolerance come nearer to it
+  EXPECT_TRUE(HasWarning(records[4], kRefinementWarning)) << AllWarnings(records);
 }
 
 TEST(Trust, ToleranceThatIsNotHeeded) {
@@ -88,13 +88,13 @@ TEST(Trust, ToleranceThatIsNotHeeded) {
   for (const double rtol : {1e-6, 1e-8, 1e-10}) {
     records.push_back(RunOne(file, kOdcaPosition, rtol, 5.0));
   }
-  SetDoubts(&records);
-  EXPECT_EQ(AllDoubts(records), "[][][]");
+  SetWarnings(&records);
+  EXPECT_EQ(AllWarnings(records), "[][][]");
   const Record coarse = records[0];
   for (Record& record : records) record = Disguised(coarse, record);
-  SetDoubts(&records);
+  SetWarnings(&records);
   for (const Record& record : records) {
-    EXPECT_TRUE(HasDoubt(record, kRefinementDoubt)) << AllDoubts(records);
+    EXPECT_TRUE(HasWarning(record, kRefinementWarning)) << AllWarnings(records);
   }
 }
 
@@ -108,19 +108,19 @@ TEST(Trust, RefinementThatComesNoNearer) {
   MechanismFile other = file;
   other.description.initial.coordinates.front().values.front() += 1e-2;
   records[3] = Disguised(RunOne(other, kOdcaPosition, 1e-10, 5.0), records[3]);
-  SetDoubts(&records);
-  EXPECT_FALSE(HasDoubt(records[0])) << AllDoubts(records);
-  EXPECT_TRUE(HasDoubt(records[2], kRefinementDoubt)) << AllDoubts(records);
-  EXPECT_TRUE(HasDoubt(records[3], kRefinementDoubt)) << AllDoubts(records);
+  SetWarnings(&records);
+  EXPECT_FALSE(HasWarning(records[0])) << AllWarnings(records);
+  EXPECT_TRUE(HasWarning(records[2], kRefinementWarning)) << AllWarnings(records);
+  EXPECT_TRUE(HasWarning(records[3], kRefinementWarning)) << AllWarnings(records);
 }
 
 TEST(Trust, RedundantLoopThatDrifts) {
-  // with its redundant rows kept, and softened where they must be, Bennett's loop opens
+  // with its redundant rows kept, and regularized where they must be, Bennett's loop opens
   Experiment experiment = Single(Shipped("bennett"));
   experiment.compile.redundancy = false;
   const Record record = RunCase(experiment, CaseOf(experiment, "bennett", kOdca, 1e-8, 50.0));
   ASSERT_EQ(record.Text("outcome"), "finished");
-  EXPECT_TRUE(HasDoubt(record, kDriftDoubt)) << record.Number("drift_position_max");
+  EXPECT_TRUE(HasWarning(record, kDriftWarning)) << record.Number("drift_position_max");
 }
 
 TEST(Trust, DriveThatStepsPassBy) {
@@ -131,10 +131,10 @@ TEST(Trust, DriveThatStepsPassBy) {
       .value = Harmonic{.mean = 0.0, .amplitude = 5e-3, .omega = 2000.0, .phase = 0.3}});
   const Record aliased = RunOne(file, kOdca, 1e-3, 2.0);
   ASSERT_EQ(aliased.Text("outcome"), "finished");
-  EXPECT_TRUE(HasDoubt(aliased, kDriveDoubt)) << aliased.Number("step_longest");
+  EXPECT_TRUE(HasWarning(aliased, kDriveWarning)) << aliased.Number("step_longest");
   EXPECT_EQ(aliased.Number("drive_frequency"), 2000.0);
   const Record seen = RunOne(file, kOdca, 1e-12, 0.2);
-  EXPECT_FALSE(HasDoubt(seen, kDriveDoubt)) << seen.Number("step_longest");
+  EXPECT_FALSE(HasWarning(seen, kDriveWarning)) << seen.Number("step_longest");
 }
 
 TEST(Trust, StepControlThatStruggles) {
@@ -144,11 +144,11 @@ TEST(Trust, StepControlThatStruggles) {
   EXPECT_GE(record.Number("step_longest"), record.Number("step_shortest"));
   Record failing = record;
   failing.Set("rejected", static_cast<std::int64_t>(record.Number("steps")) + 20);
-  EXPECT_EQ(OwnDoubts(failing), kStepsDoubt);
+  EXPECT_EQ(OwnWarnings(failing), kStepsWarning);
   Record floor = record;
   floor.Set("step_shortest", 1e-13);
   floor.Set("step_shortest_t", 0.5);
-  EXPECT_EQ(OwnDoubts(floor), kStepsDoubt);
+  EXPECT_EQ(OwnWarnings(floor), kStepsWarning);
 }
 
 #ifdef LOOPBENCH_PRECISIONS
@@ -231,13 +231,13 @@ TEST(Trust, TheReferenceDecidesWhoIsRight) {
         file, {.formulation = level == kVelocity ? "reduction" : "odca", .enforcement = level},
         1e-8, 1.0, &reference));
   }
-  SetDoubts(&records);
+  SetWarnings(&records);
   if (reference.trust_horizon == 1.0) {
     EXPECT_EQ(records[1].Text("warnings"), "") << records[1].Number("error_position_end");
-    EXPECT_TRUE(HasDoubt(records[0], kErrorDoubt)) << AllDoubts(records);
+    EXPECT_TRUE(HasWarning(records[0], kErrorWarning)) << AllWarnings(records);
   } else {
-    EXPECT_TRUE(HasDoubt(records[0], kSingularDoubt)) << AllDoubts(records);
-    EXPECT_TRUE(HasDoubt(records[1], kDisagreementDoubt)) << AllDoubts(records);
+    EXPECT_TRUE(HasWarning(records[0], kSingularWarning)) << AllWarnings(records);
+    EXPECT_TRUE(HasWarning(records[1], kDisagreementWarning)) << AllWarnings(records);
   }
 }
 
@@ -246,12 +246,12 @@ TEST(Trust, WrongResultsAloneAreSeenByTheReference) {
   const Reference reference = ReferenceOf(right, 1.0);
   EXPECT_EQ(RunOne(right, kOdcaPosition, 1e-8, 1.0, &reference).Text("warnings"), "");
   Record wrong = RunOne(Driven(-0.5), kOdcaPosition, 1e-8, 1.0, &reference);
-  EXPECT_TRUE(HasDoubt(wrong, kErrorDoubt)) << wrong.Text("warnings");
+  EXPECT_TRUE(HasWarning(wrong, kErrorWarning)) << wrong.Text("warnings");
   // a tolerance that is not heeded
   const Record coarse = RunOne(right, kOdcaPosition, 1e-3, 1.0, &reference);
   Record disguised = coarse;
   disguised.Set("rtol", 1e-9);
-  EXPECT_NE(OwnDoubts(disguised).find(kErrorDoubt), std::string::npos)
+  EXPECT_NE(OwnWarnings(disguised).find(kErrorWarning), std::string::npos)
       << coarse.Number("error_position_max");
 }
 

@@ -259,7 +259,7 @@ TEST(View, LargeOnesAreBounded) {
   // all bars are seen: some four paths each
   EXPECT_LT(ToSvg(chain, {}).size(), 5'000'000u);
   for (const PictureMotion& motion : chain.motions) {
-    EXPECT_LE(motion.frames.size() * chain.bodies, kMostFrames);
+    EXPECT_LE(motion.frames.size() * chain.bodies, kMaxFrames);
   }
 }
 

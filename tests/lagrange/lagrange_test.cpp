@@ -154,7 +154,7 @@ Outcome Evaluate(Sparse& system, const Mechanism<Planar, double>& mechanism, dou
   return system->Evaluate(0.0, q, u, udot);
 }
 
-TEST(Lagrange, LeavesDoubtfulPositionsToTheDenseEquations) {
+TEST(Lagrange, LeavesSuspiciousPositionsToTheDenseEquations) {
   const Mechanism<Planar, double> mechanism(Ladder(3, 1.0, 0.0), Coordinates::kJoint);
   Sparse system(mechanism);
   EXPECT_EQ(Evaluate(system, mechanism, 1.0), Outcome::kFinished);
@@ -169,9 +169,10 @@ TEST(Lagrange, LeavesDoubtfulPositionsToTheDenseEquations) {
   EXPECT_TRUE(system.solver().is_sparse());
 }
 
-/// What is answered sparsely is right: O-DCA, which judges joint by joint, softens nothing there
-/// and has the same accelerations. Dense equations judge all loops at once, whose responses are the
-/// wider apart the more there are: from some 50 windows on they soften where sparse ones answer.
+/// What is answered sparsely is right: O-DCA, which judges joint by joint, regularizes nothing
+/// there and has the same accelerations. Dense equations judge all loops at once, whose responses
+/// are the wider apart the more there are: from some 50 windows on they regularize where sparse
+/// ones answer.
 TEST(Lagrange, AnswersNothingSparselyThatHasLostRank) {
   for (const int windows : {1, 3, 10, 40}) {
     const Mechanism<Planar, double> mechanism(Ladder(windows, 1.0, 0.0), Coordinates::kJoint);
@@ -179,11 +180,11 @@ TEST(Lagrange, AnswersNothingSparselyThatHasLostRank) {
     testing::SystemWith<odca::Odca, Planar, double> odca(mechanism);
     VectorX<double> udot, expected;
     const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
-    double softened_to = 0.0, sparse_from = 1.0, worst = 0.0;
+    double regularized_to = 0.0, sparse_from = 1.0, worst = 0.0;
     for (double angle = 1e-6; angle < 1.0; angle *= 1.3) {
       ASSERT_EQ(Evaluate(system, mechanism, angle), Outcome::kFinished);
       if (!system.solver().is_sparse()) {
-        if (system->diagnostics().smallest_weight < 1.0) softened_to = angle;
+        if (system->diagnostics().smallest_weight < 1.0) regularized_to = angle;
         continue;
       }
       sparse_from = std::min(sparse_from, angle);
@@ -196,8 +197,8 @@ TEST(Lagrange, AnswersNothingSparselyThatHasLostRank) {
       worst = std::max(worst, (udot - expected).norm() / expected.norm() / bound);
     }
     std::printf(
-        "%3d windows: dense equations soften to %.1e rad, sparse from %.1e; %.2g of bound\n",
-        windows, softened_to, sparse_from, worst);
+        "%3d windows: dense equations regularize to %.1e rad, sparse from %.1e; %.2g of bound\n",
+        windows, regularized_to, sparse_from, worst);
     EXPECT_LE(worst, 1.0);
     EXPECT_LT(sparse_from, 0.1);
   }

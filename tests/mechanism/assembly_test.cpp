@@ -47,7 +47,7 @@ TEST(AssemblyTest, AFourBarIsAssembledFromGuesses) {
   const Start<double> start = Assemble(d, mechanism);
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
   EXPECT_EQ(start.q[0], -1.0) << "the held coordinate is untouched";
-  EXPECT_NEAR(start.q[1], 0.841188, 1e-6);  // the scene's numbers, given to six digits
+  EXPECT_NEAR(start.q[1], 0.841188, 1e-6);  // the mechanism's numbers, given to six digits
   EXPECT_NEAR(start.q[2], 1.757330, 1e-6);
   EXPECT_LE(Mismatch(mechanism, start.q), 64 * kEps) << "three bars, about a metre each";
   EXPECT_LE(start.position_residual, 64 * kEps);

@@ -13,26 +13,29 @@ namespace loopbench::testing {
 namespace {
 
 TEST(CompilePlanarTest, TiltedPlanarMechanismsBecomePlanar) {
-  std::vector<MechanismDescription> scenes;
+  std::vector<MechanismDescription> mechanisms;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    scenes.push_back(RandomChain(3 + static_cast<int>(seed), SpaceKind::kPlanar, seed));
-    scenes.push_back(RandomLadder(1 + static_cast<int>(seed % 4), SpaceKind::kPlanar, 50 + seed));
-    scenes.push_back(RandomGraph(1 + static_cast<int>(seed % 3), SpaceKind::kPlanar, 100 + seed));
-    scenes.push_back(MixedGraph(1 + static_cast<int>(seed % 2), SpaceKind::kPlanar, 200 + seed));
+    mechanisms.push_back(RandomChain(3 + static_cast<int>(seed), SpaceKind::kPlanar, seed));
+    mechanisms.push_back(
+        RandomLadder(1 + static_cast<int>(seed % 4), SpaceKind::kPlanar, 50 + seed));
+    mechanisms.push_back(
+        RandomGraph(1 + static_cast<int>(seed % 3), SpaceKind::kPlanar, 100 + seed));
+    mechanisms.push_back(
+        MixedGraph(1 + static_cast<int>(seed % 2), SpaceKind::kPlanar, 200 + seed));
   }
   // the ends of a rod may leave a plane, so it does not qualify
-  std::erase_if(scenes, [](const MechanismDescription& scene) {
-    return std::ranges::find(scene.joints, JointType::kRod, &JointDescription::type) !=
-           scene.joints.end();
+  std::erase_if(mechanisms, [](const MechanismDescription& mechanism) {
+    return std::ranges::find(mechanism.joints, JointType::kRod, &JointDescription::type) !=
+           mechanism.joints.end();
   });
-  ASSERT_GE(scenes.size(), 24u);
-  for (std::size_t i = 0; i < scenes.size(); ++i) {
-    const MechanismDescription tilted = Scramble(scenes[i], 1000 + i);
+  ASSERT_GE(mechanisms.size(), 24u);
+  for (std::size_t i = 0; i < mechanisms.size(); ++i) {
+    const MechanismDescription tilted = Scramble(mechanisms[i], 1000 + i);
     ASSERT_EQ(tilted.space, SpaceKind::kSpatial);
     const Truth truth = MakeTruth<Spatial>(tilted, i);
     Compiled compiled;
     ExpectSameMotion(truth, kOnlyPlanar, &compiled);
-    ASSERT_TRUE(compiled.done.planar) << scenes[i].name << ": " << compiled.report.back();
+    ASSERT_TRUE(compiled.done.planar) << mechanisms[i].name << ": " << compiled.report.back();
     EXPECT_EQ(compiled.parts[0].description.space, SpaceKind::kPlanar);
     EXPECT_EQ(compiled.parts[0].description.joints.size(), tilted.joints.size());
   }

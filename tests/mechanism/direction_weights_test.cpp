@@ -42,7 +42,7 @@ class WindowsTest : public ::testing::TestWithParam<int> {};
 /// The least eigenvalue falls like one over the square of their number, in the best position too.
 /// The pivots that vanish are 0.33 to 1 times the square of the distance whatever the number: at
 /// least 8 theta at 1e-3, at most theta / 40 at 3e-5.
-TEST_P(WindowsTest, SoftenWhereOneWindowDoes) {
+TEST_P(WindowsTest, RegularizeWhereOneWindowDoes) {
   std::vector<int> rows;
   const auto weights_at = [&](double distance) {
     const MatrixX<double> X = ResponseOfLadder(GetParam(), distance, &rows);

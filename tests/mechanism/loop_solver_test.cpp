@@ -57,7 +57,7 @@ TEST(LoopSolverTest, AtFullRankEveryFormIsTheInverse) {
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
     EXPECT_EQ(solver.rank(), 5);
     EXPECT_EQ(solver.smallest_weight(), 1.0);
-    ASSERT_TRUE(solver.FactorSoftened(X));
+    ASSERT_TRUE(solver.FactorRegularized(X));
     EXPECT_LE((Inverse(solver) - inverse).norm(), bound);
   }
 }
@@ -110,7 +110,7 @@ TEST(LoopSolverTest, ApplyTransposedIsTheTransposeOfApply) {
   check();
   solver.FactorGeometric(X);
   check();
-  ASSERT_TRUE(solver.FactorSoftened(X));
+  ASSERT_TRUE(solver.FactorRegularized(X));
   check();
 }
 
@@ -125,7 +125,7 @@ TEST(LoopSolverTest, ExactRedundancyLowersTheRankAndSolvesWhatIsConsistent) {
     solver.FactorGeometric(X_geometric);
     EXPECT_EQ(solver.rank(), 3);
     EXPECT_LT(solver.smallest_weight(), 1e-10);
-    ASSERT_TRUE(solver.FactorSoftened(X));
+    ASSERT_TRUE(solver.FactorRegularized(X));
     const VectorX<double> rhs = X * RandomMatrix(5, 1, seed + 200);
     const VectorX<double> x = Inverse(solver) * rhs;
     // the regular part of X has a condition of up to 1e5 in these draws
@@ -133,7 +133,7 @@ TEST(LoopSolverTest, ExactRedundancyLowersTheRankAndSolvesWhatIsConsistent) {
   }
 }
 
-TEST(LoopSolverTest, SofteningRefusesWhatRoundingMadeIndefinite) {
+TEST(LoopSolverTest, RegularizationRefusesWhatRoundingMadeIndefinite) {
   const MatrixX<double> A = RandomMatrix(5, 8, 1), X = A * A.transpose();
   LoopSolver<double> solver(kRows);
   SetScales(solver, X);
@@ -142,7 +142,7 @@ TEST(LoopSolverTest, SofteningRefusesWhatRoundingMadeIndefinite) {
   const VectorX<double> a = RandomMatrix(5, 1, 2);
   MatrixX<double> lost = a * a.transpose();
   lost.diagonal() *= 1.0 - 4 * kEps;
-  EXPECT_FALSE(solver.FactorSoftened(lost));
+  EXPECT_FALSE(solver.FactorRegularized(lost));
 }
 
 TEST(LoopSolverTest, PlainFactorisationRefusesALostPivot) {

@@ -312,7 +312,8 @@ TEST(NearlyPlanarTest, TiltsBeyondTheLimitAndOtherJointsPreventIt) {
 }
 
 TEST(IslandsTest, PartsThatCannotMoveAreNoModels) {
-  const Idea& islands = *std::ranges::find(Ideas(), "islands", &Idea::name);
+  const SimplificationRule& islands =
+      *std::ranges::find(SimplificationRules(), "islands", &SimplificationRule::name);
   const Simplified simplified = islands.apply(Shipped("truss"), {}, {});
   ASSERT_TRUE(simplified.applies());
   EXPECT_EQ(simplified.parts.size(), 1u);
@@ -322,8 +323,8 @@ TEST(IslandsTest, PartsThatCannotMoveAreNoModels) {
 }
 
 TEST(CombineTest, SaysWhichIdeasDidWhat) {
-  std::vector<const Idea*> ideas;
-  for (const Idea& idea : Ideas()) ideas.push_back(&idea);
+  std::vector<const SimplificationRule*> ideas;
+  for (const SimplificationRule& idea : SimplificationRules()) ideas.push_back(&idea);
   const Simplified nothing = Combine(Shipped("four-bar"), ideas, {}, {});
   EXPECT_FALSE(nothing.applies());
   EXPECT_TRUE(nothing.done.empty());
@@ -347,7 +348,7 @@ TEST(SimplifiedTest, RandomMechanismsHaveModelsThatStart) {
       SimplifyOptions options;
       options.light_links = 1.0;
       options.stiff_springs = 1e-3;
-      for (const Idea& idea : Ideas()) {
+      for (const SimplificationRule& idea : SimplificationRules()) {
         const Simplified simplified = idea.apply(d, run, options);
         if (!simplified.applies()) continue;
         ++applied;

@@ -38,9 +38,9 @@ TEST(StructureTest, FourBarHasOneLoopThroughAllItsJoints) {
 }
 
 TEST(StructureTest, PlanarLoopInSpaceHasThreeNamedRedundantDirections) {
-  MechanismDescription scene = Shipped("four-bar");
-  scene.space = SpaceKind::kSpatial;
-  const Structure s = AnalyseStructure(scene);
+  MechanismDescription mechanism = Shipped("four-bar");
+  mechanism.space = SpaceKind::kSpatial;
+  const Structure s = AnalyseStructure(mechanism);
   EXPECT_EQ(s.counted_freedom, -2) << "6 * 3 - 5 * 4";
   EXPECT_EQ(s.freedom(), 1);
   EXPECT_EQ(s.rank, 2);
@@ -172,9 +172,9 @@ TEST(StructureTest, TriangleOfBarsIsLocked) {
 }
 
 TEST(StructureTest, LoopThatCannotCloseIsMeasured) {
-  MechanismDescription scene = Shipped("four-bar");
-  scene.joints[3].to.position.x() = 5.0;  // the first bar is held, the others reach 2 m
-  const Structure s = AnalyseStructure(scene);
+  MechanismDescription mechanism = Shipped("four-bar");
+  mechanism.joints[3].to.position.x() = 5.0;  // the first bar is held, the others reach 2 m
+  const Structure s = AnalyseStructure(mechanism);
   EXPECT_EQ(s.start.outcome, Outcome::kInconsistentStart);
   ASSERT_EQ(s.loops.size(), 1u);
   // a minimum of the squared gap: known to the square root of round-off

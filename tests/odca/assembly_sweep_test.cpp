@@ -20,7 +20,7 @@ std::unique_ptr<AssemblySweep> Make(const Model& mechanism, const PlanOptions& o
 }
 
 struct Tally {
-  int states = 0, refused = 0, softened = 0, answered_though_softened = 0;
+  int states = 0, refused = 0, regularized = 0, answered_though_regularized = 0;
   double worst = 0.0;
 };
 /// Joints may have drifted apart by as much as they please.
@@ -30,10 +30,11 @@ void Hold(const Model& mechanism, const PlanOptions& options, const Numbers& q, 
     const auto sweep = Make(mechanism, options);
     const Both both = Compare<Planar>(mechanism, sweep.get(), speeds, q, u, options);
     ++tally.states;
-    const bool softened = both.outcome != Outcome::kFinished || both.general.smallest_weight < 1.0;
-    tally.softened += softened;
-    tally.answered_though_softened += both.evaluated && softened;
-    if (softened) continue;
+    const bool regularized =
+        both.outcome != Outcome::kFinished || both.general.smallest_weight < 1.0;
+    tally.regularized += regularized;
+    tally.answered_though_regularized += both.evaluated && regularized;
+    if (regularized) continue;
     if (!both.evaluated) {
       // as along paths, 0.004 at most for these arms and radii
       EXPECT_LT(both.general.rcond, 0.01) << mechanism.name();
@@ -66,14 +67,14 @@ TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
         }
       }
       std::printf("%d mechanisms, %d states, %d regularized, %d more refused, worst %.2g\n", made,
-                  tally.states, tally.softened, tally.refused, tally.worst);
+                  tally.states, tally.regularized, tally.refused, tally.worst);
       // where a body's pins on Ground close one by one, those of the tree are no joins here, and
       // another pin of the loop is the one that is judged
-      EXPECT_LE(100 * tally.answered_though_softened,
+      EXPECT_LE(100 * tally.answered_though_regularized,
                 closing == Closing::kOneByOne ? tally.states : 0);
       EXPECT_GT(made, 400) << "it has less to multiply but for a few";
       EXPECT_LE(20 * tally.refused, tally.states);
-      EXPECT_LE(2 * tally.softened, tally.states);
+      EXPECT_LE(2 * tally.regularized, tally.states);
     }
   }
 }
@@ -94,7 +95,7 @@ TEST(AssemblySweep, AgreesOnTreesAndGrids) {
   for (const int n : {2, 9}) hold(Grid(2, n, 1.1, -0.7));
   hold(Hub(3, 2, false));
   hold(Hub(3, 3, true));
-  EXPECT_EQ(tally.softened, 0);
+  EXPECT_EQ(tally.regularized, 0);
   EXPECT_EQ(tally.refused, 0);
 }
 

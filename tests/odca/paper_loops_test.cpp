@@ -113,7 +113,7 @@ void HoldCoupledLoops(int num_lower, std::uint64_t seed, Tally& tally) {
                           p.scene.JointTo(p.loops.body3, p.upper_joints.back()));
   const double rcond = std::min({p.rcond(), upper.rcond(), Rcond(loop.chi)});
   ++tally.scenes;
-  if (!(rcond > kLeastRcond)) {
+  if (!(rcond > kMinRcond)) {
     ++tally.left_out;
     return;
   }
@@ -170,7 +170,7 @@ void HoldMisprint(std::uint64_t seed, Tally& tally) {
   constexpr int d = Space::kDim;
   const PaperLoops<Space> p(3, seed);
   ++tally.scenes;
-  if (!(p.rcond() > kLeastRcond)) {
+  if (!(p.rcond() > kMinRcond)) {
     ++tally.left_out;
     return;
   }

@@ -79,7 +79,7 @@ struct Tally {
 };
 
 /// Below this a scene is near a singular position, where numbers say nothing about formulas.
-inline constexpr double kLeastRcond = 1e-5;
+inline constexpr double kMinRcond = 1e-5;
 
 /// A series of bodies: its two-handle equations, and forces and accelerations on the way down.
 template <class Space>

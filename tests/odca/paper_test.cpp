@@ -52,7 +52,7 @@ void HoldChain(const MechanismDescription& description, int n, std::uint64_t see
                           scene.JointTo(n, joints[n]));
   const double rcond = std::min(series.rcond(), Rcond(loop.chi));
   ++tally.scenes;
-  if (!(rcond > kLeastRcond)) {
+  if (!(rcond > kMinRcond)) {
     ++tally.left_out;
     return;
   }

@@ -47,9 +47,9 @@ TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
                                 : Compare(mechanism, GetParam(), q, u);
       ASSERT_EQ(both.outcome, Outcome::kFinished);
       ++states;
-      // What the general sweep softens is not to be had here. What is refused is near that: limits
-      // are 1e-4 of traces, of which the smallest eigenvalue is a twentieth at least for these arms
-      // and radii, and det / trace is half the smallest of X at least: 0.004.
+      // What the general sweep regularizes is not to be had here. What is refused is near that:
+      // limits are 1e-4 of traces, of which the smallest eigenvalue is a twentieth at least for
+      // these arms and radii, and det / trace is half the smallest of X at least: 0.004.
       EXPECT_TRUE(!both.evaluated || both.general.smallest_weight == 1.0) << path.name;
       if (!both.evaluated) {
         ++(is_long ? refused_long : refused);
@@ -202,12 +202,12 @@ TEST_P(PathSweepTest, AllocatesNothing) {
   }
 }
 
-/// Cranks at an angle from the line in which all bars lie: wherever the general sweep softens, by
-/// whatever order of joins, the short cut must not answer. It stops answering at 20 times the
+/// Cranks at an angle from the line in which all bars lie: wherever the general sweep regularizes,
+/// by whatever order of joins, the short cut must not answer. It stops answering at 20 times the
 /// angle.
-TEST(PathSweep, LeavesWhatIsSoftenedToTheGeneralSweep) {
+TEST(PathSweep, LeavesWhatIsRegularizedToTheGeneralSweep) {
   for (const int windows : {1, 3, 10, 40, 200}) {
-    double softened = 0.0, answered = 1.0;
+    double regularized = 0.0, answered = 1.0;
     for (double angle = 1e-5; angle < 0.3; angle *= 1.3) {
       const MechanismDescription ladder = Ladder(windows, angle, 0.5);
       const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
@@ -217,13 +217,13 @@ TEST(PathSweep, LeavesWhatIsSoftenedToTheGeneralSweep) {
         q[mechanism.joints()[start.joint].q_offset] = start.values[0];
       }
       const Both both = Compare(mechanism, SpeedsUsed::kGiven, q, u);
-      if (both.general.smallest_weight < 1.0) softened = std::max(softened, angle);
+      if (both.general.smallest_weight < 1.0) regularized = std::max(regularized, angle);
       if (both.evaluated) answered = std::min(answered, angle);
     }
-    std::printf("%3d windows: regularized to %.1e rad, answered from %.1e\n", windows, softened,
+    std::printf("%3d windows: regularized to %.1e rad, answered from %.1e\n", windows, regularized,
                 answered);
-    EXPECT_GT(softened, 1e-4) << windows;
-    EXPECT_LT(softened, answered) << windows;
+    EXPECT_GT(regularized, 1e-4) << windows;
+    EXPECT_LT(regularized, answered) << windows;
     EXPECT_LT(answered, 0.2) << windows << ": it serves somewhere";
   }
 }

@@ -60,8 +60,8 @@ class ShippedAccelerations : public testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedAccelerations, AreSimbodys) {
   const MechanismFile file = reference::Shipped(GetParam());
-  const CompiledScene scene = CompileScene(file.description, file.observe, {});
-  for (const auto& [description, images] : scene.compiled.parts) {
+  const SimplifiedProblem problem = SimplifyProblem(file.description, file.observe, {});
+  for (const auto& [description, images] : problem.compiled.parts) {
     for (const double t : {0.0, ShortHorizon(GetParam())}) {
       try {
         description.space == SpaceKind::kPlanar ? Compare<Planar>(description, t)

@@ -137,7 +137,7 @@ class StartOfOurs {
   AtStart made_;
 };
 
-inline AtStart OursAtStart(const MechanismDescription& description) {
+inline AtStart LoopbenchInitialState(const MechanismDescription& description) {
   return description.space == SpaceKind::kPlanar ? StartOfOurs<Planar>(description).Result()
                                                  : StartOfOurs<Spatial>(description).Result();
 }

@@ -20,7 +20,7 @@
 namespace loopbench::harness {
 namespace peers_export_mjcf_test {
 
-using exchange::NotThere;
+using exchange::Unsupported;
 using peers_test::AtStart;
 using peers_test::kEps;
 using peers_test::Largest;
@@ -105,12 +105,12 @@ TEST_P(ShippedMjcf, HasOurAccelerationsAtTheStart) {
   std::string text;
   try {
     text = exchange::Export(description, kMjcf).text;
-  } catch (const NotThere& missing) {
+  } catch (const Unsupported& missing) {
     // the command says so (tests/harness/export_test.cpp)
     EXPECT_TRUE(GetParam() == "driven-four-bar" || GetParam() == "screw-jack") << missing.what();
     return;
   }
-  const AtStart ours = peers_test::OursAtStart(description);
+  const AtStart ours = peers_test::LoopbenchInitialState(description);
   Loaded loaded(Write(GetParam(), text));
   ExpectBodies(ours, loaded);
   const exchange::Model model = exchange::MakeModelAtStart(description);
@@ -171,7 +171,7 @@ int CompareTrees(SpaceKind space) {
       EXPECT_LE(testing::RelativeError(theirs, sample.udot(Coordinates::kJoint)), sample.Bound())
           << tree.name;
       ++compared;
-    } catch (const NotThere& missing) {
+    } catch (const Unsupported& missing) {
       EXPECT_NE(std::string(missing.what()).find("helical"), std::string::npos) << missing.what();
     }
   }
@@ -188,7 +188,7 @@ TEST(ExportedMjcf, IsLoadedAsDeepAsItIsWritten) {
     MechanismDescription chain = Tree(bodies, 0.0);  // each bar below the one before
     for (int i = 1; i < bodies; ++i) chain.joints[static_cast<std::size_t>(i)].from.body = i;
     if (bodies == 91) {
-      EXPECT_THROW(exchange::Export(chain, kMjcf), NotThere);
+      EXPECT_THROW(exchange::Export(chain, kMjcf), Unsupported);
     } else {
       EXPECT_EQ(Loaded(Write("deep", exchange::Export(chain, kMjcf).text)).model().nbody, 91);
     }

@@ -23,7 +23,7 @@ namespace loopbench::harness {
 namespace peers_export_simbody_test {
 
 namespace fs = std::filesystem;
-using exchange::NotThere;
+using exchange::Unsupported;
 using peers_test::AtStart;
 using peers_test::kEps;
 using peers_test::LargestDifference;
@@ -150,7 +150,7 @@ TEST(ExportedSimbody, HasOurAccelerationsAndMotion) {
   for (const std::string& name : reference::ShippedNames()) {
     try {
       texts[name] = exchange::Export(reference::Shipped(name).description, kSimbody).text;
-    } catch (const NotThere&) {
+    } catch (const Unsupported&) {
       // the command says so (tests/harness/export_test.cpp)
       EXPECT_TRUE(name == "driven-four-bar" || name == "screw-jack") << name;
     }
@@ -158,7 +158,7 @@ TEST(ExportedSimbody, HasOurAccelerationsAndMotion) {
   const Programs programs(texts);
   for (const auto& [name, text] : texts) {
     SCOPED_TRACE(name);
-    const AtStart ours = peers_test::OursAtStart(reference::Shipped(name).description);
+    const AtStart ours = peers_test::LoopbenchInitialState(reference::Shipped(name).description);
     const Json start = programs.Run({name});
     const double accelerations = ExpectStart(ours, start);
     const double horizon = Horizon(name);
@@ -213,7 +213,7 @@ TEST(ExportedSimbody, OfJointsOfEveryKindHasTheOraclesAccelerations) {
   for (const auto& [name, one] : drawn) {
     try {
       texts[name] = exchange::WriteSimbodyProgram(one.model).program;
-    } catch (const NotThere& missing) {
+    } catch (const Unsupported& missing) {
       EXPECT_NE(std::string(missing.what()).find("helical"), std::string::npos) << missing.what();
     }
   }
@@ -257,7 +257,7 @@ TEST(ExportedSimbody, HasNamesThatAreOnlyNames) {
   std::size_t bodies = 0;
   for (const Json& body : document["bodies"]) EXPECT_EQ(body["name"], names[bodies++]);
   EXPECT_EQ(bodies, mechanism.bodies.size() - 1);
-  const AtStart ours = peers_test::OursAtStart(mechanism);
+  const AtStart ours = peers_test::LoopbenchInitialState(mechanism);
   ExpectStart(ours, document);
   fs::remove_all(folder);
 }

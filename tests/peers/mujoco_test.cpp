@@ -14,8 +14,8 @@ namespace {
 using harness::reference::RunShipped;
 using harness::reference::Shipped;
 
-const harness::Column kMujoco = {"peer/mujoco", Enforcement::kBaumgarte};
-const harness::Column kOdca = {"odca", Enforcement::kPosition};
+const harness::Method kMujoco = {"peer/mujoco", Enforcement::kBaumgarte};
+const harness::Method kOdca = {"odca", Enforcement::kPosition};
 
 /// Trees of joints of every kind with forces of every kind; how many of them MuJoCo has.
 template <class Space>

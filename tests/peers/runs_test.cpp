@@ -2,7 +2,7 @@
 // a peer does not have is named.
 #include <gtest/gtest.h>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/run/peers.h"
 #include "harness/timing/time_cases.h"
 #include "tests/peers/registered.h"
@@ -14,8 +14,8 @@ namespace peers_runs_test {
 using peers_test::kInexpressible;
 using reference::RunShipped;
 
-const Column kSimbody = {"peer/simbody", Enforcement::kPosition};
-const Column kOdca = {"odca", Enforcement::kPosition};
+const Method kSimbody = {"peer/simbody", Enforcement::kPosition};
+const Method kOdca = {"odca", Enforcement::kPosition};
 
 /// Time of a short run [s]: Andrews' squeezer turns a thousand times as fast as the others, and
 /// Peaucellier's linkage passes a singular position at 0.32 s, where Simbody's energy jumps by 0.3
@@ -57,7 +57,7 @@ TEST_P(ShippedRuns, OfSimbodyEndWhereThoseOfOdcaDo) {
   EXPECT_LE(difference, 100 * kRtol);
   // its projection goes to a tenth of the tolerance, by a norm of all constraints
   EXPECT_LE(theirs.Number("drift_position_max"), kRtol);
-  EXPECT_EQ(OwnDoubts(theirs), "");
+  EXPECT_EQ(OwnWarnings(theirs), "");
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedRuns, testing::ValuesIn(reference::ShippedNames()),
@@ -111,8 +111,8 @@ TEST(PeerRuns, AreEqualWhenRepeated) {
 
 TEST(PeerRuns, AreTimedBesideOthers) {
   Experiment experiment = reference::Single(reference::Shipped("four-bar"));
-  experiment.scenes.front().horizons = {0.1};
-  experiment.timing = {.repeats = 1, .columns = {kOdca, kSimbody}, .families = {}};
+  experiment.problems.front().horizons = {0.1};
+  experiment.timing = {.repeats = 1, .methods = {kOdca, kSimbody}, .families = {}};
   experiment.timing.families = {{"ladder", {2}, {kOdca, kSimbody}}};
   for (const TimingGroup& group : TimingGroups(experiment)) {
     const std::vector<Record> records = TimeTogether(experiment, group);
@@ -128,8 +128,8 @@ TEST(PeerRuns, AreTimedBesideOthers) {
 
 TEST(PeerRuns, OfWhatCannotBeExpressedAreRowsOfTimingsToo) {
   Experiment experiment = reference::Single(reference::Shipped("driven-four-bar"));
-  experiment.scenes.front().horizons = {0.1};
-  experiment.timing = {.repeats = 1, .columns = {kOdca, kSimbody}, .families = {}};
+  experiment.problems.front().horizons = {0.1};
+  experiment.timing = {.repeats = 1, .methods = {kOdca, kSimbody}, .families = {}};
   const std::vector<Record> records = TimeTogether(experiment, TimingGroups(experiment).front());
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].Text("outcome"), "finished");

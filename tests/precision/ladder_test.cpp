@@ -57,7 +57,7 @@ LadderTask Task(const std::string& mechanism, const std::string& formulation,
                 Enforcement enforcement) {
   LadderTask task;
   task.description = Shipped(mechanism);
-  task.column = {.formulation = formulation, .enforcement = enforcement};
+  task.method = {.formulation = formulation, .enforcement = enforcement};
   task.horizon = 1.0;
   task.precision.scalars = {Scalar::kFloat, Scalar::kDouble, Scalar::kLongDouble,
                             Scalar::kFloat128};
@@ -65,8 +65,8 @@ LadderTask Task(const std::string& mechanism, const std::string& formulation,
   return task;
 }
 
-const Rung& At(const Ladder& ladder, Scalar scalar, double tolerance) {
-  for (const Rung& rung : ladder.rungs) {
+const SweepLevel& At(const Ladder& ladder, Scalar scalar, double tolerance) {
+  for (const SweepLevel& rung : ladder.rungs) {
     if (rung.scalar == scalar && rung.tolerance == tolerance) return rung;
   }
   throw std::invalid_argument("no such rung");
@@ -84,16 +84,16 @@ TEST_P(LadderTest, WideScalarsShareTheirTruncation) {
   // two references 10^4 apart in tolerance: far below the finest rung
   EXPECT_LE(ladder.reference.error, 1e-18);
   EXPECT_LE(ladder.reference.drift, 1e-18);
-  const Rung& wide = At(ladder, Scalar::kFloat128, 1e-4);
+  const SweepLevel& wide = At(ladder, Scalar::kFloat128, 1e-4);
   EXPECT_GT(wide.error, 1e-8) << "an error that says something";
   for (const Scalar scalar : {Scalar::kDouble, Scalar::kLongDouble}) {
-    const Rung& rung = At(ladder, scalar, 1e-4);
+    const SweepLevel& rung = At(ladder, scalar, 1e-4);
     EXPECT_EQ(rung.steps, wide.steps);
     EXPECT_NEAR(rung.error, wide.error, 1e-6 * wide.error);
     EXPECT_EQ(rung.error_ruled_by, "truncation");
   }
   EXPECT_EQ(wide.error_ruled_by, "truncation");
-  const Rung& lost = At(ladder, Scalar::kFloat, 1e-15);
+  const SweepLevel& lost = At(ladder, Scalar::kFloat, 1e-15);
   EXPECT_EQ(lost.outcome, Outcome::kStepTooSmall);
   EXPECT_TRUE(std::isnan(lost.error));
   EXPECT_EQ(lost.error_ruled_by, "");
@@ -110,7 +110,7 @@ TEST_P(LadderTest, DriftOfAParallelogramIsRoundOff) {
   double last = 1.0;
   for (const Scalar scalar :
        {Scalar::kFloat, Scalar::kDouble, Scalar::kLongDouble, Scalar::kFloat128}) {
-    const Rung& rung = At(ladder, scalar, 1e-4);
+    const SweepLevel& rung = At(ladder, scalar, 1e-4);
     ASSERT_EQ(rung.outcome, Outcome::kFinished);
     // widening by a scalar takes at least 2^11 of its eps away; a walk of round-off varies by ten
     EXPECT_LE(rung.drift, last / 100) << ToString(scalar);
@@ -127,10 +127,10 @@ TEST(DrivenLadder, FollowsItsDrive) {
   task.precision.scalars = {Scalar::kDouble};
   task.precision.tolerances = {1e-8};
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-    task.column.coordinates = coordinates;
+    task.method.coordinates = coordinates;
     const Ladder ladder = RunLadder(task);
     ASSERT_EQ(ladder.start, Outcome::kFinished) << ladder.message;
-    const Rung& rung = At(ladder, Scalar::kDouble, 1e-8);
+    const SweepLevel& rung = At(ladder, Scalar::kDouble, 1e-8);
     ASSERT_EQ(rung.outcome, Outcome::kFinished);
     // kinematics decides: what projections leave of lengths of a metre, some hundred roundings
     EXPECT_LE(rung.drift, 1e-13);
@@ -142,7 +142,7 @@ TEST(DrivenLadder, FollowsItsDrive) {
 std::string NameOf(const ::testing::TestParamInfo<LadderTest::ParamType>& info) {
   return info.param.first + "_" + std::string(ToString(info.param.second));
 }
-INSTANTIATE_TEST_SUITE_P(Columns, LadderTest,
+INSTANTIATE_TEST_SUITE_P(Methods, LadderTest,
                          ::testing::Values(std::pair{"odca", Enforcement::kAcceleration},
                                            std::pair{"odca", Enforcement::kPosition},
                                            std::pair{"lagrange", Enforcement::kVelocity},
@@ -175,13 +175,13 @@ TEST(LadderLevels, OfOtherProgramsAreRefusedByName) {
 }
 
 TEST(RuledByTest, RoundOffIsWhatAWiderScalarTakesAway) {
-  EXPECT_EQ(RuledBy(1e-6, 1e-6), "truncation");
-  EXPECT_EQ(RuledBy(1.9e-6, 1e-6), "truncation");
-  EXPECT_EQ(RuledBy(2.1e-6, 1e-6), "round-off");
-  EXPECT_EQ(RuledBy(1e-6, 1e-12), "round-off");
-  EXPECT_EQ(RuledBy(4e-7, 1e-6), "round-off") << "some of the truncation cancelled";
-  EXPECT_EQ(RuledBy(std::numeric_limits<double>::quiet_NaN(), 1e-6), "");
-  EXPECT_EQ(RuledBy(1e-6, std::numeric_limits<double>::quiet_NaN()), "");
+  EXPECT_EQ(DominatedBy(1e-6, 1e-6), "truncation");
+  EXPECT_EQ(DominatedBy(1.9e-6, 1e-6), "truncation");
+  EXPECT_EQ(DominatedBy(2.1e-6, 1e-6), "round-off");
+  EXPECT_EQ(DominatedBy(1e-6, 1e-12), "round-off");
+  EXPECT_EQ(DominatedBy(4e-7, 1e-6), "round-off") << "some of the truncation cancelled";
+  EXPECT_EQ(DominatedBy(std::numeric_limits<double>::quiet_NaN(), 1e-6), "");
+  EXPECT_EQ(DominatedBy(1e-6, std::numeric_limits<double>::quiet_NaN()), "");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Reduction by sparse factors against dense multipliers, where each is taken, and what becomes of
-// positions in doubt.
+// suspicious positions.
 #include "reduction/sparse_partition.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// How many of the mechanisms given could be compared.
 struct Tally {
-  int solved = 0, in_doubt = 0;
+  int solved = 0, suspicious = 0;
 };
 
 /// Random forces and targets; x and lambda of both agree within the contract's bound, sums along n
@@ -46,7 +46,7 @@ void ExpectAlike(const MechanismDescription& description, Coordinates coordinate
   Conditioning found;
   ASSERT_EQ(dense.Factor(kinematics, found), Outcome::kFinished);
   if (!sparse->AreIndependent(kinematics)) {
-    ++tally.in_doubt;
+    ++tally.suspicious;
     EXPECT_LT(found.rcond, 0.1) << "what is uncertain is near that for both";
     return;
   }
@@ -103,8 +103,8 @@ TYPED_TEST(SparsePartitionTest, SolvesWhatDenseMultipliersSolve) {
                              tally);
     }
   }
-  std::printf("%d solved, %d uncertain\n", tally.solved, tally.in_doubt);
-  EXPECT_GT(tally.solved, 3 * tally.in_doubt);
+  std::printf("%d solved, %d uncertain\n", tally.solved, tally.suspicious);
+  EXPECT_GT(tally.solved, 3 * tally.suspicious);
 }
 
 using InPlane = testing::SystemWith<Reduction, Planar, double>;
@@ -189,7 +189,7 @@ TEST(Reduction, WhereNothingHangsOnTheChoiceItIsTheBestOfEachPosition) {
   }
 }
 
-TEST(Reduction, LeavesDoubtfulPositionsToDenseMatrices) {
+TEST(Reduction, LeavesSuspiciousPositionsToDenseMatrices) {
   LadderRun run(3, Enforcement::kAcceleration);
   ASSERT_EQ(run.Start(1.0), Outcome::kFinished);
   EXPECT_TRUE(run.is_sparse());
@@ -228,7 +228,7 @@ TEST(Reduction, IsSingularWhereDenseMatricesWouldBeTooLarge) {
 }
 
 /// Pivots below a tenth of each other say little of loops that hang together: where these are
-/// independent beyond doubt, sparse factors cost less than the null space.
+/// clearly independent, sparse factors cost less than the null space.
 TEST(Reduction, LeavesSuspiciousPartitionsToSparseFactors) {
   const MechanismDescription graph = testing::TightGraph(24, 8, SpaceKind::kPlanar, 1);
   const testing::Placed<Planar> placed(graph, Coordinates::kJoint, 1);
@@ -268,7 +268,7 @@ TEST(Reduction, ChangesLeastInTheMetricOfMassesWhereItIsSparse) {
                                           Matrices::kSparse);
       reduction.Start(placed.kinematics);
       ASSERT_EQ(reduction.Factor(placed.kinematics), Outcome::kFinished);
-      if (!reduction.is_sparse()) continue;  // not independent beyond doubt
+      if (!reduction.is_sparse()) continue;  // not clearly independent
       ++compared;
       reduction.Correct(target, x);
       const double bound = 100.0 * kEps * mechanism.num_bodies() /
@@ -291,7 +291,7 @@ TEST(Reduction, HasAccelerationsFarFromTheConstraints) {
       harness::ReadExperiments(std::string(LOOPBENCH_SOURCE_DIR) +
                                "/configs/experiments/extremes/stiff-rod.json")
           .back()
-          .scenes.front()
+          .problems.front()
           .mechanism.description;
   const Mechanism<Planar, double> mechanism(rod, Coordinates::kJoint);
   const State start = ConsistentState(rod, mechanism, 1);

@@ -10,22 +10,22 @@
 namespace loopbench::harness::reference {
 namespace baumgarte_test {
 
-std::vector<Column> Columns() {
-  std::vector<Column> columns = PositionColumns();
-  for (Column& column : columns) column.enforcement = Enforcement::kBaumgarte;
-  return columns;
+std::vector<Method> Methods() {
+  std::vector<Method> methods = PositionMethods();
+  for (Method& method : methods) method.enforcement = Enforcement::kBaumgarte;
+  return methods;
 }
 
-class BaumgarteRun : public testing::TestWithParam<Column> {};
+class BaumgarteRun : public testing::TestWithParam<Method> {};
 
 /// Without feedback drift grows with the square of time: four times the horizon, sixteen times the
 /// drift. With it, what is fed in per step decays within some steps.
 TEST_P(BaumgarteRun, DriftStopsGrowing) {
-  Column plain = GetParam();
+  Method plain = GetParam();
   plain.enforcement = Enforcement::kAcceleration;
   for (const double tolerance : {1e-6, 1e-9}) {
-    const auto drift = [&](const Column& column, double horizon) {
-      const Record record = RunShipped("four-bar", column, tolerance, horizon);
+    const auto drift = [&](const Method& method, double horizon) {
+      const Record record = RunShipped("four-bar", method, tolerance, horizon);
       EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
       return record.Number("drift_position_max");
     };
@@ -39,14 +39,14 @@ TEST_P(BaumgarteRun, DriftStopsGrowing) {
 
 /// Fixed steps against a run with tiny ones. Gains given: those of the step would change with it.
 TEST_P(BaumgarteRun, KeepsTheOrderOfTheIntegrator) {
-  const MechanismDescription scene = Shipped("four-bar").description;
-  Column column = GetParam();
-  column.gains = BaumgarteGains{2.0, 2.0};
+  const MechanismDescription problem = Shipped("four-bar").description;
+  Method method = GetParam();
+  method.gains = BaumgarteGains{2.0, 2.0};
   for (const auto& [profile, order] : {std::pair{"bogacki-shampine", 3}, {"dormand-prince", 5}}) {
     const auto end = [&](double step) {
       IntegratorOptions options = Options(profile, 1e-3);
       options.fixed_step = step;
-      const Simulation run = Simulate(scene, column, options, 1.6, {});
+      const Simulation run = Simulate(problem, method, options, 1.6, {});
       EXPECT_EQ(run.result.outcome, Outcome::kFinished);
       return run.last.bodies[2].p;
     };
@@ -64,7 +64,7 @@ TEST_P(BaumgarteRun, FollowsPrescribedMotions) {
   EXPECT_LE(record.Number("drift_position_max"), 1e-6);
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, BaumgarteRun, testing::ValuesIn(Columns()),
+INSTANTIATE_TEST_SUITE_P(Methods, BaumgarteRun, testing::ValuesIn(Methods()),
                          [](const auto& test) { return NameOf(test.param); });
 
 }  // namespace baumgarte_test

@@ -1,4 +1,4 @@
-// Cases for tests that run whole simulations: the paper's scenes as its experiment file defines
+// Cases for tests that run whole simulations: the paper's problems as its experiment file defines
 // them, and mechanisms made in code.
 #pragma once
 
@@ -20,7 +20,7 @@
 namespace loopbench::harness {
 
 /// Keeps addresses out of the test list.
-inline void PrintTo(const Column& column, std::ostream* out) { *out << ToString(column); }
+inline void PrintTo(const Method& method, std::ostream* out) { *out << ToString(method); }
 
 }  // namespace loopbench::harness
 
@@ -32,20 +32,20 @@ inline const Experiment& Paper() {
   return kPaper;
 }
 
-/// An experiment with one scene and nothing else.
+/// An experiment with one problem and nothing else.
 inline Experiment Single(const MechanismFile& mechanism) {
   Experiment experiment;
   experiment.name = "single";
-  experiment.scenes.push_back({.name = mechanism.description.name,
-                               .path = {},
-                               .mechanism = mechanism,
-                               .horizons = {},
-                               .tags = {}});
+  experiment.problems.push_back({.name = mechanism.description.name,
+                                 .path = {},
+                                 .mechanism = mechanism,
+                                 .horizons = {},
+                                 .tags = {}});
   return experiment;
 }
 
-/// The paper's columns as published: level and solver belong to the formulation.
-inline Column Published(const std::string& formulation, Coordinates coordinates) {
+/// The paper's methods as published: level and solver belong to the formulation.
+inline Method Published(const std::string& formulation, Coordinates coordinates) {
   return {.formulation = formulation,
           .enforcement =
               formulation == "reduction" ? Enforcement::kVelocity : Enforcement::kAcceleration,
@@ -53,19 +53,19 @@ inline Column Published(const std::string& formulation, Coordinates coordinates)
           .solver = SolverKind::kAsPublished};
 }
 
-inline const std::vector<Column>& PublishedColumns() {
-  static const std::vector<Column> kColumns = {
+inline const std::vector<Method>& PublishedMethods() {
+  static const std::vector<Method> kMethods = {
       Published("odca", Coordinates::kJoint),      Published("odca", Coordinates::kAbsolute),
       Published("lagrange", Coordinates::kJoint),  Published("lagrange", Coordinates::kAbsolute),
       Published("reduction", Coordinates::kJoint), Published("reduction", Coordinates::kAbsolute)};
-  return kColumns;
+  return kMethods;
 }
 
-/// A column as part of a test's name: "OdcaAccelerationJointAsPublished".
-inline std::string NameOf(const Column& column) {
+/// A method as part of a test's name: "OdcaAccelerationJointAsPublished".
+inline std::string NameOf(const Method& method) {
   std::string name;
   bool upper = true;
-  for (const char c : ToString(column)) {
+  for (const char c : ToString(method)) {
     const bool separator = c == '/' || c == '-';
     if (!separator) name += upper ? static_cast<char>(std::toupper(c)) : c;
     upper = separator;
@@ -73,15 +73,15 @@ inline std::string NameOf(const Column& column) {
   return name;
 }
 
-/// One run of a scene. Ten minutes of CPU time: limits are for suites, a test must not end by one
+/// One run of a problem. Ten minutes of CPU time: limits are for suites, a test must not end by one
 /// on a busy machine.
-inline Case CaseOf(const Experiment& experiment, const std::string& scene, const Column& column,
+inline Case CaseOf(const Experiment& experiment, const std::string& problem, const Method& method,
                    double tolerance, double horizon) {
-  const auto it = std::ranges::find(experiment.scenes, scene, &ExperimentScene::name);
-  if (it == experiment.scenes.end()) throw std::invalid_argument("no problem " + scene);
-  Case one{.scene = static_cast<std::size_t>(it - experiment.scenes.begin()),
-           .mechanism = scene,
-           .column = column,
+  const auto it = std::ranges::find(experiment.problems, problem, &ExperimentProblem::name);
+  if (it == experiment.problems.end()) throw std::invalid_argument("no problem " + problem);
+  Case one{.problem = static_cast<std::size_t>(it - experiment.problems.begin()),
+           .mechanism = problem,
+           .method = method,
            .integrator = experiment.integrators.front(),
            .rtol = tolerance,
            .atol = tolerance,
@@ -117,20 +117,20 @@ inline bool IsSet(const Record& record, std::string_view key) {
 }
 
 /// Runs a mechanism as it is.
-inline Record RunFile(const MechanismFile& file, const Column& column, double tolerance,
+inline Record RunFile(const MechanismFile& file, const Method& method, double tolerance,
                       double horizon) {
   const Experiment experiment = Single(file);
-  return RunCase(experiment, CaseOf(experiment, file.description.name, column, tolerance, horizon));
+  return RunCase(experiment, CaseOf(experiment, file.description.name, method, tolerance, horizon));
 }
-inline Record RunShipped(const std::string& name, const Column& column, double tolerance,
+inline Record RunShipped(const std::string& name, const Method& method, double tolerance,
                          double horizon) {
-  return RunFile(Shipped(name), column, tolerance, horizon);
+  return RunFile(Shipped(name), method, tolerance, horizon);
 }
 
-/// Runs one scene of the paper.
-inline Record RunPaper(const std::string& scene, const Column& column, double tolerance,
+/// Runs one problem of the paper.
+inline Record RunPaper(const std::string& problem, const Method& method, double tolerance,
                        double horizon) {
-  return RunCase(Paper(), CaseOf(Paper(), scene, column, tolerance, horizon));
+  return RunCase(Paper(), CaseOf(Paper(), problem, method, tolerance, horizon));
 }
 
 }  // namespace loopbench::harness::reference

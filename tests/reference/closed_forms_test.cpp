@@ -58,16 +58,16 @@ MechanismFile LadderOfA02(int windows) {
   return file;
 }
 
-std::vector<Column> AllColumns() {
-  std::vector<Column> columns = PublishedColumns();
-  for (Column column : PublishedColumns()) {
-    column.solver = SolverKind::kRankRevealing;
-    columns.push_back(column);
+std::vector<Method> AllMethods() {
+  std::vector<Method> methods = PublishedMethods();
+  for (Method method : PublishedMethods()) {
+    method.solver = SolverKind::kRankRevealing;
+    methods.push_back(method);
   }
-  return columns;
+  return methods;
 }
 
-class ClosedForm : public testing::TestWithParam<Column> {};
+class ClosedForm : public testing::TestWithParam<Method> {};
 
 TEST_P(ClosedForm, PendulumIsThatOfA01) {
   const MechanismFile file = BarOfA01();
@@ -115,10 +115,10 @@ TEST_P(ClosedForm, LaddersPassThroughTheDerivedAngles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, ClosedForm, testing::ValuesIn(AllColumns()),
-                         [](const auto& column) { return NameOf(column.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, ClosedForm, testing::ValuesIn(AllMethods()),
+                         [](const auto& method) { return NameOf(method.param); });
 
-class LongLadder : public testing::TestWithParam<Column> {};
+class LongLadder : public testing::TestWithParam<Method> {};
 
 TEST_P(LongLadder, OfFortyWindowsIsAPendulum) {
   Expect(RunFile(LadderOfA02(40), GetParam(), kTolerance, 0.70), "closed_form_error_max", 1e-9);
@@ -137,12 +137,12 @@ TEST_P(LongLadder, OfFortyWindowsFollowsThePublishedFile) {
 }
 
 // the dense matrices of the other two, three times as large, take seconds
-INSTANTIATE_TEST_SUITE_P(Columns, LongLadder,
+INSTANTIATE_TEST_SUITE_P(Methods, LongLadder,
                          testing::Values(Published("odca", Coordinates::kJoint),
                                          Published("odca", Coordinates::kAbsolute),
                                          Published("lagrange", Coordinates::kJoint),
                                          Published("reduction", Coordinates::kJoint)),
-                         [](const auto& column) { return NameOf(column.param); });
+                         [](const auto& method) { return NameOf(method.param); });
 
 }  // namespace closed_forms_test
 }  // namespace loopbench::harness::reference

@@ -16,7 +16,7 @@ namespace driven_passages_test {
 constexpr double kPi = std::numbers::pi;
 const Eigen::Vector3d kZero = Eigen::Vector3d::Zero();
 
-std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return NameOf(info.param); }
+std::string NameOfParam(const testing::TestParamInfo<Method>& info) { return NameOf(info.param); }
 
 double AngleOf(const MechanismDescription& d, const Snapshot& at, const std::string& body) {
   const Eigen::Matrix3d& R = at.bodies[static_cast<std::size_t>(BodyNamed(d, body))].R;
@@ -118,7 +118,7 @@ Known TwoWindows(double start, double speed) {
   return {d, {{"crank0", angle}, {"crank2", angle}}};
 }
 
-class DrivenPassage : public testing::TestWithParam<Column> {};
+class DrivenPassage : public testing::TestWithParam<Method> {};
 
 TEST_P(DrivenPassage, KeepsTheBranchAtLevelPosition) {
   Known heavy = Parallelogram(Polynomial{{0.4, 2.0}});
@@ -138,9 +138,9 @@ TEST_P(DrivenPassage, KeepsTheBranchAtLevelPosition) {
                    [&](const Snapshot& at) { worst = std::max(worst, LargestError(known, at)); });
       ASSERT_EQ(run.result.outcome, Outcome::kFinished) << known.description.name;
       ASSERT_EQ(run.last.t, 8.0);
-      // closed loops have the drive's angle but for rounding, except in the width of softening,
-      // where steps leave errors of the tolerance magnified by one over a speed of 0.1 or more, and
-      // softening some 4e-6 of its own, whatever the tolerance
+      // closed loops have the drive's angle but for rounding, except in the width of
+      // regularization, where steps leave errors of the tolerance magnified by one over a speed of
+      // 0.1 or more, and regularization some 4e-6 of its own, whatever the tolerance
       EXPECT_LE(worst, 1e3 * tolerance + 1e-5) << known.description.name << " " << tolerance;
     }
   }
@@ -210,21 +210,21 @@ TEST_P(DrivenPassage, DeadEndsAreNone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, DrivenPassage, testing::ValuesIn(PositionColumns()), NameOfParam);
+INSTANTIATE_TEST_SUITE_P(Methods, DrivenPassage, testing::ValuesIn(PositionMethods()), NameOfParam);
 
 /// Below level projection a passage ends on its branch or with a name and the cure.
 TEST(DrivenPassageBelowPosition, IsRightOrNamed) {
   int named = 0;
-  for (Column column : RankRevealingColumns()) {
+  for (Method method : RankRevealingMethods()) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
-      column.enforcement = level;
+      method.enforcement = level;
       for (const Known& known : {Parallelogram(Polynomial{{0.5, 1.0}}), AntiParallelogram(0.7, 1.5),
                                  SliderCrank(-0.4, -2.5)}) {
-        const Record record = RunFile(FileOf(known.description), column, 1e-8, 8.0);
+        const Record record = RunFile(FileOf(known.description), method, 1e-8, 8.0);
         if (record.Text("outcome") == "finished") {
           const Simulation run =
-              Simulate(known.description, column, Options("ode45", 1e-8), 8.0, {});
-          EXPECT_LE(LargestError(known, run.last), 1e-3) << ToString(column);
+              Simulate(known.description, method, Options("ode45", 1e-8), 8.0, {});
+          EXPECT_LE(LargestError(known, run.last), 1e-3) << ToString(method);
           continue;
         }
         ++named;

@@ -18,9 +18,9 @@ MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
 }
 
-class Driven : public testing::TestWithParam<Column> {};
+class Driven : public testing::TestWithParam<Method> {};
 
-std::string NameOfParam(const testing::TestParamInfo<Column>& info) { return NameOf(info.param); }
+std::string NameOfParam(const testing::TestParamInfo<Method>& info) { return NameOf(info.param); }
 
 /// Rocker angle of configs/mechanisms/driven-four-bar.json for a crank angle: where the circle of
 /// the coupler about B meets that of the rocker about C, on the left of BC.
@@ -186,11 +186,11 @@ TEST_P(Driven, ArmWithAllJointsDrivenHasNothingToIntegrate) {
 }
 
 template <class Test>
-void AtAllLevels(Column column, const Test& test) {
+void AtAllLevels(Method method, const Test& test) {
   for (const Enforcement level :
        {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
-    column.enforcement = level;
-    test(column);
+    method.enforcement = level;
+    test(method);
   }
 }
 
@@ -210,13 +210,13 @@ TEST_P(Driven, DiscsTurnTogether) {
   d.joints = {Revolute("O", kGround, zero, 1, zero), Revolute("Q", kGround, zero, 2, zero), rod};
   for (const double speed : {-40.0, 0.07}) {
     d.joints[0].motions = {{0, Polynomial{{0.0, speed}}}};
-    AtAllLevels(GetParam(), [&](const Column& column) {
-      const Simulation run = Simulate(d, column, Options("dormand-prince", 1e-9), 3.0, {});
-      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(column);
-      EXPECT_NEAR(run.last.bodies[2].w.z() / speed, 1.0, 1e-7) << ToString(column);
+    AtAllLevels(GetParam(), [&](const Method& method) {
+      const Simulation run = Simulate(d, method, Options("dormand-prince", 1e-9), 3.0, {});
+      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(method);
+      EXPECT_NEAR(run.last.bodies[2].w.z() / speed, 1.0, 1e-7) << ToString(method);
       const Eigen::Matrix3d& R = run.last.bodies[2].R;
       const double miss = std::atan2(R(1, 0), R(0, 0)) - 3.0 * speed;
-      EXPECT_NEAR(std::remainder(miss, 2 * M_PI), 0.0, 1e-6) << ToString(column);
+      EXPECT_NEAR(std::remainder(miss, 2 * M_PI), 0.0, 1e-6) << ToString(method);
     });
   }
 }
@@ -250,21 +250,21 @@ TEST_P(Driven, CardansJointHasItsLaw) {
         Eigen::Vector3d::Constant(2 * M_PI / 3 / std::sqrt(3.0));
     d.joints = {in, fork, out};
     d.initial.coordinates = {{1, {0.0, b}}};
-    AtAllLevels(GetParam(), [&](const Column& column) {
+    AtAllLevels(GetParam(), [&](const Method& method) {
       double worst = 0.0;
       const Simulation run =
-          Simulate(d, column, Options("dormand-prince", 1e-9), 2.0, [&](const Snapshot& at) {
+          Simulate(d, method, Options("dormand-prince", 1e-9), 2.0, [&](const Snapshot& at) {
             const double law =
                 5.0 * std::cos(b) / (1.0 - std::pow(std::sin(b) * std::cos(5.0 * at.t), 2));
             worst = std::max(worst, std::abs(std::abs(at.bodies[2].w.dot(axis)) - law));
           });
-      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(column);
-      EXPECT_LE(worst, 1e-5) << ToString(column);
+      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(method);
+      EXPECT_LE(worst, 1e-5) << ToString(method);
     });
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Driven, testing::ValuesIn(RankRevealingColumns()), NameOfParam);
+INSTANTIATE_TEST_SUITE_P(Methods, Driven, testing::ValuesIn(RankRevealingMethods()), NameOfParam);
 
 }  // namespace driven_test
 }  // namespace loopbench::harness::reference

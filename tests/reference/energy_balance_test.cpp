@@ -1,4 +1,4 @@
-// The energy balance of scenes that are not conservative: work supplied and dissipated against
+// The energy balance of problems that are not conservative: work supplied and dissipated against
 // closed forms, and a balance that closes to the integrator's tolerance.
 #include <gtest/gtest.h>
 
@@ -22,16 +22,16 @@ constexpr double kHorizon = 5.0;  // [s]
 /// units. Seen: 85.
 constexpr double kErrorPerTolerance = 1e3;  // [J]
 
-/// The published columns; reduction with a partition that may change: driven bars turn through the
+/// The published methods; reduction with a partition that may change: driven bars turn through the
 /// dead centres of any fixed one.
-std::vector<Column> Columns() {
-  std::vector<Column> columns = PublishedColumns();
-  for (Column& column : columns) {
-    if (column.formulation == "reduction") {
-      column.solver = SolverKind::kRankRevealing;
+std::vector<Method> Methods() {
+  std::vector<Method> methods = PublishedMethods();
+  for (Method& method : methods) {
+    if (method.formulation == "reduction") {
+      method.solver = SolverKind::kRankRevealing;
     }
   }
-  return columns;
+  return methods;
 }
 
 /// A bar on a pin, without gravity, of moment of inertia 2 kg m^2 about it.
@@ -52,7 +52,7 @@ constexpr double kClosedForm = 1e-7;  // [J]
 TEST(Work, OfADamperIsTheEnergyThatASpinningBarLoses) {
   const double inertia = 2.0, damping = 1.5, speed = 3.0, t = 2.0;
   const MechanismFile file = BarOnPin(JointDamper{0, damping}, speed);
-  const Record record = RunFile(file, PublishedColumns()[0], kTolerance, t);
+  const Record record = RunFile(file, PublishedMethods()[0], kTolerance, t);
   const double lost =
       0.5 * inertia * speed * speed * (1.0 - std::exp(-2.0 * damping * t / inertia));
   EXPECT_NEAR(record.Number("energy_dissipated"), lost, kClosedForm);
@@ -64,7 +64,7 @@ TEST(Work, OfDragSlowsABarAsItsClosedFormSays) {
   const double inertia = 2.0, drag = 0.7, speed = 3.0, t = 2.0;
   const MechanismFile file =
       BarOnPin(Drag{.point = {1, {1.0, 0.0, 0.0}}, .quadratic = drag}, speed);
-  const Record record = RunFile(file, PublishedColumns()[0], kTolerance, t);
+  const Record record = RunFile(file, PublishedMethods()[0], kTolerance, t);
   const double end = speed / (1.0 + drag * speed * t / inertia);
   EXPECT_NEAR(record.Number("energy_dissipated"), 0.5 * inertia * (speed * speed - end * end),
               kClosedForm);
@@ -73,15 +73,15 @@ TEST(Work, OfDragSlowsABarAsItsClosedFormSays) {
 TEST(Work, OfATorqueIsTheEnergyThatABarGains) {
   const double inertia = 2.0, rate = 1.5, t = 2.0;
   const MechanismFile file = BarOnPin(JointTorque{0, Polynomial{{0.0, rate}}}, 0.0);
-  const Record record = RunFile(file, PublishedColumns()[0], kTolerance, t);
+  const Record record = RunFile(file, PublishedMethods()[0], kTolerance, t);
   const double speed = rate * t * t / 2.0 / inertia;
   EXPECT_NEAR(record.Number("energy_supplied"), 0.5 * inertia * speed * speed, kClosedForm);
   EXPECT_EQ(record.Number("energy_dissipated"), 0.0);
 }
 
-TEST(Work, OfConservativeScenesHasNoEntry) {
+TEST(Work, OfConservativeProblemsHasNoEntry) {
   const MechanismFile file = BarOnPin(JointSpring{0, 2.0, 0.3, 0.1}, 1.0);
-  const Record record = RunFile(file, PublishedColumns()[0], kTolerance, 1.0);
+  const Record record = RunFile(file, PublishedMethods()[0], kTolerance, 1.0);
   EXPECT_EQ(record.Find("energy_supplied"), nullptr);
   EXPECT_EQ(record.Find("energy_dissipated"), nullptr);
   EXPECT_LE(record.Number("energy_error_max"), kClosedForm);
@@ -95,7 +95,7 @@ MechanismFile FourBar(const std::string& name, std::vector<ForceDescription> for
   return file;
 }
 
-MechanismFile SceneOf(const std::string& name) {
+MechanismFile ProblemOf(const std::string& name) {
   const Eigen::Vector3d tip = Eigen::Vector3d::UnitX();
   const SpringDamper strut{.from = {kGround, {0.3, -0.4, 0.0}},
                            .to = {2, 0.5 * tip},
@@ -113,25 +113,25 @@ MechanismFile SceneOf(const std::string& name) {
   if (name == "dragged") return FourBar(name, {drag, thrust});
   if (name == "kinked") return FourBar(name, {kinked, JointDamper{2, 0.2}});
   if (name == "prescribed") {
-    MechanismFile scene = FourBar(name, {JointDamper{2, 0.5}, strut});
+    MechanismFile problem = FourBar(name, {JointDamper{2, 0.5}, strut});
     // from the angle that the file starts at
-    scene.description.joints[0].motions = {
+    problem.description.joints[0].motions = {
         {0, Harmonic{.mean = -1.0, .amplitude = 0.4, .omega = 3.0}}};
-    scene.description.initial.speeds.clear();
-    return scene;
+    problem.description.initial.speeds.clear();
+    return problem;
   }
   return FourBar(name, {JointDamper{0, 0.5}, JointSpring{1, 5.0, 0.2, 1.0}, strut, drag, thrust,
                         motor, smooth, kinked});
 }
 
-class BalanceTest : public testing::TestWithParam<std::tuple<std::string, Column>> {};
+class BalanceTest : public testing::TestWithParam<std::tuple<std::string, Method>> {};
 
 TEST_P(BalanceTest, ClosesToTheTolerance) {
-  const auto& [name, column] = GetParam();
-  const MechanismFile scene = SceneOf(name);
+  const auto& [name, method] = GetParam();
+  const MechanismFile problem = ProblemOf(name);
   double coarse = 0.0;
   for (const double rtol : {1e-6, 1e-8, 1e-10}) {
-    const Record record = RunFile(scene, column, rtol, kHorizon);
+    const Record record = RunFile(problem, method, rtol, kHorizon);
     ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     const double error = record.Number("energy_error_max");
     const double supplied = record.Number("energy_supplied");
@@ -164,31 +164,31 @@ TEST_P(BalanceTest, ClosesToTheTolerance) {
 INSTANTIATE_TEST_SUITE_P(FourBar, BalanceTest,
                          testing::Combine(testing::Values("damped", "driven", "dragged", "kinked",
                                                           "prescribed", "everything"),
-                                          testing::ValuesIn(Columns())),
+                                          testing::ValuesIn(Methods())),
                          [](const auto& test) {
                            return std::get<0>(test.param) + NameOf(std::get<1>(test.param));
                          });
 
 TEST(Balance, ClosesInSpaceToo) {
-  MechanismFile scene = SceneOf("everything");
-  scene.description.space = SpaceKind::kSpatial;
-  for (Column column : PublishedColumns()) {
-    column.solver = SolverKind::kRankRevealing;  // a planar loop in space has redundant rows
-    const Record record = RunFile(scene, column, 1e-8, kHorizon);
+  MechanismFile problem = ProblemOf("everything");
+  problem.description.space = SpaceKind::kSpatial;
+  for (Method method : PublishedMethods()) {
+    method.solver = SolverKind::kRankRevealing;  // a planar loop in space has redundant rows
+    const Record record = RunFile(problem, method, 1e-8, kHorizon);
     ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
-    EXPECT_LE(record.Number("energy_error_max"), kErrorPerTolerance * 1e-8) << ToString(column);
+    EXPECT_LE(record.Number("energy_error_max"), kErrorPerTolerance * 1e-8) << ToString(method);
   }
 }
 
 /// Timings integrate without work, accuracy runs with it: the motion must be one.
 TEST(Balance, IntegratingWorkLeavesTheBitsOfTheMotion) {
-  const MechanismDescription description = SceneOf("everything").description;
+  const MechanismDescription description = ProblemOf("everything").description;
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   const Start<double> start = Assemble<Planar>(description, mechanism);
   ASSERT_EQ(start.outcome, Outcome::kFinished);
   std::vector<std::vector<double>> ends;
   for (const bool with_work : {false, true}) {
-    const auto formulation = MakeFormulation<Planar>(PublishedColumns()[0], mechanism);
+    const auto formulation = MakeFormulation<Planar>(PublishedMethods()[0], mechanism);
     ASSERT_EQ(formulation->Start(0.0, start.q, start.u), Outcome::kFinished);
     formulation->IntegrateWork(with_work);
     std::vector<double> y(static_cast<std::size_t>(formulation->size()), 0.0);

@@ -1,4 +1,4 @@
-// Energy of the paper's conservative scenes that stay clear of singular positions.
+// Energy of the paper's conservative problems that stay clear of singular positions.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -13,23 +13,23 @@ namespace energy_test {
 /// Errors of at most rtol per step and component, some 1e3 steps and energies of some 10 J.
 constexpr double kErrorPerTolerance = 1e4;  // [J]
 
-class ConservativeScene : public testing::TestWithParam<std::tuple<std::string, Column>> {};
+class ConservativeProblem : public testing::TestWithParam<std::tuple<std::string, Method>> {};
 
-TEST_P(ConservativeScene, KeepsItsEnergyWithinTheTolerance) {
-  const auto& [scene, column] = GetParam();
+TEST_P(ConservativeProblem, KeepsItsEnergyWithinTheTolerance) {
+  const auto& [problem, method] = GetParam();
   for (const double rtol : {1e-6, 1e-8, 1e-10}) {
-    const Record record = RunPaper(scene, column, rtol, 10.0);
+    const Record record = RunPaper(problem, method, rtol, 10.0);
     ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     EXPECT_LE(record.Number("energy_error_max"), kErrorPerTolerance * rtol) << rtol;
     std::cout << "energy error " << record.Number("energy_error_max") / rtol << " rtol\n";
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Paper, ConservativeScene,
+INSTANTIATE_TEST_SUITE_P(Paper, ConservativeProblem,
                          testing::Combine(testing::Values("square-four-bar", "square-seven-bar",
                                                           "four-bar", "seven-bar",
                                                           "general-seven-bar"),
-                                          testing::ValuesIn(PublishedColumns())),
+                                          testing::ValuesIn(PublishedMethods())),
                          [](const auto& test) {
                            std::string name =
                                std::get<0>(test.param) + NameOf(std::get<1>(test.param));

@@ -69,13 +69,13 @@ TEST(DriftOfTheSquareSevenBar, StaysAtRoundOffInJointCoordinates) {
 
 TEST(DriftOfTheSquareSevenBar, FollowsTheToleranceInAbsoluteCoordinates) {
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
-    const Column column = Published(formulation, Coordinates::kAbsolute);
+    const Method method = Published(formulation, Coordinates::kAbsolute);
     const double coarse =
-        RunPaper("square-seven-bar", column, 1e-6, 10.0).Number("drift_position_max");
+        RunPaper("square-seven-bar", method, 1e-6, 10.0).Number("drift_position_max");
     const double fine =
-        RunPaper("square-seven-bar", column, 1e-10, 10.0).Number("drift_position_max");
-    EXPECT_GE(coarse / fine, 1e3) << ToString(column);
-    std::cout << ToString(column) << ": " << coarse << " / " << fine << " = " << coarse / fine
+        RunPaper("square-seven-bar", method, 1e-10, 10.0).Number("drift_position_max");
+    EXPECT_GE(coarse / fine, 1e3) << ToString(method);
+    std::cout << ToString(method) << ": " << coarse << " / " << fine << " = " << coarse / fine
               << "\n";
   }
 }

@@ -34,9 +34,9 @@ double Difference(const A05State& a, const A05State& b) {
 }
 
 /// Runs to the time of `exact` and prints what it took.
-Simulation RunAndPrint(const Column& column, const std::string& profile, double rtol,
+Simulation RunAndPrint(const Method& method, const std::string& profile, double rtol,
                        const A05State& exact) {
-  const Simulation run = Simulate(Governor(), column, Options(profile, rtol), exact.t);
+  const Simulation run = Simulate(Governor(), method, Options(profile, rtol), exact.t);
   std::cout << profile << " " << rtol << ", " << exact.t << " s: error "
             << Difference(StateOf(run.last), exact) << ", " << run.result.steps << " steps, "
             << run.result.rhs_evaluations << " right-hand sides, energy balance "
@@ -44,7 +44,7 @@ Simulation RunAndPrint(const Column& column, const std::string& profile, double 
   return run;
 }
 
-class Flyball : public testing::TestWithParam<Column> {};
+class Flyball : public testing::TestWithParam<Method> {};
 
 TEST_P(Flyball, ExplicitMethodFollowsTheDerivedNumbers) {
   // 3.6e3 steps a second in joint coordinates, for stability; 1.3e4 in absolute ones
@@ -68,8 +68,8 @@ TEST_P(Flyball, ImplicitMethodNeedsAFiftiethOfTheSteps) {
   EXPECT_LE(Difference(StateOf(stiff.last), exact), 1e-6 * static_cast<double>(stiff.result.steps));
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Flyball, testing::ValuesIn(RankRevealingColumns()),
-                         [](const auto& column) { return NameOf(column.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, Flyball, testing::ValuesIn(RankRevealingMethods()),
+                         [](const auto& method) { return NameOf(method.param); });
 
 }  // namespace flyball_test
 }  // namespace loopbench::harness::reference

@@ -33,10 +33,10 @@ MechanismDescription Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json")).description;
 }
 
-Simulation RunTo(const MechanismDescription& description, const Column& column, double horizon,
+Simulation RunTo(const MechanismDescription& description, const Method& method, double horizon,
                  const Watch& watch = {}) {
   const Simulation run =
-      Simulate(description, column, Options("ode45", kTolerance), horizon, watch);
+      Simulate(description, method, Options("ode45", kTolerance), horizon, watch);
   EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   EXPECT_EQ(run.result.t_reached, horizon);
   return run;
@@ -88,7 +88,7 @@ State Integrate(State y, const Accelerations& accelerations, double horizon) {
   return y;
 }
 
-class Imports : public testing::TestWithParam<Column> {};
+class Imports : public testing::TestWithParam<Method> {};
 
 TEST_P(Imports, PendulumOfMjcfFollowsItsClosedForm) {
   const MechanismDescription pendulum = Import("pendulum.xml");
@@ -269,8 +269,8 @@ TEST_P(Imports, FurutaPendulumOfSdfFollowsItsEquations) {
   std::cout << "centre of mass " << error << " m, " << run.result.steps << " steps\n";
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Imports, testing::ValuesIn(RankRevealingColumns()),
-                         [](const auto& column) { return NameOf(column.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, Imports, testing::ValuesIn(RankRevealingMethods()),
+                         [](const auto& method) { return NameOf(method.param); });
 
 }  // namespace imports_test
 }  // namespace loopbench::harness::reference

@@ -9,7 +9,7 @@
 #include <map>
 #include <numbers>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
@@ -66,9 +66,9 @@ MechanismFile FileOf(const KnownEnd& known) {
 }
 
 /// The largest difference from the known end; all links are about a metre long.
-double ErrorOf(const KnownEnd& known, const Column& column, double tolerance) {
+double ErrorOf(const KnownEnd& known, const Method& method, double tolerance) {
   const MechanismDescription d = FileOf(known).description;
-  const Simulation run = Simulate(d, column, Options("ode45", tolerance), known.horizon);
+  const Simulation run = Simulate(d, method, Options("ode45", tolerance), known.horizon);
   if (run.result.outcome != Outcome::kFinished) return std::numeric_limits<double>::infinity();
   double worst = 0.0;
   for (const auto& [body, angle] : known.angles) {
@@ -83,9 +83,9 @@ double ErrorOf(const KnownEnd& known, const Column& column, double tolerance) {
   return worst;
 }
 
-class NearSingular : public ::testing::TestWithParam<Column> {};
+class NearSingular : public ::testing::TestWithParam<Method> {};
 
-/// Wrong is a difference beyond those between runs of one tolerance (kMostTolerances).
+/// Wrong is a difference beyond those between runs of one tolerance (kMaxTolerances).
 /// Regularization without the forces of its directions leaves 3e-4 rad of the Peaucellier linkage
 /// 1.7 rad of the nearly flat four-bar and
 /// 3 rad of the passing one.
@@ -93,7 +93,7 @@ TEST_P(NearSingular, EndsRightAtLevelProjection) {
   constexpr double kTolerance = 1e-8;
   for (const KnownEnd& known : KnownEnds()) {
     const double error = ErrorOf(known, GetParam(), kTolerance);
-    EXPECT_LE(error, kMostTolerances * kTolerance + known.accuracy) << known.name;
+    EXPECT_LE(error, kMaxTolerances * kTolerance + known.accuracy) << known.name;
   }
 }
 
@@ -102,21 +102,21 @@ TEST_P(NearSingular, WrongOnesAreFlaggedAlone) {
   for (const KnownEnd& known : KnownEnds()) {
     for (const Enforcement level : {Enforcement::kPosition, Enforcement::kVelocity}) {
       constexpr double kTolerance = 1e-8;
-      Column column = GetParam();
-      column.enforcement = level;
+      Method method = GetParam();
+      method.enforcement = level;
       Experiment experiment = Single(FileOf(known));
       experiment.refine = true;
-      const std::string name = experiment.scenes.front().name;
+      const std::string name = experiment.problems.front().name;
       const Record record =
-          RunCase(experiment, CaseOf(experiment, name, column, kTolerance, known.horizon));
+          RunCase(experiment, CaseOf(experiment, name, method, kTolerance, known.horizon));
       if (record.Text("outcome") != "finished" || !record.Text("warnings").empty()) continue;
-      EXPECT_LE(ErrorOf(known, column, kTolerance), kMostTolerances * kTolerance + known.accuracy)
-          << known.name << " " << ToString(column);
+      EXPECT_LE(ErrorOf(known, method, kTolerance), kMaxTolerances * kTolerance + known.accuracy)
+          << known.name << " " << ToString(method);
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, NearSingular, testing::ValuesIn(PositionColumns()),
+INSTANTIATE_TEST_SUITE_P(Methods, NearSingular, testing::ValuesIn(PositionMethods()),
                          [](const auto& one) { return NameOf(one.param); });
 
 }  // namespace near_singular_test

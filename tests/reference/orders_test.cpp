@@ -53,33 +53,33 @@ constexpr Motion kMotions[] = {{"four-bar", 1.6, 2}, {"stewart-platform", 0.4, 4
 using Numbers = std::vector<double>;
 
 /// After each of so many steps.
-std::vector<Numbers> StatesOf(const MechanismDescription& description, const Column& column,
+std::vector<Numbers> StatesOf(const MechanismDescription& description, const Method& method,
                               const std::string& profile, double horizon, int steps) {
   IntegratorOptions options = Options(profile, kToleranceOfFixedSteps);
   options.fixed_step = horizon / steps;
   std::vector<Numbers> states;
   const Simulation run =
-      Simulate(description, column, options, horizon, [&](const Snapshot& snapshot) {
+      Simulate(description, method, options, horizon, [&](const Snapshot& snapshot) {
         Numbers& numbers = states.emplace_back();
         for (const BodyState& body : snapshot.bodies) {
           numbers.insert(numbers.end(), body.p.begin(), body.p.end());
           numbers.insert(numbers.end(), body.v.begin(), body.v.end());
         }
       });
-  EXPECT_EQ(run.result.outcome, Outcome::kFinished) << profile << " " << ToString(column);
+  EXPECT_EQ(run.result.outcome, Outcome::kFinished) << profile << " " << ToString(method);
   return states;
 }
 
 constexpr int kExactSteps = 480;  ///< a multiple of all others below, times the motion's factor
 
-/// The same for all columns: one of them, by the method of the highest order with steps so short
+/// The same for all methods: one of them, by the method of the highest order with steps so short
 /// that they leave rounding alone.
 const std::vector<Numbers>& Exact(const Motion& motion) {
   static std::map<std::string, std::vector<Numbers>> known;
   const auto [place, is_new] = known.try_emplace(motion.mechanism);
   if (is_new) {
-    const Column column{.formulation = "lagrange", .enforcement = Enforcement::kPosition};
-    place->second = StatesOf(Shipped(motion.mechanism).description, column, "fehlberg-78",
+    const Method method{.formulation = "lagrange", .enforcement = Enforcement::kPosition};
+    place->second = StatesOf(Shipped(motion.mechanism).description, method, "fehlberg-78",
                              motion.horizon, kExactSteps * motion.factor);
   }
   return place->second;
@@ -97,22 +97,22 @@ double ErrorOf(const std::vector<Numbers>& states, const std::vector<Numbers>& e
   return std::sqrt(square / static_cast<double>(states.size()));
 }
 
-std::vector<Column> AllColumns() {
-  std::vector<Column> columns;
+std::vector<Method> AllMethods() {
+  std::vector<Method> methods;
   for (const char* name : {"odca", "lagrange", "reduction"}) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity,
                                     Enforcement::kPosition, Enforcement::kBaumgarte}) {
       if (!FindFormulation(name)->Has(level)) continue;
-      Column column{.formulation = name, .enforcement = level};
+      Method method{.formulation = name, .enforcement = level};
       // default gains grow with the longest step, which a fixed one leaves open
-      if (level == Enforcement::kBaumgarte) column.gains = BaumgarteGains{5.0, 5.0};
-      columns.push_back(column);
+      if (level == Enforcement::kBaumgarte) method.gains = BaumgarteGains{5.0, 5.0};
+      methods.push_back(method);
     }
   }
-  return columns;
+  return methods;
 }
 
-class Orders : public testing::TestWithParam<Column> {};
+class Orders : public testing::TestWithParam<Method> {};
 
 TEST_P(Orders, OfEveryProfileAreThoseOfItsPair) {
   for (const Motion& motion : kMotions) {
@@ -132,7 +132,7 @@ TEST_P(Orders, OfEveryProfileAreThoseOfItsPair) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Orders, testing::ValuesIn(AllColumns()), [](const auto& test) {
+INSTANTIATE_TEST_SUITE_P(Methods, Orders, testing::ValuesIn(AllMethods()), [](const auto& test) {
   return NameOf(test.param).substr(0, NameOf(test.param).find('('));
 });
 

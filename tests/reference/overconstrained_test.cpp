@@ -18,17 +18,17 @@ Experiment InSpace(const MechanismFile& mechanism) {
   return experiment;
 }
 
-Record RunScene(const MechanismFile& mechanism, const Column& column, double rtol, double horizon,
-                int ensemble = 1) {
+Record RunProblem(const MechanismFile& mechanism, const Method& method, double rtol, double horizon,
+                  int ensemble = 1) {
   const Experiment experiment = InSpace(mechanism);
-  Case one = CaseOf(experiment, mechanism.description.name, column, rtol, horizon);
+  Case one = CaseOf(experiment, mechanism.description.name, method, rtol, horizon);
   one.ensemble = ensemble;
   one.seed = 1;
   one.perturb = 0.02;
   return RunCase(experiment, one);
 }
 
-Column At(const std::string& formulation, Enforcement level,
+Method At(const std::string& formulation, Enforcement level,
           Coordinates coordinates = Coordinates::kJoint,
           SolverKind solver = SolverKind::kRankRevealing) {
   return {.formulation = formulation,
@@ -40,7 +40,7 @@ Column At(const std::string& formulation, Enforcement level,
 TEST(DriftOfBennettsLinkage, GrowsQuadraticallyAtAccelerationLevel) {
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const Record record =
-        RunScene(Shipped("bennett"), At(formulation, Enforcement::kAcceleration), 1e-8, 100.0, 8);
+        RunProblem(Shipped("bennett"), At(formulation, Enforcement::kAcceleration), 1e-8, 100.0, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
     EXPECT_NEAR(record.Number("growth_exponent"), 2.0, 0.15);
     EXPECT_EQ(record.Text("preprocessed"), "redundancy");
@@ -54,7 +54,7 @@ TEST(DriftOfBennettsLinkage, GrowsLinearlyAtVelocityLevel) {
   // the part that comes back with each turn hides the growth for 100 s in reduction (t^0.81)
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const Record record =
-        RunScene(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, 400.0, 8);
+        RunProblem(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, 400.0, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
     EXPECT_NEAR(record.Number("growth_exponent"), 1.0, 0.15);
   }
@@ -99,8 +99,8 @@ TEST_P(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) 
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
-        const Record away = RunScene(ModelledAway(), At("odca", level, set), rtol, 100.0);
-        const Record record = RunScene(bennett, At("odca", level, set), rtol, 100.0);
+        const Record away = RunProblem(ModelledAway(), At("odca", level, set), rtol, 100.0);
+        const Record record = RunProblem(bennett, At("odca", level, set), rtol, 100.0);
         ASSERT_EQ(away.Text("outcome"), "finished");
         EXPECT_EQ(record.Text("outcome"), "finished");
         const double ratio =
@@ -119,20 +119,20 @@ INSTANTIATE_TEST_SUITE_P(Angles, BennettsFrames, ::testing::Values(0.0, 0.4, 0.8
 
 class Overconstrained : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(Overconstrained, KeepsItsEnergyInAllColumnsAsPublishedToo) {
+TEST_P(Overconstrained, KeepsItsEnergyInAllMethodsAsPublishedToo) {
   const MechanismFile mechanism = Shipped(GetParam());
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
       for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
         const Enforcement level =
             formulation == "reduction" ? Enforcement::kVelocity : Enforcement::kAcceleration;
-        const Column column = At(formulation, level, set, solver);
-        const Record record = RunScene(mechanism, column, 1e-8, 50.0);
-        EXPECT_EQ(record.Text("outcome"), "finished") << ToString(column);
+        const Method method = At(formulation, level, set, solver);
+        const Record record = RunProblem(mechanism, method, 1e-8, 50.0);
+        EXPECT_EQ(record.Text("outcome"), "finished") << ToString(method);
         // 50 s of some 50 steps a second, each with an error of the tolerance, twice integrated
-        EXPECT_LE(record.Number("energy_error_relative"), 1e-3) << ToString(column);
-        EXPECT_LE(record.Number("drift_position_max"), 1e-4) << ToString(column);
-        std::cout << ToString(column) << ": drift " << record.Number("drift_position_max")
+        EXPECT_LE(record.Number("energy_error_relative"), 1e-3) << ToString(method);
+        EXPECT_LE(record.Number("drift_position_max"), 1e-4) << ToString(method);
+        std::cout << ToString(method) << ": drift " << record.Number("drift_position_max")
                   << " m, energy " << record.Number("energy_error_relative") << "\n";
       }
     }
@@ -166,11 +166,11 @@ class Linkage : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(Linkage, FollowsAnIndependentIntegrationInEveryColumn) {
   constexpr double kRtol = 1e-8, kHorizon = 10.0;
-  ASSERT_EQ(Linkages().columns.size(), 18u);  // formulations, levels, coordinate sets
-  for (const Column& column : Linkages().columns) {
-    SCOPED_TRACE(ToString(column));
+  ASSERT_EQ(Linkages().methods.size(), 18u);  // formulations, levels, coordinate sets
+  for (const Method& method : Linkages().methods) {
+    SCOPED_TRACE(ToString(method));
     const Record record =
-        RunCase(Linkages(), CaseOf(Linkages(), GetParam(), column, kRtol, kHorizon));
+        RunCase(Linkages(), CaseOf(Linkages(), GetParam(), method, kRtol, kHorizon));
     EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     if (record.Text("outcome") != "finished") continue;
     ASSERT_EQ(record.Text("reference"), kPublished);
@@ -179,9 +179,9 @@ TEST_P(Linkage, FollowsAnIndependentIntegrationInEveryColumn) {
     const double limit = 26.0 * kRtol * record.Number("steps");
     EXPECT_LE(record.Number("error_position_max"), limit);
     // some hundred round-offs: a closure is a sum over up to nine bodies of about a metre
-    const bool closed = column.enforcement == Enforcement::kPosition;
+    const bool closed = method.enforcement == Enforcement::kPosition;
     EXPECT_LE(record.Number("drift_position_max"), closed ? 1e-13 : limit);
-    std::cout << ToString(column) << ": error " << record.Number("error_position_max")
+    std::cout << ToString(method) << ": error " << record.Number("error_position_max")
               << " m, drift " << record.Number("drift_position_max") << " m, "
               << record.Number("steps") << " steps\n";
   }

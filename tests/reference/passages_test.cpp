@@ -18,9 +18,9 @@ namespace loopbench::harness::reference {
 namespace passages_test {
 
 /// Where the tip of the first crank is at the end.
-Eigen::Vector3d Tip(int windows, const Column& column, double rtol, double horizon) {
+Eigen::Vector3d Tip(int windows, const Method& method, double rtol, double horizon) {
   const MechanismDescription ladder = Ladder(windows, std::numbers::pi / 2, -1.0);
-  const Simulation run = Simulate(ladder, column, Options("ode45", rtol), horizon);
+  const Simulation run = Simulate(ladder, method, Options("ode45", rtol), horizon);
   EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   EXPECT_EQ(run.result.t_reached, horizon);
   const int crank = BodyNamed(ladder, "crank0");
@@ -32,7 +32,7 @@ Eigen::Vector3d Tip(int windows, const Column& column, double rtol, double horiz
 
 class Passages : public testing::TestWithParam<std::string> {
  protected:
-  Column column() const {
+  Method method() const {
     return {.formulation = GetParam(),
             .enforcement = Enforcement::kVelocity,
             .coordinates = Coordinates::kJoint,
@@ -42,11 +42,11 @@ class Passages : public testing::TestWithParam<std::string> {
 
 /// How near a step comes to a position in line is chance, and with it what is lost there: of 41
 /// tolerances around 1e-10 each formulation kept the energy to 1.7e-7 J, which moves the tip by
-/// some 1e-7 m, at 23 to 30, and at 2 to 7 it left the branch, which runs mark (doubts_test.cpp).
+/// some 1e-7 m, at 23 to 30, and at 2 to 7 it left the branch, which runs mark (warnings_test.cpp).
 /// Which ones these are, round-off decides. The test is of the median of nine.
 TEST_P(Passages, TenOfTheNFourBarOfTwo) {
   std::vector<Eigen::Vector3d> tips;
-  for (int k = -4; k <= 4; ++k) tips.push_back(Tip(2, column(), (1.0 + 0.01 * k) * 1e-10, 10.0));
+  for (int k = -4; k <= 4; ++k) tips.push_back(Tip(2, method(), (1.0 + 0.01 * k) * 1e-10, 10.0));
   const PathPoint& end = kA02DerivedN2AtTenSeconds;
   const auto distance = [&](const Eigen::Vector3d& tip) {
     return std::max(std::abs(tip.x() - end.x), std::abs(tip.y() - end.y));
@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(Formulations, Passages, testing::Values("odca", "lagran
                          [](const auto& test) { return test.param; });
 
 TEST(LongPassages, TwentyOfTheNFourBarOfFortyByOdca) {
-  const Column odca{.formulation = "odca",
+  const Method odca{.formulation = "odca",
                     .enforcement = Enforcement::kVelocity,
                     .coordinates = Coordinates::kJoint,
                     .solver = SolverKind::kRankRevealing};

@@ -13,16 +13,16 @@ namespace loopbench::harness::reference {
 namespace pendulum_drift_test {
 
 /// Errors at 30 s, where the exact state is the first one: (1, 0) at rest.
-PendulumErrors RodPendulum(const Column& column, double rtol) {
-  static const MechanismDescription kScene =
+PendulumErrors RodPendulum(const Method& method, double rtol) {
+  static const MechanismDescription kProblem =
       ReadMechanism(kConfigs / "mechanisms/rod-pendulum.json").description;
-  const Simulation run = Simulate(kScene, column, Options("ode45", rtol), 30.0);
+  const Simulation run = Simulate(kProblem, method, Options("ode45", rtol), 30.0);
   EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   EXPECT_EQ(run.result.t_reached, 30.0);
   if (run.result.outcome != Outcome::kFinished) return {};
   const BodyState& bob = run.last.bodies[1];
   return {rtol,
-          column.enforcement == Enforcement::kVelocity,
+          method.enforcement == Enforcement::kVelocity,
           std::abs(bob.p.x() - 1.0),
           std::abs(bob.p.y()),
           std::abs(bob.v.x()),
@@ -35,7 +35,7 @@ void Print(const std::string& name, const PendulumErrors& row) {
             << row.vx << " | " << row.vy << " | " << row.constraint << " |\n";
 }
 
-class PendulumDrift : public testing::TestWithParam<Column> {};
+class PendulumDrift : public testing::TestWithParam<Method> {};
 
 TEST_P(PendulumDrift, IsBelowThePublishedOneOfBdf) {
   for (const PendulumErrors& bdf : kPendulumDriftPublished) {
@@ -53,19 +53,19 @@ TEST_P(PendulumDrift, IsBelowThePublishedOneOfBdf) {
   }
 }
 
-std::vector<Column> BothLevels() {
-  std::vector<Column> columns;
-  for (Column column : RankRevealingColumns()) {
-    columns.push_back(column);
-    if (column.formulation == "reduction") continue;
-    column.enforcement = Enforcement::kVelocity;
-    columns.push_back(column);
+std::vector<Method> BothLevels() {
+  std::vector<Method> methods;
+  for (Method method : RankRevealingMethods()) {
+    methods.push_back(method);
+    if (method.formulation == "reduction") continue;
+    method.enforcement = Enforcement::kVelocity;
+    methods.push_back(method);
   }
-  return columns;
+  return methods;
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, PendulumDrift, testing::ValuesIn(BothLevels()),
-                         [](const auto& column) { return NameOf(column.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, PendulumDrift, testing::ValuesIn(BothLevels()),
+                         [](const auto& method) { return NameOf(method.param); });
 
 }  // namespace pendulum_drift_test
 }  // namespace loopbench::harness::reference

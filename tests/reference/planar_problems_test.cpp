@@ -20,16 +20,16 @@ constexpr double kTolerance = 1e-11;  // rtol = atol unless a test says otherwis
 
 enum class Place { kPlane, kTilted };
 
-/// A scene, and its points seen in the plane it was described in.
-class PlacedScene {
+/// A problem, and its points seen in the plane it was described in.
+class PlacedProblem {
  public:
-  PlacedScene(const MechanismDescription& planar, Place place)
+  PlacedProblem(const MechanismDescription& planar, Place place)
       : description_(place == Place::kPlane ? planar : Tilted(planar, AnyRotation())),
         R_(place == Place::kPlane ? Eigen::Matrix3d::Identity() : AnyRotation()) {}
 
-  Simulation Run(const Column& column, const IntegratorOptions& options, double horizon,
+  Simulation Run(const Method& method, const IntegratorOptions& options, double horizon,
                  const Watch& watch = {}) const {
-    const Simulation run = Simulate(description_, column, options, horizon, watch);
+    const Simulation run = Simulate(description_, method, options, horizon, watch);
     EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
     EXPECT_EQ(run.result.t_reached, horizon);
     return run;
@@ -73,11 +73,11 @@ double Apart(double a, double b) { return std::abs(std::remainder(a - b, 2 * kPi
 /// what the tolerance bounds.
 double Bound(const Simulation& run) { return static_cast<double>(run.result.steps) * kTolerance; }
 
-class PlanarProblem : public testing::TestWithParam<std::tuple<Column, Place>> {
+class PlanarProblem : public testing::TestWithParam<std::tuple<Method, Place>> {
  protected:
-  const Column& column() const { return std::get<0>(GetParam()); }
-  PlacedScene Placed(const MechanismDescription& planar) const {
-    return PlacedScene(planar, std::get<1>(GetParam()));
+  const Method& method() const { return std::get<0>(GetParam()); }
+  PlacedProblem Placed(const MechanismDescription& planar) const {
+    return PlacedProblem(planar, std::get<1>(GetParam()));
   }
   static const IntegratorOptions& Accurate() {
     static const IntegratorOptions kOptions = Options("ode45", kTolerance);
@@ -88,10 +88,10 @@ class PlanarProblem : public testing::TestWithParam<std::tuple<Column, Place>> {
 const Eigen::Vector3d kTip = Eigen::Vector3d::UnitX();
 
 TEST_P(PlanarProblem, SimplePendulumIsThatOfA01) {
-  const PlacedScene scene = Placed(Shipped("simple-pendulum"));
+  const PlacedProblem problem = Placed(Shipped("simple-pendulum"));
   for (std::size_t i = 0; i < kA01Published.size(); ++i) {
-    const Simulation run = scene.Run(column(), Accurate(), kA01Published[i].t);
-    const Eigen::Vector3d tip = scene.Point(run.last, "bob", kTip);
+    const Simulation run = problem.Run(method(), Accurate(), kA01Published[i].t);
+    const Eigen::Vector3d tip = problem.Point(run.last, "bob", kTip);
     const double bound = Bound(run);
     EXPECT_NEAR(tip.x(), kA01Derived[i].x, bound);
     EXPECT_NEAR(tip.y(), kA01Derived[i].y, bound);
@@ -103,12 +103,12 @@ TEST_P(PlanarProblem, SimplePendulumIsThatOfA01) {
 
 TEST(LongPendulum, IsThatOfA01AfterTwoThousandSeconds) {
   // an error in the energy makes one in the period, which adds up: method and tolerance to match
-  const MechanismDescription scene = Shipped("simple-pendulum");
+  const MechanismDescription problem = Shipped("simple-pendulum");
   for (const auto& [t, x, y] : kA01PublishedLate) {
     const Simulation run =
-        Simulate(scene, RankRevealingColumns()[0], Options("fehlberg-78", 1e-14), t);
+        Simulate(problem, RankRevealingMethods()[0], Options("fehlberg-78", 1e-14), t);
     ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
-    const Eigen::Vector3d tip = PointOf(scene, run.last, 1, kTip);
+    const Eigen::Vector3d tip = PointOf(problem, run.last, 1, kTip);
     // six digits are printed; the file is within 7.1e-7 of the closed form over its 2000 s
     EXPECT_NEAR(tip.x(), x, 7.1e-7) << t;
     EXPECT_NEAR(tip.y(), y, 7.1e-7) << t;
@@ -119,10 +119,10 @@ TEST(LongPendulum, IsThatOfA01AfterTwoThousandSeconds) {
 TEST_P(PlanarProblem, PendulumOfTwoSecondsReturns) {
   // fifteen periods; the state returns to within 5e4 rtol at rtol 1e-8
   constexpr double kRtol = 1e-8;
-  const PlacedScene scene = Placed(Shipped("pendulum-two-seconds"));
-  const Simulation run = scene.Run(column(), Options("ode45", kRtol), 30.0);
-  const Eigen::Vector3d x = scene.Point(run.last, "bob", kTip);
-  const Eigen::Vector3d v = scene.Velocity(run.last, "bob", kTip);
+  const PlacedProblem problem = Placed(Shipped("pendulum-two-seconds"));
+  const Simulation run = problem.Run(method(), Options("ode45", kRtol), 30.0);
+  const Eigen::Vector3d x = problem.Point(run.last, "bob", kTip);
+  const Eigen::Vector3d v = problem.Velocity(run.last, "bob", kTip);
   EXPECT_LE((x - kTip).lpNorm<Eigen::Infinity>(), 5e4 * kRtol);
   EXPECT_LE(v.lpNorm<Eigen::Infinity>(), 5e4 * kRtol);
   std::cout << "position " << (x - kTip).lpNorm<Eigen::Infinity>() / kRtol << " rtol, velocity "
@@ -132,12 +132,12 @@ TEST_P(PlanarProblem, PendulumOfTwoSecondsReturns) {
 TEST_P(PlanarProblem, NFourBarOfTwoIsThatOfA02) {
   // 0.70 s: 0.014 s before the first position with all bars in line
   const double w2 = 3.5 * 9.81 / 3.0;
-  const PlacedScene scene = Placed(Shipped("n-four-bar"));
+  const PlacedProblem problem = Placed(Shipped("n-four-bar"));
   double worst = 0.0;
-  scene.Run(column(), Accurate(), 0.70, [&](const Snapshot& snapshot) {
+  problem.Run(method(), Accurate(), 0.70, [&](const Snapshot& snapshot) {
     const double theta = PendulumAngle(w2, kPi, -1.0, snapshot.t);
     const Eigen::Vector3d exact(std::cos(theta - kPi / 2), std::sin(theta - kPi / 2), 0.0);
-    worst = std::max(worst, (scene.Point(snapshot, "crank0", kTip) - exact).norm());
+    worst = std::max(worst, (problem.Point(snapshot, "crank0", kTip) - exact).norm());
   });
   EXPECT_LE(worst, 1e-9);
   std::cout << "tip of the first crank " << worst << " m\n";
@@ -145,10 +145,10 @@ TEST_P(PlanarProblem, NFourBarOfTwoIsThatOfA02) {
 
 TEST_P(PlanarProblem, ParallelogramOfThePaperIsAPendulum) {
   // a quarter of the way to the position in line, see closed_forms_test.cpp
-  const PlacedScene scene = Placed(Shipped("parallelogram"));
+  const PlacedProblem problem = Placed(Shipped("parallelogram"));
   double theta0 = std::nan(""), worst = 0.0;
-  const Simulation run = scene.Run(column(), Accurate(), 0.57, [&](const Snapshot& snapshot) {
-    const double theta = scene.Angle(snapshot, "bar1") + kPi / 2;
+  const Simulation run = problem.Run(method(), Accurate(), 0.57, [&](const Snapshot& snapshot) {
+    const double theta = problem.Angle(snapshot, "bar1") + kPi / 2;
     if (std::isnan(theta0)) theta0 = theta;
     const double exact = PendulumAngle(2 * 9.81 / 3.5, theta0, 0.0, snapshot.t);
     worst = std::max(worst, Apart(theta, exact));
@@ -158,27 +158,27 @@ TEST_P(PlanarProblem, ParallelogramOfThePaperIsAPendulum) {
 
 TEST_P(PlanarProblem, AndrewsSqueezerIsThatOfTheTestSet) {
 #ifdef __SANITIZE_ADDRESS__
-  if (column().formulation == "lagrange" && column().coordinates == Coordinates::kAbsolute &&
+  if (method().formulation == "lagrange" && method().coordinates == Coordinates::kAbsolute &&
       std::get<1>(GetParam()) == Place::kTilted) {
     GTEST_SKIP() << "dense and in space: a quarter of an hour with sanitizers";
   }
 #endif
-  const PlacedScene scene = Placed(Shipped("andrews-squeezer"));
+  const PlacedProblem problem = Placed(Shipped("andrews-squeezer"));
   // spring and torque by hand: 4530 (d - 0.07785)^2 / 2 and 0.033 N m times the crank's angle
   const Eigen::Vector3d C(0.014, 0.072, 0.0), D(0.02, -0.018, 0.0);
   double first = std::nan(""), worst = 0.0, most = 0.0, turned = -0.06171389001427645;
   const auto balance = [&](const Snapshot& snapshot) {
-    turned += std::remainder(scene.Angle(snapshot, "K1") - turned, 2 * kPi);
-    const double stretch = (scene.Point(snapshot, "K3", D) - C).norm() - 0.07785;
+    turned += std::remainder(problem.Angle(snapshot, "K1") - turned, 2 * kPi);
+    const double stretch = (problem.Point(snapshot, "K3", D) - C).norm() - 0.07785;
     const double energy = snapshot.kinetic + 4530.0 * stretch * stretch / 2 - 0.033 * turned;
     if (std::isnan(first)) first = energy;
     worst = std::max(worst, std::abs(energy - first));
     most = std::max(most, snapshot.kinetic);
   };
   // 0.03 s; speeds reach 1e3 rad/s, and the bound for angles is 1e-10
-  const Simulation run = scene.Run(column(), Options("fehlberg-78", 1e-14), 0.03, balance);
-  const auto angle = [&](const char* body) { return scene.Angle(run.last, body); };
-  const auto rate = [&](const char* body) { return scene.Rate(run.last, body); };
+  const Simulation run = problem.Run(method(), Options("fehlberg-78", 1e-14), 0.03, balance);
+  const auto angle = [&](const char* body) { return problem.Angle(run.last, body); };
+  const auto rate = [&](const char* body) { return problem.Rate(run.last, body); };
   const std::array<double, 7> q = {
       angle("K1"), angle("K2") - angle("K1"), angle("K3"), angle("K4") - angle("K5"),
       angle("K5"), angle("K6") - angle("K7"), angle("K7")};
@@ -200,13 +200,13 @@ TEST_P(PlanarProblem, AndrewsSqueezerIsThatOfTheTestSet) {
 }
 
 TEST_P(PlanarProblem, SliderCrankIsThatOfSundials) {
-  const PlacedScene scene = Placed(Shipped("slider-crank"));
+  const PlacedProblem problem = Placed(Shipped("slider-crank"));
   for (std::size_t i = 0; i < kSliderCrankVerified.size(); ++i) {
     const SliderCrankState& exact = kSliderCrankVerified[i];
     const SliderCrankState& printed = kSliderCrankPublished[i];
-    const Simulation run = scene.Run(column(), Accurate(), exact.t);
-    const double q = scene.Angle(run.last, "crank"), p = scene.Angle(run.last, "rod");
-    const double x = scene.Point(run.last, "rod", Eigen::Vector3d::Zero()).x();
+    const Simulation run = problem.Run(method(), Accurate(), exact.t);
+    const double q = problem.Angle(run.last, "crank"), p = problem.Angle(run.last, "rod");
+    const double x = problem.Point(run.last, "rod", Eigen::Vector3d::Zero()).x();
     const double bound = Bound(run);
     EXPECT_LE(Apart(q, exact.q), bound) << exact.t;
     EXPECT_NEAR(x, exact.x, bound) << exact.t;
@@ -216,7 +216,7 @@ TEST_P(PlanarProblem, SliderCrankIsThatOfSundials) {
     EXPECT_NEAR(x, printed.x, FifthDigit(printed.x)) << exact.t;
     EXPECT_NEAR(p, printed.p, FifthDigit(printed.p)) << exact.t;
     if (exact.t == 10.0) {
-      EXPECT_NEAR(scene.Rate(run.last, "crank"), kSliderCrankSpeedVerified, bound);
+      EXPECT_NEAR(problem.Rate(run.last, "crank"), kSliderCrankSpeedVerified, bound);
       EXPECT_NEAR(run.kinetic_integral, kSliderCrankIntegralVerified, bound);
       // published at rtol 1e-6, which leaves 9.3e-6
       EXPECT_NEAR(run.kinetic_integral, kSliderCrankIntegralPublished, 1e-5);
@@ -227,8 +227,8 @@ TEST_P(PlanarProblem, SliderCrankIsThatOfSundials) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, PlanarProblem,
-                         testing::Combine(testing::ValuesIn(RankRevealingColumns()),
+INSTANTIATE_TEST_SUITE_P(Methods, PlanarProblem,
+                         testing::Combine(testing::ValuesIn(RankRevealingMethods()),
                                           testing::Values(Place::kPlane, Place::kTilted)),
                          [](const auto& test) {
                            return NameOf(std::get<0>(test.param)) +

@@ -10,7 +10,7 @@
 namespace loopbench::harness::reference {
 namespace projection_test {
 
-class Projection : public testing::TestWithParam<Column> {};
+class Projection : public testing::TestWithParam<Method> {};
 
 TEST_P(Projection, KeepsLoopsClosedWhateverTheTolerance) {
   for (const char* name : {"four-bar", "seven-bar", "slider-crank", "spatial-four-bar"}) {
@@ -28,12 +28,12 @@ TEST_P(Projection, KeepsLoopsClosedWhateverTheTolerance) {
 /// Fixed steps against a run with tiny ones: projection takes away errors of the method's order,
 /// and adds none of a lower one.
 TEST_P(Projection, KeepsTheOrderOfTheIntegrator) {
-  const MechanismDescription scene = Shipped("four-bar").description;
+  const MechanismDescription problem = Shipped("four-bar").description;
   for (const auto& [profile, order] : {std::pair{"bogacki-shampine", 3}, {"dormand-prince", 5}}) {
     const auto end = [&](double step) {
       IntegratorOptions options = Options(profile, 1e-3);
       options.fixed_step = step;
-      const Simulation run = Simulate(scene, GetParam(), options, 1.6, {});
+      const Simulation run = Simulate(problem, GetParam(), options, 1.6, {});
       EXPECT_EQ(run.result.outcome, Outcome::kFinished);
       return run.last.bodies[2].p;
     };
@@ -44,7 +44,7 @@ TEST_P(Projection, KeepsTheOrderOfTheIntegrator) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Projection, testing::ValuesIn(PositionColumns()),
+INSTANTIATE_TEST_SUITE_P(Methods, Projection, testing::ValuesIn(PositionMethods()),
                          [](const auto& test) { return NameOf(test.param); });
 
 }  // namespace projection_test

@@ -62,11 +62,11 @@ TEST_P(Lean, ChangesAMotionByItsOwnSize) {
         const auto end = [&](const MechanismFile& file) {
           Experiment experiment = Single(file);
           experiment.compile.planar = false;
-          const Column column{.formulation = formulation,
+          const Method method{.formulation = formulation,
                               .enforcement = level,
                               .coordinates = set,
                               .solver = SolverKind::kRankRevealing};
-          return RunCase(experiment, CaseOf(experiment, file.description.name, column, 1e-9, 1.0));
+          return RunCase(experiment, CaseOf(experiment, file.description.name, method, 1e-9, 1.0));
         };
         const Record expected = end(exact), record = end(leaning);
         EXPECT_EQ(record.Text("outcome"), "finished");

@@ -52,14 +52,15 @@ std::string UnitsOf(JointType type, SpaceKind space) {
 }
 
 template <class Space>
-std::string UnitsOf(const MechanismDescription& scene, const Mechanism<Space, double>& mechanism) {
+std::string UnitsOf(const MechanismDescription& problem,
+                    const Mechanism<Space, double>& mechanism) {
   std::string units(static_cast<std::size_t>(mechanism.num_u()), '?');
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, double>& joint = mechanism.joints()[j];
     if (!joint.in_tree()) continue;
     const JointType type =
-        joint.description < 0 ? JointType::kFree : scene.joints[joint.description].type;
-    std::string own = UnitsOf(type, scene.space);
+        joint.description < 0 ? JointType::kFree : problem.joints[joint.description].type;
+    std::string own = UnitsOf(type, problem.space);
     for (const Drive& drive : mechanism.drives()) {
       if (drive.joint == j) own[drive.coordinate] = ' ';
     }
@@ -70,14 +71,14 @@ std::string UnitsOf(const MechanismDescription& scene, const Mechanism<Space, do
 }
 
 template <class Space>
-FirstEvaluation EvaluateIn(const MechanismDescription& scene, const Column& column) {
-  const Mechanism<Space, double> mechanism(scene, column.coordinates);
-  const Start<double> start = Assemble<Space>(scene, mechanism);
+FirstEvaluation EvaluateIn(const MechanismDescription& problem, const Method& method) {
+  const Mechanism<Space, double> mechanism(problem, method.coordinates);
+  const Start<double> start = Assemble<Space>(problem, mechanism);
   FirstEvaluation first;
   first.outcome = start.outcome;
   if (start.outcome != Outcome::kFinished) return first;
-  if (column.coordinates == Coordinates::kJoint) first.units = UnitsOf(scene, mechanism);
-  const auto formulation = MakeFormulation<Space>(column, mechanism);
+  if (method.coordinates == Coordinates::kJoint) first.units = UnitsOf(problem, mechanism);
+  const auto formulation = MakeFormulation<Space>(method, mechanism);
   first.outcome = formulation->Start(0.0, start.q, start.u);
   if (first.outcome != Outcome::kFinished) return first;
   // speeds of velocity level are the formulation's own: those of the start serve all
@@ -86,9 +87,9 @@ FirstEvaluation EvaluateIn(const MechanismDescription& scene, const Column& colu
   return first;
 }
 
-FirstEvaluation EvaluateAt(const MechanismDescription& scene, const Column& column) {
-  return scene.space == SpaceKind::kPlanar ? EvaluateIn<Planar>(scene, column)
-                                           : EvaluateIn<Spatial>(scene, column);
+FirstEvaluation EvaluateAt(const MechanismDescription& problem, const Method& method) {
+  return problem.space == SpaceKind::kPlanar ? EvaluateIn<Planar>(problem, method)
+                                             : EvaluateIn<Spatial>(problem, method);
 }
 
 /// Without those that start in singular positions, where the condition has no bound.
@@ -102,14 +103,14 @@ class Scales : public testing::TestWithParam<std::string> {};
 class RegularScales : public Scales {};
 
 TEST_P(Scales, RankIsThatOfTheOriginal) {
-  const MechanismDescription scene = Shipped(GetParam()).description;
-  for (const Column& column : PositionColumns()) {
-    const FirstEvaluation original = EvaluateAt(scene, column);
-    ASSERT_EQ(original.outcome, Outcome::kFinished) << ToString(column);
+  const MechanismDescription problem = Shipped(GetParam()).description;
+  for (const Method& method : PositionMethods()) {
+    const FirstEvaluation original = EvaluateAt(problem, method);
+    ASSERT_EQ(original.outcome, Outcome::kFinished) << ToString(method);
     for (const double factor : {1e-6, 1e6}) {
-      const FirstEvaluation scaled = EvaluateAt(AtScale(scene, factor), column);
-      ASSERT_EQ(scaled.outcome, Outcome::kFinished) << ToString(column) << " at " << factor;
-      EXPECT_EQ(scaled.rank, original.rank) << ToString(column) << " at " << factor;
+      const FirstEvaluation scaled = EvaluateAt(AtScale(problem, factor), method);
+      ASSERT_EQ(scaled.outcome, Outcome::kFinished) << ToString(method) << " at " << factor;
+      EXPECT_EQ(scaled.rank, original.rank) << ToString(method) << " at " << factor;
     }
   }
 }
@@ -118,20 +119,20 @@ TEST_P(Scales, RankIsThatOfTheOriginal) {
 /// rounds nothing, so that what is left comes from the order of sums alone: elimination of some 50
 /// unknowns in loops whose condition is 1e4 at worst away from singular positions.
 TEST_P(RegularScales, AnglesMoveAsBefore) {
-  const MechanismDescription scene = Shipped(GetParam()).description;
+  const MechanismDescription problem = Shipped(GetParam()).description;
   constexpr double kFactor = 1024;
-  for (const Column& column : PositionColumns()) {
-    if (column.coordinates != Coordinates::kJoint) continue;
-    const FirstEvaluation original = EvaluateAt(scene, column);
-    const FirstEvaluation scaled = EvaluateAt(AtScale(scene, kFactor), column);
+  for (const Method& method : PositionMethods()) {
+    if (method.coordinates != Coordinates::kJoint) continue;
+    const FirstEvaluation original = EvaluateAt(problem, method);
+    const FirstEvaluation scaled = EvaluateAt(AtScale(problem, kFactor), method);
     ASSERT_EQ(scaled.udot.size(), original.udot.size());
     const double bound = 1e-9 * (1.0 + original.udot.cwiseAbs().maxCoeff());
     for (Eigen::Index i = 0; i < scaled.udot.size(); ++i) {
       const char unit = original.units.at(static_cast<std::size_t>(i));
-      ASSERT_NE(unit, '?') << ToString(column) << " speed " << i;
+      ASSERT_NE(unit, '?') << ToString(method) << " speed " << i;
       const double factor = unit == 'l' ? kFactor : 1.0;
       EXPECT_NEAR(scaled.udot[i] / factor, original.udot[i], bound)
-          << ToString(column) << " speed " << i;
+          << ToString(method) << " speed " << i;
     }
   }
 }
@@ -143,16 +144,16 @@ INSTANTIATE_TEST_SUITE_P(All, RegularScales, testing::ValuesIn(RegularNames()),
 
 /// D5: stiffness is physical, rank is not.
 TEST(Masses, RankOfTheFourBarIgnoresThem) {
-  const MechanismDescription scene = Shipped("four-bar").description;
-  for (const Column& column : PositionColumns()) {
-    const FirstEvaluation original = EvaluateAt(scene, column);
-    for (std::size_t body = 1; body < scene.bodies.size(); ++body) {
-      MechanismDescription heavy = scene;
+  const MechanismDescription problem = Shipped("four-bar").description;
+  for (const Method& method : PositionMethods()) {
+    const FirstEvaluation original = EvaluateAt(problem, method);
+    for (std::size_t body = 1; body < problem.bodies.size(); ++body) {
+      MechanismDescription heavy = problem;
       heavy.bodies[body].mass *= 1e9;
       heavy.bodies[body].inertia *= 1e9;
-      const FirstEvaluation changed = EvaluateAt(heavy, column);
-      ASSERT_EQ(changed.outcome, Outcome::kFinished) << ToString(column);
-      EXPECT_EQ(changed.rank, original.rank) << ToString(column) << " body " << body;
+      const FirstEvaluation changed = EvaluateAt(heavy, method);
+      ASSERT_EQ(changed.outcome, Outcome::kFinished) << ToString(method);
+      EXPECT_EQ(changed.rank, original.rank) << ToString(method) << " body " << body;
     }
   }
 }
@@ -163,12 +164,12 @@ TEST(InSpace, PlanarLoopsReportThreeRedundantRowsEach) {
   const std::vector<std::pair<std::string, int>> loops = {
       {"parallelogram", 1}, {"seven-bar", 2}, {"n-four-bar", 2}, {"andrews-squeezer", 3}};
   for (const auto& [name, count] : loops) {
-    const MechanismDescription scene =
+    const MechanismDescription problem =
         InSpace(Shipped(name).description, Eigen::Vector3d(0.3, -0.5, 0.7));
-    for (const Column& column : PositionColumns()) {
-      const FirstEvaluation first = EvaluateAt(scene, column);
-      ASSERT_EQ(first.outcome, Outcome::kFinished) << name << " " << ToString(column);
-      EXPECT_EQ(first.rank, count * (5 - 3)) << name << " " << ToString(column);
+    for (const Method& method : PositionMethods()) {
+      const FirstEvaluation first = EvaluateAt(problem, method);
+      ASSERT_EQ(first.outcome, Outcome::kFinished) << name << " " << ToString(method);
+      EXPECT_EQ(first.rank, count * (5 - 3)) << name << " " << ToString(method);
     }
   }
 }

@@ -23,19 +23,19 @@ TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
       Single(ReadMechanism(kConfigs / "mechanisms" / (GetParam() + ".json")));
   constexpr double kRtol = 1e-8;
   // rank-revealing: some start in singular positions
-  for (const Column& column : RankRevealingColumns()) {
+  for (const Method& method : RankRevealingMethods()) {
     const Record record = RunCase(
-        experiment, CaseOf(experiment, GetParam(), column, kRtol, ShortHorizon(GetParam())));
-    if (column.formulation == "reduction" && GetParam().ends_with("singular-start") &&
+        experiment, CaseOf(experiment, GetParam(), method, kRtol, ShortHorizon(GetParam())));
+    if (method.formulation == "reduction" && GetParam().ends_with("singular-start") &&
         record.Text("outcome") == "singular") {
       continue;  // no set of independent speeds serves there: a result, see results/paper
     }
     ASSERT_EQ(record.Text("outcome"), "finished")
-        << ToString(column) << ": " << record.Text("message");
+        << ToString(method) << ": " << record.Text("message");
     // errors of at most rtol per step and component, some 1e3 steps and energies up to 1e3 J
-    EXPECT_LE(record.Number("energy_error_max"), 1e6 * kRtol) << ToString(column);
-    EXPECT_LE(record.Number("drift_position_max"), 1e3 * kRtol) << ToString(column);
-    std::cout << ToString(column) << ": " << record.Number("energy_error_max") << " J, "
+    EXPECT_LE(record.Number("energy_error_max"), 1e6 * kRtol) << ToString(method);
+    EXPECT_LE(record.Number("drift_position_max"), 1e3 * kRtol) << ToString(method);
+    std::cout << ToString(method) << ": " << record.Number("energy_error_max") << " J, "
               << record.Number("drift_position_max") << " m\n";
   }
 }

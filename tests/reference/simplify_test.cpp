@@ -1,6 +1,6 @@
-// Models of a scene against the whole one, point by point: exact ones agree to what the integrator
-// leaves, the error of approximate ones goes to zero as what they neglect does, and where it is not
-// small they are wrong.
+// Models of a problem against the whole one, point by point: exact ones agree to what the
+// integrator leaves, the error of approximate ones goes to zero as what they neglect does, and
+// where it is not small they are wrong.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,14 +17,16 @@
 namespace loopbench::harness::reference {
 namespace simplify_test {
 
-MechanismDescription Scene(const std::string& path) {
+MechanismDescription Problem(const std::string& path) {
   return ReadMechanism(kConfigs / (path + ".json")).description;
 }
 
-MechanismDescription Model(const std::string& name) { return Scene("experiments/models/" + name); }
+MechanismDescription Model(const std::string& name) {
+  return Problem("experiments/models/" + name);
+}
 
-const Idea& IdeaOf(const std::string& name) {
-  return *std::ranges::find(Ideas(), name, &Idea::name);
+const SimplificationRule& IdeaOf(const std::string& name) {
+  return *std::ranges::find(SimplificationRules(), name, &SimplificationRule::name);
 }
 
 /// What the file of the model says: models are compared as they are written and read.
@@ -36,11 +38,11 @@ constexpr double kTolerance = 1e-12;
 
 /// The last snapshot of a run in tight steps, multipliers at level projection.
 Snapshot End(const MechanismDescription& description, double horizon) {
-  Column column;
-  column.formulation = "lagrange";
-  column.enforcement = Enforcement::kPosition;
+  Method method;
+  method.formulation = "lagrange";
+  method.enforcement = Enforcement::kPosition;
   const Simulation simulation =
-      Simulate(description, column, Options("dormand-prince", kTolerance), horizon);
+      Simulate(description, method, Options("dormand-prince", kTolerance), horizon);
   EXPECT_EQ(simulation.result.outcome, Outcome::kFinished)
       << description.name << ": " << simulation.result.message;
   return simulation.last;
@@ -93,7 +95,7 @@ Simplified Apply(const std::string& idea, const MechanismDescription& descriptio
 }
 
 /// What two tight runs of one motion may differ by [m]: the errors of their steps, each within the
-/// tolerance, add up over up to a hundred steps of scenes of some metres.
+/// tolerance, add up over up to a hundred steps of problems of some metres.
 constexpr double kSameMotion = 1e2 * kTolerance;
 
 TEST(SimplifiedModels, ExactOnesMoveAsTheWholeModel) {
@@ -102,10 +104,10 @@ TEST(SimplifiedModels, ExactOnesMoveAsTheWholeModel) {
     MechanismDescription whole;
     double horizon;
   };
-  const std::vector<Exact> exact = {{"welds", Scene("mechanisms/welded-four-bar"), 2.0},
-                                    {"immovable", Scene("mechanisms/truss"), 1.0},
-                                    {"islands", Scene("mechanisms/four-islands"), 1.0},
-                                    {"planar", Scene("mechanisms/parallelogram-in-space"), 1.0},
+  const std::vector<Exact> exact = {{"welds", Problem("mechanisms/welded-four-bar"), 2.0},
+                                    {"immovable", Problem("mechanisms/truss"), 1.0},
+                                    {"islands", Problem("mechanisms/four-islands"), 1.0},
+                                    {"planar", Problem("mechanisms/parallelogram-in-space"), 1.0},
                                     {"welds", Model("hall"), 1.0},
                                     {"immovable", Model("hall"), 1.0},
                                     {"islands", Model("hall"), 1.0},
@@ -123,7 +125,7 @@ TEST(SimplifiedModels, ExactOnesMoveAsTheWholeModel) {
 
 TEST(SimplifiedModels, TheAssembledStartIsNoOtherMotion) {
   for (const std::string name : {"mechanisms/four-bar", "mechanisms/double-wishbone"}) {
-    const MechanismDescription whole = Scene(name);
+    const MechanismDescription whole = Problem(name);
     std::string why;
     Simplified started;
     started.parts = {WithAssembledStart(whole, &why)};
@@ -201,7 +203,7 @@ TEST(SimplifiedModels, TheErrorOfAStiffSpringIsAsItsCompliance) {
 
 TEST(SimplifiedModels, ASpringBetweenPointsBecomesARod) {
   const auto with_springs = [](double small) {
-    MechanismDescription d = Scene("mechanisms/flyball-governor");
+    MechanismDescription d = Problem("mechanisms/flyball-governor");
     for (ForceDescription& force : d.forces) {
       auto& spring = std::get<SpringDamper>(force);
       spring.stiffness *= 10.0 / small;
@@ -255,8 +257,8 @@ TEST(SimplifiedModels, AHeavyRodIsNoMasslessOne) {
 
 TEST(SimplifiedModels, CombinedOnesHaveTheErrorOfTheirWorst) {
   const MechanismDescription whole = Model("excavator-arm");
-  std::vector<const Idea*> ideas;
-  for (const Idea& idea : Ideas()) ideas.push_back(&idea);
+  std::vector<const SimplificationRule*> ideas;
+  for (const SimplificationRule& idea : SimplificationRules()) ideas.push_back(&idea);
   SimplifyOptions options;
   options.light_links = 0.02;
   const Simplified all = Combine(whole, ideas, MakeShortRun(whole, 1.0, 60.0), options);

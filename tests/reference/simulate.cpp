@@ -60,12 +60,12 @@ Snapshot SnapshotOf(double t, const Kinematics<Space, double>& kinematics) {
 }
 
 template <class Space>
-Simulation SimulateIn(const MechanismDescription& description, const Column& column,
+Simulation SimulateIn(const MechanismDescription& description, const Method& method,
                       const IntegratorOptions& options, double horizon, const Watch& watch) {
-  const Mechanism<Space, double> mechanism(description, column.coordinates);
+  const Mechanism<Space, double> mechanism(description, method.coordinates);
   Simulation simulation;
   const Start<double> start = Assemble<Space>(description, mechanism);
-  const auto formulation = MakeFormulation<Space>(column, mechanism);
+  const auto formulation = MakeFormulation<Space>(method, mechanism);
   simulation.result.outcome = start.outcome;
   simulation.result.message = start.message;
   if (start.outcome == Outcome::kFinished) {
@@ -107,11 +107,11 @@ Eigen::Vector3d After(const Eigen::Matrix3d& R1, const Eigen::Vector3d& turn) {
 
 }  // namespace
 
-Simulation Simulate(const MechanismDescription& description, const Column& column,
+Simulation Simulate(const MechanismDescription& description, const Method& method,
                     const IntegratorOptions& options, double horizon, const Watch& watch) {
   return description.space == SpaceKind::kPlanar
-             ? SimulateIn<Planar>(description, column, options, horizon, watch)
-             : SimulateIn<Spatial>(description, column, options, horizon, watch);
+             ? SimulateIn<Planar>(description, method, options, horizon, watch)
+             : SimulateIn<Spatial>(description, method, options, horizon, watch);
 }
 
 IntegratorOptions Options(const std::string& profile, double tolerance) {
@@ -172,22 +172,22 @@ Eigen::Matrix3d AnyRotation() {
   return Eigen::AngleAxisd(1.2345, Eigen::Vector3d(0.48, -0.6, 0.64)).toRotationMatrix();
 }
 
-const std::vector<Column>& RankRevealingColumns() {
-  static const std::vector<Column> kColumns = [] {
-    std::vector<Column> columns = PublishedColumns();
-    for (Column& column : columns) column.solver = SolverKind::kRankRevealing;
-    return columns;
+const std::vector<Method>& RankRevealingMethods() {
+  static const std::vector<Method> kMethods = [] {
+    std::vector<Method> methods = PublishedMethods();
+    for (Method& method : methods) method.solver = SolverKind::kRankRevealing;
+    return methods;
   }();
-  return kColumns;
+  return kMethods;
 }
 
-const std::vector<Column>& PositionColumns() {
-  static const std::vector<Column> kColumns = [] {
-    std::vector<Column> columns = RankRevealingColumns();
-    for (Column& column : columns) column.enforcement = Enforcement::kPosition;
-    return columns;
+const std::vector<Method>& PositionMethods() {
+  static const std::vector<Method> kMethods = [] {
+    std::vector<Method> methods = RankRevealingMethods();
+    for (Method& method : methods) method.enforcement = Enforcement::kPosition;
+    return methods;
   }();
-  return kColumns;
+  return kMethods;
 }
 
 }  // namespace loopbench::harness::reference

@@ -39,7 +39,7 @@ using Watch = std::function<void(const Snapshot&)>;
 
 /// Runs `description` from its consistent start; `watch` sees every accepted step and the start.
 /// An assembly that fails gives its outcome and message.
-Simulation Simulate(const MechanismDescription& description, const Column& column,
+Simulation Simulate(const MechanismDescription& description, const Method& method,
                     const IntegratorOptions& options, double horizon, const Watch& watch = {});
 
 /// rtol = atol, ten minutes of CPU time: a test must not end by them, sanitizers or not.
@@ -54,9 +54,10 @@ Eigen::Vector3d PointOf(const MechanismDescription& description, const Snapshot&
 Eigen::Vector3d VelocityOf(const MechanismDescription& description, const Snapshot& snapshot,
                            int body, const Eigen::Vector3d& at);
 
-/// The same scene turned by `R` in space: gravity, the ground's points and joint frames, forces in
-/// ground axes. Bodies keep their axes, joints their coordinates. Spatial whatever it was; throws
-/// std::invalid_argument for a planar scene with free joints, whose coordinates differ in space.
+/// The same problem turned by `R` in space: gravity, the ground's points and joint frames, forces
+/// in ground axes. Bodies keep their axes, joints their coordinates. Spatial whatever it was;
+/// throws std::invalid_argument for a planar problem with free joints, whose coordinates differ in
+/// space.
 MechanismDescription Tilted(MechanismDescription description, const Eigen::Matrix3d& R);
 
 /// A rotation about no particular axis, the same one for all.
@@ -64,8 +65,8 @@ Eigen::Matrix3d AnyRotation();
 
 /// The three formulations at the level of the paper with rank-revealing solvers, in both coordinate
 /// sets.
-const std::vector<Column>& RankRevealingColumns();
+const std::vector<Method>& RankRevealingMethods();
 /// The same at level projection.
-const std::vector<Column>& PositionColumns();
+const std::vector<Method>& PositionMethods();
 
 }  // namespace loopbench::harness::reference

@@ -17,15 +17,15 @@
 namespace loopbench::harness::reference {
 namespace singular_test {
 
-const Column kOdcaPosition{.formulation = "odca",
+const Method kOdcaPosition{.formulation = "odca",
                            .enforcement = Enforcement::kPosition,
                            .coordinates = Coordinates::kJoint,
                            .solver = SolverKind::kRankRevealing};
 
-class Passage : public testing::TestWithParam<Column> {
+class Passage : public testing::TestWithParam<Method> {
  protected:
-  /// In absolute coordinates every joint can come apart, and what is softened in a step that ends
-  /// near a singular position is not taken away in full: a share of that step's own error.
+  /// In absolute coordinates every joint can come apart, and what is regularized in a step that
+  /// ends near a singular position is not taken away in full: a share of that step's own error.
   double Branch(double tolerance) const {
     const bool absolute = GetParam().coordinates == Coordinates::kAbsolute;
     return absolute ? std::max(1e-8, 0.1 * tolerance) : 1e-8;
@@ -99,7 +99,7 @@ TEST_P(Passage, RedundantLoopsPassToo) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Passage, testing::ValuesIn(PositionColumns()),
+INSTANTIATE_TEST_SUITE_P(Methods, Passage, testing::ValuesIn(PositionMethods()),
                          [](const auto& test) { return NameOf(test.param); });
 
 /// What the passages cost: steps of the motion itself, a pendulum without any loop.
@@ -145,23 +145,23 @@ TEST(PassageStarts, PerturbedStartsKeepTheirBranch) {
 /// What a run says of the singular positions it met.
 TEST(SingularityDistance, IsSmallWhereLoopsGoFlatAndOnlyThere) {
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-    Column column = kOdcaPosition;
-    column.coordinates = coordinates;
+    Method method = kOdcaPosition;
+    method.coordinates = coordinates;
     const auto run = [&](const char* name, double tolerance) {
-      return RunShipped(name, column, tolerance, 10.0);
+      return RunShipped(name, method, tolerance, 10.0);
     };
     // flat every 0.7 s, passed at 1 rad/s in steps of some 0.01 s: one of them ends within 0.01 rad
     const Record passing = run("parallelogram", 1e-10);
     EXPECT_LT(passing.Number("singularity_distance_min"), 0.01);
     EXPECT_GT(passing.Number("singularity_distance_min_t"), 0.3);
-    // softened at steps' ends and at stages between them
+    // regularized at steps' ends and at stages between them
     EXPECT_GT(passing.Number("regularized_steps"), 0.0);
     EXPECT_GT(passing.Number("regularized_evaluations"), passing.Number("regularized_steps"));
     // a start in line, which rounding of the angles puts off by eps
     const Record from = run("parallelogram-singular-start", 1e-8);
     EXPECT_LE(from.Number("singularity_distance_min"), 1e-15);
     EXPECT_EQ(from.Number("singularity_distance_min_t"), 0.0);
-    // never in line; nothing is softened
+    // never in line; nothing is regularized
     const Record regular = run("four-bar", 1e-8);
     EXPECT_GT(regular.Number("singularity_distance_min"), 0.05);
     EXPECT_EQ(regular.Number("regularized_evaluations"), 0.0);

@@ -35,27 +35,27 @@ JointDescription JointTo(const std::string& name, JointType type, int body) {
 /// axes at the start.
 MechanismDescription BodyOnPoint(const BodyDescription& body, Hold hold, const Eigen::Vector3d& g,
                                  const Eigen::Matrix3d& R, const Eigen::Vector3d& w) {
-  MechanismDescription scene;
-  scene.name = "body";
-  scene.space = SpaceKind::kSpatial;
-  scene.gravity = g;
-  scene.bodies[kGround].name = "ground";
-  scene.bodies.push_back(body);
+  MechanismDescription problem;
+  problem.name = "body";
+  problem.space = SpaceKind::kSpatial;
+  problem.gravity = g;
+  problem.bodies[kGround].name = "ground";
+  problem.bodies.push_back(body);
   const Eigen::Quaterniond e(R);
   std::vector<double> coordinates = {e.w(), e.x(), e.y(), e.z()};
   std::vector<double> speeds = {w[0], w[1], w[2]};
   if (hold == Hold::kFreeAndSpherical) {
-    scene.joints.push_back(JointTo("free", JointType::kFree, 1));
-    scene.joints.push_back(JointTo("ball", JointType::kSpherical, 1));
-    scene.joints.back().cut = true;
+    problem.joints.push_back(JointTo("free", JointType::kFree, 1));
+    problem.joints.push_back(JointTo("ball", JointType::kSpherical, 1));
+    problem.joints.back().cut = true;
     coordinates.insert(coordinates.end(), 3, 0.0);
     speeds.insert(speeds.end(), 3, 0.0);
   } else {
-    scene.joints.push_back(JointTo("ball", JointType::kSpherical, 1));
+    problem.joints.push_back(JointTo("ball", JointType::kSpherical, 1));
   }
-  scene.initial.coordinates.push_back({0, coordinates});
-  scene.initial.speeds.push_back({0, speeds});
-  return scene;
+  problem.initial.coordinates.push_back({0, coordinates});
+  problem.initial.speeds.push_back({0, speeds});
+  return problem;
 }
 
 /// For elements of a rotation matrix, energies of some joules and lengths below a metre: each step
@@ -64,12 +64,12 @@ double Bound(const Simulation& simulation) {
   return static_cast<double>(simulation.result.steps) * kTolerance;
 }
 
-void ExpectAttitude(const MechanismDescription& scene, const Column& column,
+void ExpectAttitude(const MechanismDescription& problem, const Method& method,
                     const std::function<Eigen::Matrix3d(double)>& exact) {
   double worst = 0.0;
   int step = 0;
   const Simulation run = Simulate(
-      scene, column, Options("ode45", kTolerance), kHorizon, [&](const Snapshot& snapshot) {
+      problem, method, Options("ode45", kTolerance), kHorizon, [&](const Snapshot& snapshot) {
         // the closed form costs a quadrature
         if (step++ % 50 != 0 && snapshot.t < kHorizon) return;
         const Eigen::Matrix3d error = snapshot.bodies[1].R - exact(snapshot.t);
@@ -79,15 +79,15 @@ void ExpectAttitude(const MechanismDescription& scene, const Column& column,
   ASSERT_EQ(run.result.t_reached, kHorizon);
   EXPECT_LE(worst, Bound(run));
   EXPECT_LE(run.energy_error, Bound(run));
-  const Eigen::Vector3d held = PointOf(scene, run.last, 1, Eigen::Vector3d::Zero());
+  const Eigen::Vector3d held = PointOf(problem, run.last, 1, Eigen::Vector3d::Zero());
   EXPECT_LE(held.norm(), Bound(run));
   std::cout << "attitude " << worst << " of " << Bound(run) << ", energy " << run.energy_error
             << " J, point " << held.norm() << " m, " << run.result.steps << " steps\n";
 }
 
-class OneBody : public testing::TestWithParam<std::tuple<Column, Hold>> {
+class OneBody : public testing::TestWithParam<std::tuple<Method, Hold>> {
  protected:
-  const Column& column() const { return std::get<0>(GetParam()); }
+  const Method& method() const { return std::get<0>(GetParam()); }
   Hold hold() const { return std::get<1>(GetParam()); }
 };
 
@@ -100,9 +100,9 @@ TEST_P(OneBody, AsymmetricWithoutMomentsTurnsAsJacobiSays) {
   const double w1 = 3.0, w3 = 2.5;
   const FreeBody exact(moments, w1, w3);
   const Eigen::Matrix3d R0 = AnyRotation();
-  const MechanismDescription scene =
+  const MechanismDescription problem =
       BodyOnPoint(body, hold(), Eigen::Vector3d::Zero(), R0, R0 * Eigen::Vector3d(w1, 0.0, w3));
-  ExpectAttitude(scene, column(),
+  ExpectAttitude(problem, method(),
                  [&](double t) -> Eigen::Matrix3d { return R0 * exact.Attitude(t); });
 }
 
@@ -115,13 +115,13 @@ TEST_P(OneBody, QuaternionsKeepTheOrderOfTheIntegrator) {
   const Eigen::Vector3d moments(0.4, 0.8, 1.1);
   body.inertia = moments.asDiagonal();
   const FreeBody exact(moments, 3.0, 2.5);
-  const MechanismDescription scene = BodyOnPoint(body, hold(), Eigen::Vector3d::Zero(),
-                                                 Eigen::Matrix3d::Identity(), {3.0, 0.0, 2.5});
+  const MechanismDescription problem = BodyOnPoint(body, hold(), Eigen::Vector3d::Zero(),
+                                                   Eigen::Matrix3d::Identity(), {3.0, 0.0, 2.5});
   for (const auto& [profile, order] : {std::pair{"bogacki-shampine", 3}, {"dormand-prince", 5}}) {
     const auto error = [&](double step) {
       IntegratorOptions options = Options(profile, 1e-3);
       options.fixed_step = step;
-      const Simulation run = Simulate(scene, column(), options, 1.6, {});
+      const Simulation run = Simulate(problem, method(), options, 1.6, {});
       EXPECT_EQ(run.result.outcome, Outcome::kFinished);
       return (run.last.bodies[1].R - exact.Attitude(1.6)).norm();
     };
@@ -143,33 +143,33 @@ BodyDescription Top(double A, double C) {
 }
 
 /// Started at a turning point of the nutation.
-void ExpectTop(const Column& column, Hold hold, double A, double C, double theta, double phi_rate,
+void ExpectTop(const Method& method, Hold hold, double A, double C, double theta, double phi_rate,
                double w3) {
   constexpr double kGravity = 9.81;
   const SymmetricTop exact(A, C, kGravity * 0.5, theta, phi_rate, w3);
   const Eigen::Matrix3d R0 = EulerRotation(0.0, theta, 0.0);
   const double own_spin = w3 - phi_rate * std::cos(theta);
   const Eigen::Vector3d w = phi_rate * Eigen::Vector3d::UnitZ() + own_spin * R0.col(2);
-  ExpectAttitude(BodyOnPoint(Top(A, C), hold, {0.0, 0.0, -kGravity}, R0, w), column,
+  ExpectAttitude(BodyOnPoint(Top(A, C), hold, {0.0, 0.0, -kGravity}, R0, w), method,
                  [&](double t) { return exact.Attitude(t); });
 }
 
 TEST_P(OneBody, SphericalPendulumNutatesAndPrecesses) {
   // from its upper turning point, without spin
-  ExpectTop(column(), hold(), 0.35, 0.1, kPi - 1.2, 1.5, 0.0);
+  ExpectTop(method(), hold(), 0.35, 0.1, kPi - 1.2, 1.5, 0.0);
 }
 
 TEST_P(OneBody, HeavyTopNutatesAndPrecesses) {
   // dropped without precession: it falls to the lower turning point in cusps
-  ExpectTop(column(), hold(), 0.35, 0.2, 0.5, 0.0, 25.0);
+  ExpectTop(method(), hold(), 0.35, 0.2, 0.5, 0.0, 25.0);
 }
 
 TEST_P(OneBody, HeavyTopLoopsWhenPushedBackwards) {
-  ExpectTop(column(), hold(), 0.35, 0.2, 0.9, -1.5, 20.0);
+  ExpectTop(method(), hold(), 0.35, 0.2, 0.9, -1.5, 20.0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, OneBody,
-                         testing::Combine(testing::ValuesIn(RankRevealingColumns()),
+INSTANTIATE_TEST_SUITE_P(Methods, OneBody,
+                         testing::Combine(testing::ValuesIn(RankRevealingMethods()),
                                           testing::Values(Hold::kSpherical,
                                                           Hold::kFreeAndSpherical)),
                          [](const auto& test) {
@@ -178,11 +178,11 @@ INSTANTIATE_TEST_SUITE_P(Columns, OneBody,
                                                                                : "FreeAndBall");
                          });
 
-class Bennett : public testing::TestWithParam<Column> {};
+class Bennett : public testing::TestWithParam<Method> {};
 
 TEST_P(Bennett, LinkageKeepsTheRelationOfItsAngles) {
   // tan(theta1 / 2) tan(theta2 / 2) = sin((beta + alpha) / 2) / sin((beta - alpha) / 2)
-  const MechanismDescription scene =
+  const MechanismDescription problem =
       ReadMechanism(kConfigs / "mechanisms/bennett.json").description;
   const double alpha = 1.1, beta = std::asin(0.6 * std::sin(alpha));
   const double plus = std::sin((beta + alpha) / 2), minus = std::sin((beta - alpha) / 2);
@@ -190,7 +190,7 @@ TEST_P(Bennett, LinkageKeepsTheRelationOfItsAngles) {
   constexpr double kRtol = 1e-9;
   double worst = 0.0;
   const Simulation run =
-      Simulate(scene, GetParam(), Options("ode45", kRtol), 5.0, [&](const Snapshot& snapshot) {
+      Simulate(problem, GetParam(), Options("ode45", kRtol), 5.0, [&](const Snapshot& snapshot) {
         const Eigen::Matrix3d& R1 = snapshot.bodies[1].R;
         const Eigen::Matrix3d R12 = (R1 * twist).transpose() * snapshot.bodies[2].R;
         const double half1 = std::atan2(R1(1, 0), R1(0, 0)) / 2;
@@ -206,8 +206,8 @@ TEST_P(Bennett, LinkageKeepsTheRelationOfItsAngles) {
             << run.result.steps << " steps\n";
 }
 
-INSTANTIATE_TEST_SUITE_P(Columns, Bennett, testing::ValuesIn(RankRevealingColumns()),
-                         [](const auto& column) { return NameOf(column.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, Bennett, testing::ValuesIn(RankRevealingMethods()),
+                         [](const auto& method) { return NameOf(method.param); });
 
 // The closed forms themselves against facts that need no elliptic function.
 

@@ -22,7 +22,7 @@ namespace trajectory_test {
 constexpr double kPi = std::numbers::pi;
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-const Column kOdcaJoint = {.formulation = "odca"};
+const Method kOdcaJoint = {.formulation = "odca"};
 
 /// A run's record and trajectory.
 struct Written {
@@ -43,14 +43,14 @@ MechanismFile ShippedFile(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
 }
 
-Written WriteTrajectory(const MechanismFile& mechanism, const Column& column,
+Written WriteTrajectory(const MechanismFile& mechanism, const Method& method,
                         const std::string& integrator, double tolerance, double horizon,
                         const OutputOptions& output, const CompileOptions& compile = {},
                         double step = 0.0) {
   Experiment experiment = Single(mechanism);
   experiment.output = output;
   experiment.compile = compile;
-  Case one = CaseOf(experiment, mechanism.description.name, column, tolerance, horizon);
+  Case one = CaseOf(experiment, mechanism.description.name, method, tolerance, horizon);
   one.integrator = integrator;
   one.step = step;
   Written written;
@@ -132,9 +132,9 @@ TEST(Trajectory, OfA01IsTheEllipticFunctionAndItsPinForce) {
 TEST(Trajectory, OfTheSliderCrankIsThatOfSundials) {
   std::vector<double> times;
   for (const SliderCrankState& state : kSliderCrankVerified) times.push_back(state.t);
-  for (const Column& column : PositionColumns()) {
+  for (const Method& method : PositionMethods()) {
     const Written run =
-        WriteTrajectory(ShippedFile("slider-crank"), column, "ode45", 1e-11, 10.0, Times(times));
+        WriteTrajectory(ShippedFile("slider-crank"), method, "ode45", 1e-11, 10.0, Times(times));
     const double bound = BoundOf(run, 1e-11);
     for (std::size_t row = 0; row < times.size(); ++row) {
       const SliderCrankState& exact = kSliderCrankVerified[row];
@@ -192,23 +192,23 @@ TEST(Trajectory, ErrorOfDenseOutputIsOfOrderSix) {
 }
 
 TEST(Trajectory, LeavesTheRunAsItIs) {
-  // the parallelogram passes singular positions, near which rows see softened constraints too
+  // the parallelogram passes singular positions, near which rows see regularized constraints too
   for (const char* name : {"four-bar", "parallelogram", "driven-four-bar", "bennett"}) {
     const bool passes = std::string(name) == "parallelogram";
     const double horizon = passes ? 3.0 : 0.9;
     const MechanismFile mechanism = ShippedFile(name);
-    std::vector<Column> columns = RankRevealingColumns();
-    columns.insert(columns.end(), PositionColumns().begin(), PositionColumns().end());
-    for (const Column& column : columns) {
+    std::vector<Method> methods = RankRevealingMethods();
+    methods.insert(methods.end(), PositionMethods().begin(), PositionMethods().end());
+    for (const Method& method : methods) {
       Experiment experiment = Single(mechanism);
-      const Case one = CaseOf(experiment, mechanism.description.name, column, 1e-7, horizon);
+      const Case one = CaseOf(experiment, mechanism.description.name, method, 1e-7, horizon);
       const Record alone = RunCase(experiment, one);
-      const Written run = WriteTrajectory(mechanism, column, one.integrator, 1e-7, horizon,
+      const Written run = WriteTrajectory(mechanism, method, one.integrator, 1e-7, horizon,
                                           Rows(passes ? 3001 : 97));
       for (const char* key :
            {"state_hash", "steps", "rejected", "rhs_evaluations", "restarts", "drift_position_max",
             "energy_error_max", "regularized_evaluations"}) {
-        EXPECT_EQ(alone.Text(key), run.record.Text(key)) << name << ' ' << ToString(column) << key;
+        EXPECT_EQ(alone.Text(key), run.record.Text(key)) << name << ' ' << ToString(method) << key;
       }
     }
   }
@@ -238,12 +238,12 @@ TEST(Reactions, OfAStaticFourBarAreThoseOfStatics) {
   const double by = m2 * g / 2, bx = -(by + m3 * g / 2) / 2;
   const double ax = -bx, ay = m2 * g - by;  // of the crank on the coupler
   const double moment = ay - 2 * ax + m1 * g / 2;
-  for (const Column& column : RankRevealingColumns()) {
-    const Written run = WriteTrajectory(HeldFourBar(), column, "ode45", 1e-9, 1.0, Rows(3));
+  for (const Method& method : RankRevealingMethods()) {
+    const Written run = WriteTrajectory(HeldFourBar(), method, "ode45", 1e-9, 1.0, Rows(3));
     for (std::size_t row = 0; row < 3; ++row) {
       // assembled to 1e-15 of some metres; loads of 100 N, condition below 10
       const double bound = 1000 * 100 * kEpsilon;
-      EXPECT_NEAR(run.At(row, "reaction", "A", "fx"), ax, bound) << ToString(column);
+      EXPECT_NEAR(run.At(row, "reaction", "A", "fx"), ax, bound) << ToString(method);
       EXPECT_NEAR(run.At(row, "reaction", "A", "fy"), ay, bound);
       EXPECT_NEAR(run.At(row, "reaction", "B", "fx"), -bx, bound);  // on the follower
       EXPECT_NEAR(run.At(row, "reaction", "B", "fy"), -by, bound);

@@ -9,7 +9,7 @@ const LoopbenchCosts = (() => {
     constructor(host, costs, pick) {
       super();
       Object.assign(this, {costs, pick, cost: costs[0], problem: costs[0].problems[0], tall: 380, logX: true, logY: true});
-      const names = select('scene', this.cost.problems.map((one) => one.name), (i) => this.show(this.cost, i));
+      const names = select('problem', this.cost.problems.map((one) => one.name), (i) => this.show(this.cost, i));
       const errors = select('error', costs.map((one) => one.error), (i) => {
         names.list.replaceChildren(...costs[i].problems.map((one, k) => make('option', {value: String(k)}, one.name)));
         this.show(costs[i], 0);

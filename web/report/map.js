@@ -3,7 +3,7 @@
 const LoopbenchMap = (() => {
   const {make, button, command} = LoopbenchParts;
 
-  class FailureMap {
+  class RobustnessMap {
     constructor(host, map, pick) {
       Object.assign(this, {map, pick, folded: new Set(), narrow: new Set(), chosen: null});
       this.legend = make('p', {class: 'legend'});
@@ -98,5 +98,5 @@ const LoopbenchMap = (() => {
           ': ' + this.map.columns[c] + ': ' + cell.text), list, ...show);
     }
   }
-  return {FailureMap};
+  return {RobustnessMap};
 })();

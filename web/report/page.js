@@ -30,7 +30,7 @@
       view.tables.push(new LoopbenchTable.Table(byId('tables'), table, on));
     }
     if (byId('costs') && data('costs').length) view.costs = new LoopbenchCosts.Costs(byId('costs'), data('costs'), pickId);
-    if (byId('map') && data('map')) view.map = new LoopbenchMap.FailureMap(byId('map'), data('map'), pickId);
+    if (byId('map') && data('map')) view.map = new LoopbenchMap.RobustnessMap(byId('map'), data('map'), pickId);
     for (const button of document.querySelectorAll('button.show')) {
       button.addEventListener('click', () => {
         view.tables[0].filter(button.dataset.filter);
@@ -44,9 +44,9 @@
 
   function buildMotion(runs) {
     view.runs = runs;
-    view.scenes = data('scenes');
+    view.problems = data('problems');
     const host = byId('motion');
-    view.choice = select('scene', view.scenes.map((scene) => scene.name), (i) => showScene(i));
+    view.choice = select('problem', view.problems.map((problem) => problem.name), (i) => showProblem(i));
     const grid = make('div', {class: 'together'}), left = make('div'), right = make('div');
     view.legend = make('p', {class: 'legend'});
     grid.append(left, right);
@@ -56,17 +56,17 @@
                 command(data('plot-command')));
     view.motion = new LoopbenchMotion.Motion(left, clock);
     for (const plot of data('plots')) view.plots.push(new LoopbenchPlots.TimePlot(right, plot, runs, clock));
-    view.scene = 0;
+    view.problem = 0;
   }
 
-  // Curves are of the rows that the table shows, of one scene.
-  function rowsOfScene() {
-    const name = view.scenes[view.scene].name;
-    return (view.tables[0] ? view.tables[0].rows : []).filter((row) => view.runs.scenes[row] === name);
+  // Curves are of the rows that the table shows, of one problem.
+  function rowsOfProblem() {
+    const name = view.problems[view.problem].name;
+    return (view.tables[0] ? view.tables[0].rows : []).filter((row) => view.runs.problems[row] === name);
   }
   function drawRows(chosen = -1) {
     if (!view.ready || !view.runs) return;
-    const rows = rowsOfScene();
+    const rows = rowsOfProblem();
     for (const plot of view.plots) plot.show(rows, chosen);
     const looks = data('tables').looks, kinds = new Map();
     for (const row of rows) {
@@ -76,25 +76,25 @@
     view.legend.replaceChildren(...[...kinds].map(([name, colour]) =>
       make('span', {}, make('span', {class: 'stroke', style: 'border-color:var(' + colour + ')'}), ' ' + name)));
     const ends = view.plots.map((plot) => plot.end());
-    const paths = view.scenes[view.scene].paths.map((path) => path.times[path.times.length - 1]);
+    const paths = view.problems[view.problem].paths.map((path) => path.times[path.times.length - 1]);
     clock.end = Math.max(1e-12, ...ends, ...paths);
-    if (view.shown !== view.scene) {
-      view.shown = view.scene;
-      view.motion.show(view.scenes[view.scene]);
+    if (view.shown !== view.problem) {
+      view.shown = view.problem;
+      view.motion.show(view.problems[view.problem]);
       clock.set(0);
     } else if (chosen < 0) {
       clock.set(clock.t);
     }
   }
-  function showScene(i) {
-    view.scene = i;
+  function showProblem(i) {
+    view.problem = i;
     view.choice.list.value = String(i);
     drawRows();
   }
   function pick(row) {
-    const i = view.scenes.findIndex((scene) => scene.name === view.runs.scenes[row]);
-    if (i >= 0) view.scene = i;
-    view.choice.list.value = String(view.scene);
+    const i = view.problems.findIndex((problem) => problem.name === view.runs.problems[row]);
+    if (i >= 0) view.problem = i;
+    view.choice.list.value = String(view.problem);
     drawRows(row);
     view.motion.choose(row);
   }

@@ -183,7 +183,7 @@ const LoopbenchPlots = (() => {
       }
       const series = this.rows.map((row) => ({
         label: table.names[row], stroke: () => styleOf(colourOf(looks, table.formulations[row], table.absolute[row])), width: 1.8, spanGaps: false, points: {show: false},
-        dash: table.doubts[row] || table.failed[row] ? [6, 4] : undefined,
+        dash: table.warnings[row] || table.failed[row] ? [6, 4] : undefined,
         alpha: 1}));
       this.u = new uPlot({
         ...this.size(), legend: {show: false}, padding: [8, 12, 0, 0],
@@ -231,9 +231,9 @@ const LoopbenchPlots = (() => {
       const {u} = this, row = this.rows[this.hovered], index = u.cursor.idxs ? u.cursor.idxs[this.hovered + 1] : null;
       this.tip.hidden = row === undefined || index === null || index === undefined || u.cursor.left < 0;
       if (this.tip.hidden) return;
-      const {names, doubts, failed} = this.table;
+      const {names, warnings, failed} = this.table;
       this.tip.textContent = names[row] + ': ' + number(u.data[this.hovered + 1][index]) + ' ' + this.plot.unit + ' at ' +
-          number(u.data[0][index]) + ' s' + (failed[row] ? ' (failed)' : doubts[row] ? ' (flagged: ' + doubts[row] + ')' : '');
+          number(u.data[0][index]) + ' s' + (failed[row] ? ' (failed)' : warnings[row] ? ' (flagged: ' + warnings[row] + ')' : '');
       this.tip.style.left = Math.min(u.cursor.left + 90, this.stage.clientWidth - this.tip.offsetWidth - 4) + 'px';
       this.tip.style.top = Math.max(0, u.cursor.top - 26) + 'px';
     }

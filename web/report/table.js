@@ -117,9 +117,9 @@ const LoopbenchTable = (() => {
     }
 
     rowElement(row, place, columns) {
-      const {failed, doubts} = this.data;
+      const {failed, warnings} = this.data;
       const element = make('tr', {'aria-rowindex': String(place + 2), 'aria-selected': String(row === this.chosen),
-                                  class: failed[row] ? 'bad' : doubts[row] ? 'doubt' : ''});
+                                  class: failed[row] ? 'bad' : warnings[row] ? 'flagged' : ''});
       for (const column of columns) {
         const cell = make('td', {}, column.words[column.at[row]]);
         if (column.numbers) cell.className = 'number';
@@ -139,13 +139,13 @@ const LoopbenchTable = (() => {
       this.pick(this.rows[next]);
     }
 
-    // Shows all that is known of a row: every column, its doubts in words, and the command that prints it.
+    // Shows all that is known of a row: every column, its warnings in words, and the command that prints it.
     pick(row, tell = true) {
       this.chosen = row;
       this.draw();
-      const {names, scenes, doubts, failed, messages, ids} = this.data, all = LoopbenchParts.data('tables').doubts;
-      const reasons = doubts[row].split(' ').filter((code) => code)
-          .map((code) => make('li', {class: 'doubt'}, 'flagged, ' + code + ': ' + (all[code] || 'see the warnings above')));
+      const {names, problems, warnings, failed, messages, ids} = this.data, all = LoopbenchParts.data('tables').warnings;
+      const reasons = warnings[row].split(' ').filter((code) => code)
+          .map((code) => make('li', {class: 'flagged'}, 'flagged, ' + code + ': ' + (all[code] || 'see the warnings above')));
       if (failed[row]) reasons.unshift(make('li', {class: 'bad'}, 'failed: ' + (messages[row] || 'without a message')));
       const list = make('dl', {});
       for (const column of this.data.columns) {
@@ -155,7 +155,7 @@ const LoopbenchTable = (() => {
                                        ? String(column.numbers[row]) + (word.endsWith('?') ? ' ?' : '') : word)));
       }
       const shell = this.data.command.replace('--format csv', '--where case_id=' + ids[row] + ' --format json');
-      this.detail.replaceChildren(make('h4', {}, scenes[row] + ': ' + names[row]), make('ul', {}, ...reasons), list,
+      this.detail.replaceChildren(make('h4', {}, problems[row] + ': ' + names[row]), make('ul', {}, ...reasons), list,
                                   command(shell));
       if (tell && this.on.pick) this.on.pick(row);
     }

@@ -1,4 +1,4 @@
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/config/selection_reader.h"
 #include "harness/json/fields.h"
 #include "harness/judge/rule_schemas.h"
@@ -34,7 +34,7 @@ CellState StateOfEnding(const std::string& outcome) {
 }
 
 // Returns the rank of a run; the greatest decides a cell. Stopped runs are ranked by time.
-auto Badness(const MapCell& cell) {
+auto SeverityKey(const MapCell& cell) {
   return std::tuple(cell.state, std::isnan(cell.decided.ratio) ? 0.0 : cell.decided.ratio,
                     std::isnan(cell.t_reached) ? 0.0 : -cell.t_reached);
 }
@@ -53,7 +53,7 @@ std::vector<std::string> UnknownKeys(const MapRules& rules, std::span<const Reco
   const auto name = [&named](const Selection& selection) {
     for (const Condition& condition : selection) named.insert(condition.key);
   };
-  for (const MapColumn& column : rules.columns) name(column.select);
+  for (const MapMethod& column : rules.columns) name(column.select);
   for (const MapGroup& group : rules.groups) {
     for (const MapRow& row : group.rows) {
       name(row.select);
@@ -128,23 +128,23 @@ MapCell JudgeRun(const MapRow& row, const Record& record) {
   return cell;
 }
 
-MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method,
+MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method,
                   std::span<const Record> records) {
   const Selection selection = RowAndColumn(row.select, method.select);
   std::optional<MapCell> worst;
-  std::size_t holding = 0, count = 0, doubted = 0;
-  std::map<std::string, int> doubts;
+  std::size_t holding = 0, count = 0, flagged = 0;
+  std::map<std::string, int> warnings;
   for (const Record& record : records) {
     if (!Matches(record, selection)) continue;
     const MapCell one = JudgeRun(row, record);
     holding += one.holding;
-    if (one.holding > 0 && HasDoubt(record)) {
-      ++doubted;
+    if (one.holding > 0 && HasWarning(record)) {
+      ++flagged;
       std::istringstream codes(record.Text("warnings"));
-      for (std::string code; codes >> code;) ++doubts[code];
+      for (std::string code; codes >> code;) ++warnings[code];
     }
     ++count;
-    if (!worst || Badness(one) > Badness(*worst)) worst = one;
+    if (!worst || SeverityKey(one) > SeverityKey(*worst)) worst = one;
   }
   MapCell cell;
   const auto named = row.not_applicable.find(method.label);
@@ -163,17 +163,17 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method
   }
   cell.holding = holding;
   cell.records = count;
-  cell.doubted = doubted;
-  for (const auto& [code, times] : doubts) {
-    cell.doubts += fmt::format("{}{} {}", cell.doubts.empty() ? "" : ", ", code, times);
+  cell.flagged = flagged;
+  for (const auto& [code, times] : warnings) {
+    cell.warnings += fmt::format("{}{} {}", cell.warnings.empty() ? "" : ", ", code, times);
   }
   cell.cases = std::max(count, row.cases);
   cell.demanded = row.must_hold.at(column);
   return cell;
 }
 
-FailureMap MakeFailureMap(const MapRules& rules, std::span<const Record> records) {
-  FailureMap map{rules, {}, UnknownKeys(rules, records)};
+RobustnessMap MakeRobustnessMap(const MapRules& rules, std::span<const Record> records) {
+  RobustnessMap map{rules, {}, UnknownKeys(rules, records)};
   for (const MapGroup& group : rules.groups) {
     auto& rows = map.cells.emplace_back();
     for (const MapRow& row : group.rows) {
@@ -210,9 +210,9 @@ std::string HoldingCount(const MapCell& cell) {
   return several ? fmt::format("{}/{}", cell.holding, cell.cases) : "";
 }
 
-std::vector<std::string> BrokenDemands(const FailureMap& map) {
+std::vector<std::string> BrokenDemands(const RobustnessMap& map) {
   std::vector<std::string> broken;
-  EachCell(map, [&broken](const MapGroup&, const MapRow& row, const MapColumn& column,
+  EachCell(map, [&broken](const MapGroup&, const MapRow& row, const MapMethod& column,
                           const MapCell& cell) {
     if (!cell.demanded || cell.state == CellState::kHolds) return;
     const std::string number = DecidingNumber(cell);
@@ -356,7 +356,7 @@ void ReadMustHold(const JsonNode& demanded, RowOfMap* row) {
   }
 }
 
-constexpr std::int64_t kMostCases = 1'000'000;
+constexpr std::int64_t kMaxMapCases = 1'000'000;
 
 /// Reads the common keys of groups and rows; `row` contains the group's values. Some keys depend on
 /// others, so the order is fixed.
@@ -370,7 +370,7 @@ void ReadShared(const JsonNode& node, RowOfMap* row) {
     row->decides = ReadDemands(*decides, row->right);
   }
   if (const auto cases = node.Optional("cases")) {
-    row->cases = static_cast<std::size_t>(cases->Integer(1, kMostCases));
+    row->cases = static_cast<std::size_t>(cases->Integer(1, kMaxMapCases));
   }
   if (const auto why = node.Optional("rationale")) row->why = why->Text();
   // without columns, every reference to a column would be a consequential error
@@ -391,7 +391,7 @@ std::vector<Field<T>> WithShared(std::vector<Field<T>> rows) {
        "\"all\" or labels of methods that must pass, for --fail-on required."},
       {"not_applicable", EitherSchema({text, MapSchema(text)}),
        "Reason for missing records, by method label, or one reason for all methods not required."},
-      {"cases", IntegerSchema(1, kMostCases), "Expected number of records; default: 1."},
+      {"cases", IntegerSchema(1, kMaxMapCases), "Expected number of records; default: 1."},
       {"rationale", text, "Origin of the limits."}};
   rows.insert(rows.end(), shared.begin(), shared.end());
   return rows;
@@ -451,11 +451,11 @@ const Fields<GroupOfMap>& MapGroupFields() {
   return fields;
 }
 
-const Fields<MapColumn>& MethodFields() {
-  static const Fields<MapColumn> fields(
-      "method", "Method: a column of the map.",
-      {{"label", Text(&MapColumn::label), "Method name.", kAnyText},
-       {"select", SelectionOf(&MapColumn::select, 1), "Selection of records.",
+const Fields<MapMethod>& MethodFields() {
+  static const Fields<MapMethod> fields(
+      "map-method", "Method: a column of the map.",
+      {{"label", Text(&MapMethod::label), "Method name.", kAnyText},
+       {"select", SelectionOf(&MapMethod::select, 1), "Selection of records.",
         "an object of keys and values"}});
   return fields;
 }
@@ -463,7 +463,7 @@ const Fields<MapColumn>& MethodFields() {
 void ReadMapColumns(const JsonNode& node, MapRules& rules) {
   std::vector<std::string> labels;
   for (const JsonNode& element : node.Elements("methods")) {
-    MapColumn& column = rules.columns.emplace_back();
+    MapMethod& column = rules.columns.emplace_back();
     if (!MethodFields().Read(element, &column)) continue;
     ReportRepeated(element, "label", column.label, &labels);
   }
@@ -472,7 +472,7 @@ void ReadMapColumns(const JsonNode& node, MapRules& rules) {
 
 void ReadMapGroups(const JsonNode& node, MapRules& rules) {
   NameList columns;
-  for (const MapColumn& column : rules.columns) columns.Add(column.label);
+  for (const MapMethod& column : rules.columns) columns.Add(column.label);
   std::vector<std::string> labels;
   for (const JsonNode& element : node.Elements("groups")) {
     GroupOfMap group;

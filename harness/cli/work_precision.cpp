@@ -1,5 +1,5 @@
 // tradeoff: cost of accuracy.
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/work_precision.h"
 
 #include <filesystem>
 #include <string>
@@ -18,9 +18,9 @@
 namespace loopbench::harness {
 namespace {
 
-struct TradeoffCommand {
+struct WorkPrecisionCommand {
   std::filesystem::path store;
-  TradeoffOptions options;
+  WorkPrecisionOptions options;
   std::string format = "text";      ///< format of the output: text, csv, markdown, json or latex
   std::filesystem::path out;        ///< folder; default: the store's folder
   std::string figures;              ///< svg or pdf; "" for none
@@ -29,66 +29,67 @@ struct TradeoffCommand {
 };
 
 /// Returns the folder of tables: for a store that is a file, the file's folder.
-std::filesystem::path FolderOf(const TradeoffCommand& command) {
+std::filesystem::path FolderOf(const WorkPrecisionCommand& command) {
   if (!command.out.empty()) return command.out;
   const bool is_file = command.store.extension() == ".jsonl";
   return is_file ? command.store.parent_path() : command.store;
 }
 
-void WriteTradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder,
+void WriteTradeoff(const WorkPrecision& work_precision, const std::filesystem::path& folder,
                    const std::string& typed) {
   const std::string stem = (folder / "work-precision").string();
-  Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
-  Table cheapest = CheapestTable(tradeoff);
+  Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
+  Table cheapest = CheapestTable(work_precision);
   AppendProvenance(rows, typed);
   AppendProvenance(cheapest, typed);
   WriteFileAtomically(stem + ".csv", RenderKept(rows, "csv"));
   WriteFileAtomically(stem + "-overview.csv", RenderKept(cheapest, "csv"));
-  WriteFileAtomically(stem + ".md", TradeoffMarkdown(tradeoff, Provenance(typed)));
+  WriteFileAtomically(stem + ".md", WorkPrecisionMarkdown(work_precision, Provenance(typed)));
 }
 
 /// Prints fronts and overview for people, then which conditions were equal and which were not.
-void PrintForPeople(const Tradeoff& tradeoff, const TradeoffCommand& command,
+void PrintForPeople(const WorkPrecision& work_precision, const WorkPrecisionCommand& command,
                     const std::string& typed) {
-  const Table fronts = TradeoffTable(tradeoff, {.compact = true, .all = command.all});
+  const Table fronts = WorkPrecisionTable(work_precision, {.compact = true, .all = command.all});
   PrintText(ToScreen(fronts) + "\n");
-  Table overview = OverviewTable(tradeoff);
-  overview.notes = FairnessStatement(tradeoff);
+  Table overview = OverviewTable(work_precision);
+  overview.notes = FairnessStatement(work_precision);
   AppendProvenance(overview, typed);
   PrintText(ToScreen(overview) + "\n");
 }
 
 /// Prints fronts, overview and fairness statement; writes tradeoff.csv, tradeoff-overview.csv,
 /// tradeoff.md and the figures.
-int PrintTradeoff(const TradeoffCommand& command, const std::string& typed) {
+int PrintTradeoff(const WorkPrecisionCommand& command, const std::string& typed) {
   const std::vector<Record> records = LoadRecords(command.store, command.options.where);
   if (records.empty()) {
     PrintError("{}: no records\n", command.store.string());
     return 2;
   }
   RequireOneContent(records, command.store, "work-precision");
-  const Tradeoff tradeoff = MakeTradeoff(records, command.options);
+  const WorkPrecision work_precision = MakeTradeoff(records, command.options);
   const std::filesystem::path folder = FolderOf(command);
-  WriteTradeoff(tradeoff, folder, typed);
+  WriteTradeoff(work_precision, folder, typed);
   if (command.format == "text") {
-    PrintForPeople(tradeoff, command, typed);
+    PrintForPeople(work_precision, command, typed);
     const std::string stem = (folder / "work-precision").string();
     Print("wrote {0}.csv, {0}-overview.csv, {0}.md\n", stem);
   } else {
-    Table rows = TradeoffTable(tradeoff, {.compact = false, .all = true});
-    for (std::string& line : FairnessStatement(tradeoff)) rows.notes.push_back(std::move(line));
+    Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
+    for (std::string& line : FairnessStatement(work_precision))
+      rows.notes.push_back(std::move(line));
     AppendProvenance(rows, typed);
     PrintText(RenderKept(rows, command.format));
   }
   if (command.figures.empty()) return 0;
-  return DrawAll(TradeoffFigures(tradeoff), folder / "figures", command.figures,
+  return DrawAll(WorkPrecisionFigures(work_precision), folder / "figures", command.figures,
                  FigureSizes().at(command.size));
 }
 
 }  // namespace
 
 void AddTradeoff(Commands& commands) {
-  auto& command = commands.Keep<TradeoffCommand>();
+  auto& command = commands.Keep<WorkPrecisionCommand>();
   auto& conditions = commands.Keep<std::vector<std::string>>();
   auto& draws = commands.Keep<bool>();
   auto& drawn_as = commands.Keep<std::string>("svg");
@@ -99,7 +100,7 @@ void AddTradeoff(Commands& commands) {
                                  return PrintTradeoff(command, typed.line);
                                });
   app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
-  TradeoffOptions& options = command.options;
+  WorkPrecisionOptions& options = command.options;
   app->add_option("--error-key", options.error,
                   "Key of the error (default: error_position_max, or an error in the store)");
   app->add_option("--cost-key", options.cost,

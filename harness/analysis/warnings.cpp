@@ -1,4 +1,4 @@
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +47,7 @@ bool IsSoft(const Record& record) {
 }
 
 bool EndAlike(const Record& a, const Record& b, double rtol) {
-  return DifferenceOf(a, b).largest <= kMostTolerances * rtol;
+  return DifferenceOf(a, b).largest <= kMaxTolerances * rtol;
 }
 
 /// Final poses of a set of runs: of each component the least and the largest. A number that is not
@@ -65,7 +65,7 @@ class Bounds {
       if (low.size() != pose->size()) return false;
       for (std::size_t i = 0; i < pose->size(); ++i) {
         const double off = std::max((*pose)[i] - low[i], high[i] - (*pose)[i]);
-        if (!(off / UnitOf(length_, pose->size(), i) <= kMostTolerances * rtol)) return false;
+        if (!(off / UnitOf(length_, pose->size(), i) <= kMaxTolerances * rtol)) return false;
       }
     }
     return true;
@@ -183,14 +183,15 @@ PoseDifference DifferenceOf(const Record& a, const Record& b) {
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
                                          const std::vector<bool>& testifies) {
   // by problem and horizon, then by tolerance, the finest first
-  std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> scenes;
+  std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> problems;
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (!HasFinalPoses(records[i])) continue;
-    scenes[{records[i].Text("problem_id"), records[i].Number("horizon")}][records[i].Number("rtol")]
-        .push_back(i);
+    problems[{records[i].Text("problem_id"), records[i].Number("horizon")}]
+            [records[i].Number("rtol")]
+                .push_back(i);
   }
   std::vector<Agreement> agreements(records.size());
-  for (const auto& [scene, tolerances] : scenes) {
+  for (const auto& [problem, tolerances] : problems) {
     const Record* decided = nullptr;
     for (const auto& [rtol, all] : tolerances) {
       std::vector<std::size_t> runs = all;
@@ -205,21 +206,21 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
       for (std::size_t c = 0; c < clusters.size(); ++c) {
         for (const std::size_t run : clusters[c]) {
           if (all.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
-          agreements[run].doubted = others == nullptr || !EndAlike(records[run], *others, rtol);
+          agreements[run].flagged = others == nullptr || !EndAlike(records[run], *others, rtol);
         }
       }
       for (const std::size_t run : all) {
         if (!IsSoft(records[run]) || runs.empty()) continue;
-        agreements[run].doubted = others == nullptr || !EndAlike(records[run], *others, rtol);
+        agreements[run].flagged = others == nullptr || !EndAlike(records[run], *others, rtol);
         agreements[run].cluster =
-            agreements[run].doubted ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
+            agreements[run].flagged ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
       }
       // a branch is kept by who ends as those do that can keep it
       const bool is_kept = std::ranges::any_of(witnesses, [&](std::size_t run) {
-        return testifies[run] && KeepsBranches(records[run]) && !agreements[run].doubted;
+        return testifies[run] && KeepsBranches(records[run]) && !agreements[run].flagged;
       });
       for (const std::size_t run : runs) {
-        agreements[run].is_backed = is_kept && !agreements[run].doubted;
+        agreements[run].is_backed = is_kept && !agreements[run].flagged;
       }
     }
   }
@@ -233,7 +234,7 @@ namespace {
 
 /// Energy balance: a hundredth of the energy that moves is no error of integration at any tolerance
 /// that deserves the name; regular runs at 1e-6 have 1e-3 and less.
-constexpr double kMostEnergyError = 1e-2;
+constexpr double kMaxEnergyError = 1e-2;
 /// Rounding of an evaluation, which adds to a tolerance.
 constexpr double kEvaluation = 100 * std::numeric_limits<double>::epsilon();
 
@@ -253,18 +254,18 @@ constexpr double kOpenLoop = 0.1;
 constexpr double kProjection = 25.0;
 
 /// Sampled less than twice a period, an oscillation looks like a slow one (Nyquist).
-constexpr double kMostPeriods = 0.5;
+constexpr double kMaxPeriods = 0.5;
 /// A step of 16 eps t ends a run (harness/integrator/stepper.cpp). Steps within three decades of
 /// that gain digits of nothing; no regular run comes within six.
 constexpr double kStepFloor = 1e3 * 16 * std::numeric_limits<double>::epsilon();
 /// Maximum of rejected steps per accepted step: if step control fails more often, the solution is
 /// not smooth. Fewer than a dozen rejections are not significant.
-constexpr double kMostRejected = 1.0, kFewRejected = 12.0;
+constexpr double kMaxRejected = 1.0, kFewRejected = 12.0;
 
 /// Step control at its floor, or failing all the time.
-bool StepsStruggle(const Record& record) {
+bool StepControlFailing(const Record& record) {
   const double rejected = record.Number("rejected");
-  if (rejected > kFewRejected && rejected > kMostRejected * record.Number("steps")) return true;
+  if (rejected > kFewRejected && rejected > kMaxRejected * record.Number("steps")) return true;
   return record.Number("step_shortest") <= kStepFloor * record.Number("step_shortest_t");
 }
 
@@ -312,7 +313,7 @@ bool PassedSingularPosition(const Record& record) {
 
 /// Regularized, which bends the motion by more than tolerances, although no position at which steps
 /// ended was near a singular one.
-bool WasSoftenedElsewhere(const Record& record) {
+bool WasRegularizedElsewhere(const Record& record) {
   return record.Number("regularized_evaluations") > 0 &&
          record.Number("singularity_crossings") == 0 &&
          record.Number("singularity_distance_min") >= kRankRatio;
@@ -332,8 +333,8 @@ std::string Without(const std::string& code, const std::string& codes) {
 
 /// Returns true if no warning concerns the trajectory itself: warnings on ensemble members and
 /// exponents do not.
-bool TellsOfItsWay(const std::string& codes) {
-  return Without(kMembersDoubt, Without(kExponentDoubt, codes)).empty();
+bool TrajectoryIsTrusted(const std::string& codes) {
+  return Without(kMembersWarning, Without(kExponentWarning, codes)).empty();
 }
 
 /// Error measure of published data besides or instead of the error of points. Speeds are left out:
@@ -349,14 +350,14 @@ constexpr OtherError kOtherErrors[] = {
 
 /// Fixed steps have no tolerance: errors up to a hundredth of a link or rad are then accepted, as
 /// for the energy.
-constexpr double kMostFixedError = 1e-2;
+constexpr double kMaxFixedError = 1e-2;
 
 /// Within as many tolerances as runs may be apart. The reference has an error of its own, and
 /// rounding is no fault of a tolerance.
 bool IsNear(const Record& record, const char* error, const char* accuracy, double length) {
   const double certain = record.Number(accuracy) / length + kRoundOffShare;
   const double expected =
-      record.Number("step") > 0.0 ? kMostFixedError : kMostTolerances * record.Number("rtol");
+      record.Number("step") > 0.0 ? kMaxFixedError : kMaxTolerances * record.Number("rtol");
   return record.Number(error) / length <= expected + certain;
 }
 
@@ -379,9 +380,9 @@ bool IsCertified(const Record& record) {
          IsNearReference(record);
 }
 
-/// Returns true if a requested finer run differs by more than kMostTolerances.
+/// Returns true if a requested finer run differs by more than kMaxTolerances.
 bool IsFarFromFinerRun(const Record& record) {
-  const double most = kMostTolerances * record.Number("rtol") + kRoundOffShare;
+  const double most = kMaxTolerances * record.Number("rtol") + kRoundOffShare;
   return record.Find("refinement_difference") != nullptr &&
          !(record.Number("refinement_difference") <= most);
 }
@@ -396,12 +397,12 @@ std::optional<DriftGrowth> GrowthAt(const Record& record) {
 
 double ExpectedEnergyShare(const Record& record) {
   const double rtol = record.Number("rtol");
-  if (!(rtol > 0.0) || IsPeer(record)) return kMostEnergyError;
+  if (!(rtol > 0.0) || IsPeer(record)) return kMaxEnergyError;
   // no level puts the energy back, so that errors of all steps add up
   const double tolerances = TolerancesOfDrift(record) + kVelocity * record.Number("steps");
   const double scale = record.Number("energy_scale");
   const double per_tolerance = std::fmax(1.0, record.Number("energy_sensitivity") / scale);
-  return std::min(kMostEnergyError, tolerances * (rtol + kEvaluation) * per_tolerance);
+  return std::min(kMaxEnergyError, tolerances * (rtol + kEvaluation) * per_tolerance);
 }
 
 double EnergyErrorShare(const Record& record) {
@@ -417,7 +418,7 @@ double DriftShare(const Record& record) {
   return shift <= rotation || std::isnan(rotation) ? rotation : shift;
 }
 
-double PromisedDriftShare(const Record& record) {
+double ExpectedDriftShare(const Record& record) {
   const double rtol = record.Number("rtol");
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
   const auto growth = GrowthAt(record);
@@ -444,7 +445,7 @@ double PeriodsPerStep(const Record& record) {
   return record.Number("step_longest") * record.Number("drive_frequency") / (2 * std::numbers::pi);
 }
 
-std::string OwnDoubts(const Record& record) {
+std::string OwnWarnings(const Record& record) {
   std::string codes;
   if (record.Text("kind") != "accuracy" || !HasFinished(record)) return codes;
   // NaN or infinite measures give a warning; missing ones give none
@@ -452,33 +453,33 @@ std::string OwnDoubts(const Record& record) {
   Add(&codes,
       (has("energy_scale") || has("energy_error_relative")) &&
           !(EnergyErrorShare(record) <= ExpectedEnergyShare(record)) && !IsAtRest(record),
-      kEnergyDoubt);
+      kEnergyWarning);
   // agreement with the reference proves that the branch was kept
-  Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularDoubt);
-  Add(&codes, WasSoftenedElsewhere(record) && !IsCertified(record), kSoftenedDoubt);
+  Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularWarning);
+  Add(&codes, WasRegularizedElsewhere(record) && !IsCertified(record), kRegularizedWarning);
   Add(&codes,
       has("drift_position_max") && has("link_length") &&
-          !(DriftShare(record) <= PromisedDriftShare(record)),
-      kDriftDoubt);
-  Add(&codes, !IsNearReference(record), kErrorDoubt);
-  Add(&codes, IsFarFromFinerRun(record) && !IsCertified(record), kRefinementDoubt);
-  Add(&codes, PeriodsPerStep(record) > kMostPeriods, kDriveDoubt);
-  Add(&codes, StepsStruggle(record), kStepsDoubt);
-  Add(&codes, record.Number("ensemble_failed") > 0, kMembersDoubt);
+          !(DriftShare(record) <= ExpectedDriftShare(record)),
+      kDriftWarning);
+  Add(&codes, !IsNearReference(record), kErrorWarning);
+  Add(&codes, IsFarFromFinerRun(record) && !IsCertified(record), kRefinementWarning);
+  Add(&codes, PeriodsPerStep(record) > kMaxPeriods, kDriveWarning);
+  Add(&codes, StepControlFailing(record), kStepsWarning);
+  Add(&codes, record.Number("ensemble_failed") > 0, kMembersWarning);
   // a single run was not asked for an exponent, and drift of round-off has none
   Add(&codes,
       record.Number("ensemble_size") > 0 && record.Text("growth_resolved") == "false" &&
           record.Text("growth_regime") != "round-off",
-      kExponentDoubt);
+      kExponentWarning);
   return codes;
 }
 
-void SetDoubts(std::vector<Record>* records) {
+void SetWarnings(std::vector<Record>* records) {
   std::vector<std::string> own;
   std::vector<bool> testifies;
   for (const Record& record : *records) {
-    own.push_back(OwnDoubts(record));
-    testifies.push_back(TellsOfItsWay(own.back()));
+    own.push_back(OwnWarnings(record));
+    testifies.push_back(TrajectoryIsTrusted(own.back()));
   }
   const std::vector<Agreement> agreements = CompareFinalPoses(*records, testifies);
   const std::vector<Refinement> refinements = CompareTolerances(*records);
@@ -488,16 +489,16 @@ void SetDoubts(std::vector<Record>* records) {
     // the others need not be right; a reference is
     const bool certified = IsCertified(record);
     // who ends as those do that can keep a branch has kept it
-    std::string codes = agreements[i].is_backed ? Without(kSingularDoubt, own[i]) : own[i];
-    Add(&codes, agreements[i].doubted && !certified, kDisagreementDoubt);
-    const bool is_known = own[i].find(kRefinementDoubt) != own[i].npos;
-    Add(&codes, refinements[i].doubted && !certified && !is_known, kRefinementDoubt);
+    std::string codes = agreements[i].is_backed ? Without(kSingularWarning, own[i]) : own[i];
+    Add(&codes, agreements[i].flagged && !certified, kDisagreementWarning);
+    const bool is_known = own[i].find(kRefinementWarning) != own[i].npos;
+    Add(&codes, refinements[i].flagged && !certified && !is_known, kRefinementWarning);
     record.Set("warnings", codes);
     if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
   }
 }
 
-bool HasDoubt(const Record& record, const std::string& code) {
+bool HasWarning(const Record& record, const std::string& code) {
   const std::string codes = record.Text("warnings");
   return code.empty() ? !codes.empty() : (" " + codes + " ").find(" " + code + " ") != codes.npos;
 }
@@ -541,18 +542,18 @@ std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
     runs.erase(same.begin(), same.end());
     constexpr std::size_t kFewest = 3;
     if (runs.size() < kFewest) continue;
-    const auto doubt_from = [&](std::size_t first) {
-      for (std::size_t i = first; i < runs.size(); ++i) refinements[runs[i]].doubted = true;
+    const auto flag_from = [&](std::size_t first) {
+      for (std::size_t i = first; i < runs.size(); ++i) refinements[runs[i]].flagged = true;
     };
     for (std::size_t i = 0; i + 1 < runs.size(); ++i) {
       Refinement& own = refinements[runs[i]];
       own.off = DifferenceOf(records[runs[i]], records[runs.back()]).largest;
-      if (SameInEveryBit(records[runs[i]], records[runs[i + 1]])) doubt_from(i);
+      if (SameInEveryBit(records[runs[i]], records[runs[i + 1]])) flag_from(i);
       if (i == 0) continue;
       own.off_before = refinements[runs[i - 1]].off;
       const double shrunk = std::pow(rtol(runs[i]) / rtol(runs[i - 1]), 0.25);
-      const bool far = own.off > kMostTolerances * rtol(runs[i]) && own.off > kRoundOffShare;
-      if (far && own.off > shrunk * own.off_before) doubt_from(i);
+      const bool far = own.off > kMaxTolerances * rtol(runs[i]) && own.off > kRoundOffShare;
+      if (far && own.off > shrunk * own.off_before) flag_from(i);
     }
   }
   return refinements;

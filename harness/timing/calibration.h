@@ -11,10 +11,10 @@ namespace loopbench::harness {
 /// Time [ns] of factoring a small matrix and of going through the first cache several times: the
 /// work whose time shows a neighbour best (loops that stay in registers show 2 %). The least of
 /// three, which take some 20 us together.
-double YardstickNs();
+double CalibrationNs();
 
-/// Returns the smallest result of YardstickNs() in this process and before its fork: an estimate
+/// Returns the smallest result of CalibrationNs() in this process and before its fork: an estimate
 /// for an otherwise idle machine. Infinite before the first call.
-double YardstickAloneNs();
+double CalibrationBaselineNs();
 
 }  // namespace loopbench::harness

@@ -43,14 +43,14 @@ struct MapGroup {
 };
 
 /// Method: a column of the map.
-struct MapColumn {
+struct MapMethod {
   std::string label;
   Selection select;
 };
 
 struct MapRules {
   std::string title, comment;
-  std::vector<MapColumn> columns;
+  std::vector<MapMethod> columns;
   std::vector<MapGroup> groups;
 };
 
@@ -108,8 +108,8 @@ struct MapCell {
   double t_reached = std::numeric_limits<double>::quiet_NaN();  ///< [s]
   std::size_t holding = 0, records = 0;
   /// Number of holding runs with warnings, and the warning codes with counts: "energy 2".
-  std::size_t doubted = 0;
-  std::string doubts;
+  std::size_t flagged = 0;
+  std::string warnings;
   std::size_t cases = 0;  ///< expected number of records, at least `records`
   std::string reason;     ///< text: all measures beyond their limits, the run's message, ...
   bool demanded = false;
@@ -120,27 +120,27 @@ MapCell JudgeRun(const MapRow& row, const Record& record);
 
 /// Evaluates one cell: its worst run. Only records of kind "accuracy" are used, unless a selection
 /// names the kind.
-MapCell JudgeCell(const MapRow& row, std::size_t column, const MapColumn& method,
+MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method,
                   std::span<const Record> records);
 
 /// Returns true if the cell holds and one of its holding runs has a warning. The warning is then a
 /// false alarm, or the map's demands are weaker.
-inline bool HoldsInDoubt(const MapCell& cell) {
-  return cell.state == CellState::kHolds && cell.doubted > 0;
+inline bool HoldsWithWarnings(const MapCell& cell) {
+  return cell.state == CellState::kHolds && cell.flagged > 0;
 }
 
 /// Rules, and the cells by group, row and column.
-struct FailureMap {
+struct RobustnessMap {
   MapRules rules;
   std::vector<std::vector<std::vector<MapCell>>> cells;
   /// One sentence for each key of the rules that no record has: misspelt, or not run yet.
   std::vector<std::string> remarks;
 };
-FailureMap MakeFailureMap(const MapRules& rules, std::span<const Record> records);
+RobustnessMap MakeRobustnessMap(const MapRules& rules, std::span<const Record> records);
 
 /// Calls `visit` with group, row, column and cell of every cell, in the order of the rules.
 template <class Visit>
-void EachCell(const FailureMap& map, const Visit& visit) {
+void EachCell(const RobustnessMap& map, const Visit& visit) {
   for (std::size_t g = 0; g < map.cells.size(); ++g) {
     const MapGroup& group = map.rules.groups[g];
     for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
@@ -163,7 +163,7 @@ std::string HoldingCount(const MapCell& cell);
 
 /// Returns "O-DCA, position / parallelogram: singular at 0.31 s" for each required cell that does
 /// not hold.
-std::vector<std::string> BrokenDemands(const FailureMap& map);
+std::vector<std::string> BrokenDemands(const RobustnessMap& map);
 
 // Reads the rules of a robustness map (configs/experiments/extremes/map.json). Keys of the file:
 // docs/fields.md, map.

@@ -7,38 +7,39 @@
 
 #include "harness/figures/judge_figures.h"
 #include "harness/judge/reports.h"
-#include "harness/judge/tradeoff.h"
-#include "tests/harness/tradeoff_records.h"
+#include "harness/judge/work_precision.h"
+#include "tests/harness/work_precision_records.h"
 
 namespace loopbench::harness {
-namespace tradeoff_report_test {
+namespace work_precision_report_test {
 
-using namespace tradeoff_records;
+using namespace work_precision_records;
 
-TEST(TradeoffReport, SaysNoneReachedIt) {
+TEST(WorkPrecisionReport, SaysNoneReachedIt) {
   const std::vector<Record> records = Store({1e-4, 1e-7}, {0.1, 0.3});
-  const Tradeoff tradeoff = MakeTradeoff(records, {});
-  const std::string overview = ToText(OverviewTable(tradeoff));
+  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const std::string overview = ToText(OverviewTable(work_precision));
   EXPECT_NE(overview.find("none"), std::string::npos) << overview;
   EXPECT_NE(overview.find("0.3 (3.00)"), std::string::npos) << overview;
-  EXPECT_NE(ToCsv(CheapestTable(tradeoff)).find("none"), std::string::npos);
+  EXPECT_NE(ToCsv(CheapestTable(work_precision)).find("none"), std::string::npos);
 }
 
-TEST(TradeoffReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
+TEST(WorkPrecisionReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
   std::vector<Record> records = Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3});
   records[4].Set("warnings", std::string("energy"));
-  const Tradeoff tradeoff = MakeTradeoff(records, {});
-  const Table brief = TradeoffTable(tradeoff, {});
+  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const Table brief = WorkPrecisionTable(work_precision, {});
   ASSERT_EQ(brief.rows.size(), 2u);
   EXPECT_EQ(brief.rows[0].Text("front"), "*");
   EXPECT_EQ(brief.rows[1].Text("reason"), "warnings: energy");
   EXPECT_NE(ToText(brief).find("not shown: 1 dominated rows"), std::string::npos);
-  EXPECT_EQ(TradeoffTable(tradeoff, {.compact = true, .all = true}).rows.size(), 3u);
-  const std::string csv = ToCsv(TradeoffTable(tradeoff, {.compact = false, .all = true}));
+  EXPECT_EQ(WorkPrecisionTable(work_precision, {.compact = true, .all = true}).rows.size(), 3u);
+  const std::string csv =
+      ToCsv(WorkPrecisionTable(work_precision, {.compact = false, .all = true}));
   EXPECT_NE(csv.find("problem,formulation,enforcement,coordinates,solver,integrator,rtol,error,"),
             std::string::npos)
       << csv;
-  const std::string page = TradeoffMarkdown(tradeoff, {"command: x"});
+  const std::string page = WorkPrecisionMarkdown(work_precision, {"command: x"});
   for (const char* part :
        {"cheapest method for an error", "equal in all compared rows", "energy", "command: x"}) {
     EXPECT_NE(page.find(part), std::string::npos) << part;
@@ -115,27 +116,27 @@ TEST(Fairness, WhatIsEqualInEachProblemIsEqual) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
   for (Record record : Store({1e-2, 1e-5}, {10.0, 20.0})) {
     record.Set("mechanism", std::string("other"));
-    if (record.Find("problem_id") != nullptr) record.Set("problem_id", std::string("scene-2"));
+    if (record.Find("problem_id") != nullptr) record.Set("problem_id", std::string("problem-2"));
     records.push_back(record);
   }
   ExpectWords(Statement(records), {"mechanism and start (in each problem)"});
 }
 
-TEST(TradeoffFigures, DrawTheFrontDoubtsAndFailures) {
+TEST(WorkPrecisionFigures, DrawTheFrontWarningsAndFailures) {
   std::vector<Record> records = Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4});
   records[2].Set("warnings", std::string("energy"));
   records[4].Set("outcome", std::string("singular"));
   records[5].Set("wall_s_median", Value());
   records[4].Set("cpu_s", 0.05);
-  const Tradeoff tradeoff = MakeTradeoff(records, {});
-  const Figure figure = WorkPrecisionFigure(tradeoff, tradeoff.problems.front());
-  std::size_t doubted = 0, crosses = 0;
+  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const Figure figure = WorkPrecisionFigure(work_precision, work_precision.problems.front());
+  std::size_t flagged = 0, crosses = 0;
   for (const Curve& curve : figure.curves) {
-    doubted += curve.style.doubtful ? curve.x.size() : 0;
+    flagged += curve.style.flagged ? curve.x.size() : 0;
     crosses += curve.crosses.size();
     for (const auto& cross : curve.crosses) EXPECT_EQ(cross.first, 0.05);
   }
-  EXPECT_EQ(doubted, 1u);
+  EXPECT_EQ(flagged, 1u);
   EXPECT_EQ(crosses, 1u);
   const Curve& stairs = figure.curves.back();
   EXPECT_EQ(stairs.label, "Pareto front");
@@ -143,9 +144,9 @@ TEST(TradeoffFigures, DrawTheFrontDoubtsAndFailures) {
   EXPECT_EQ(stairs.y, (std::vector<double>{1e-3, 1e-3, 1e-7}));
 }
 
-TEST(TradeoffFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
-  const Tradeoff tradeoff = MakeTradeoff(Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3}), {});
-  const Figure figure = ToleranceFigure(tradeoff, tradeoff.problems.front(), "ode45");
+TEST(WorkPrecisionFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
+  const WorkPrecision work_precision = MakeTradeoff(Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3}), {});
+  const Figure figure = ToleranceFigure(work_precision, work_precision.problems.front(), "ode45");
   const Curve& line = figure.curves.back();
   EXPECT_EQ(line.label, "error = tolerance x link");
   ASSERT_EQ(line.x.size(), 2u);
@@ -155,9 +156,10 @@ TEST(TradeoffFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
   }
 }
 
-TEST(TradeoffFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
-  const Tradeoff tradeoff = MakeTradeoff(Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4}), {});
-  const Figure figure = WorkPrecisionFigure(tradeoff, tradeoff.problems.front());
+TEST(WorkPrecisionFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
+  const WorkPrecision work_precision =
+      MakeTradeoff(Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4}), {});
+  const Figure figure = WorkPrecisionFigure(work_precision, work_precision.problems.front());
   std::size_t marks = 0;
   for (const Curve& curve : figure.curves) {
     EXPECT_NE(curve.points, curve.line) << "marks, or a line";
@@ -167,22 +169,22 @@ TEST(TradeoffFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
   EXPECT_LE(GnuplotScript(figure, FigureSize::kOneColumn).legend_rows, kLegendRows);
 }
 
-TEST(TradeoffFigures, ErrorsOverTimeHaveTheTrustHorizon) {
+TEST(WorkPrecisionFigures, ErrorsOverTimeHaveTheTrustHorizon) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
-  EXPECT_EQ(TradeoffFigures(MakeTradeoff(records, {})).size(), 2u) << "no series, no third";
+  EXPECT_EQ(WorkPrecisionFigures(MakeTradeoff(records, {})).size(), 2u) << "no series, no third";
   for (Record& record : records) {
     if (record.Text("kind") != "accuracy") continue;
     record.Set("series.error_t", std::vector<double>{0, 5, 10});
     record.Set("series.error", std::vector<double>{0, 1e-9, 1e-6});
     record.Set("reference_valid_until", 7.5);
   }
-  const Tradeoff tradeoff = MakeTradeoff(records, {});
-  const Figure figure = ErrorOverTimeFigure(tradeoff.problems.front(), "ode45");
+  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const Figure figure = ErrorOverTimeFigure(work_precision.problems.front(), "ode45");
   ASSERT_EQ(figure.curves.size(), 2u) << "the finest tolerance, and the horizon";
   EXPECT_EQ(figure.curves[1].label, "validity limit of the reference");
   EXPECT_EQ(figure.curves[1].x, (std::vector<double>{7.5, 7.5}));
-  EXPECT_EQ(TradeoffFigures(tradeoff).size(), 3u);
+  EXPECT_EQ(WorkPrecisionFigures(work_precision).size(), 3u);
 }
 
-}  // namespace tradeoff_report_test
+}  // namespace work_precision_report_test
 }  // namespace loopbench::harness

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "harness/json/file_kind.h"
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
-namespace failure_map_reader_test {
+namespace robustness_map_reader_test {
 
 constexpr const char* kRules = R"({
   "title": "t",
@@ -148,5 +148,5 @@ TEST(MapRules, ThatAreShippedRead) {
   EXPECT_GE(count, 1);
 }
 
-}  // namespace failure_map_reader_test
+}  // namespace robustness_map_reader_test
 }  // namespace loopbench::harness

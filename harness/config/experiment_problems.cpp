@@ -33,8 +33,8 @@ std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<doub
   const std::vector<double> numbers = node.NumberList(kPositive);
   for (const double number : numbers) {
     if (std::find(used.begin(), used.end(), number) != used.end()) continue;
-    constexpr std::size_t kMostShown = 16;
-    const auto end = used.begin() + static_cast<int>(std::min(used.size(), kMostShown));
+    constexpr std::size_t kMaxShown = 16;
+    const auto end = used.begin() + static_cast<int>(std::min(used.size(), kMaxShown));
     if (used.empty()) {
       node.Fail("no such key: the experiment has none");
       break;
@@ -52,18 +52,18 @@ void ReadTolerances(const JsonNode& node, RuleOfExperiment& rule) {
 
 void ReadHorizons(const JsonNode& node, RuleOfExperiment& rule) {
   std::set<double> horizons;
-  for (const ExperimentScene& scene : rule.experiment->scenes) {
-    horizons.insert(scene.horizons.begin(), scene.horizons.end());
+  for (const ExperimentProblem& problem : rule.experiment->problems) {
+    horizons.insert(problem.horizons.begin(), problem.horizons.end());
   }
   rule.horizons = ReadUsedNumbers(node, {horizons.begin(), horizons.end()});
 }
 
-void ReadSceneNames(const JsonNode& node, RuleOfExperiment& rule) {
+void ReadProblemNames(const JsonNode& node, RuleOfExperiment& rule) {
   NameList known;
-  for (const ExperimentScene& scene : rule.experiment->scenes) known.Add(scene.name);
+  for (const ExperimentProblem& problem : rule.experiment->problems) known.Add(problem.name);
   for (const JsonNode& element : node.OneOrMore("problem names")) {
-    const auto scene = element.Choice(known, "a problem");
-    if (scene) rule.scenes.push_back(known.all()[static_cast<std::size_t>(*scene)]);
+    const auto problem = element.Choice(known, "a problem");
+    if (problem) rule.problems.push_back(known.all()[static_cast<std::size_t>(*problem)]);
   }
 }
 
@@ -98,15 +98,15 @@ void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Exper
                   const std::vector<Case>& cases) {
   const auto node = element.Optional("between");
   if (!node) return;
-  for (std::size_t s = 0; s < experiment.scenes.size(); ++s) {
+  for (std::size_t s = 0; s < experiment.problems.size(); ++s) {
     const bool used = std::ranges::any_of(
-        cases, [&](const Case& one) { return one.scene == s && Matches(rule, one); });
+        cases, [&](const Case& one) { return one.problem == s && Matches(rule, one); });
     if (!used) continue;
-    const NameList known = DrawableJoints(experiment.scenes[s].mechanism.description);
+    const NameList known = DrawableJoints(experiment.problems[s].mechanism.description);
     for (const auto& [joint, bounds] : node->Members()) {
       if (known.Find(joint)) continue;
       bounds.FailAs(fmt::format("no held joint \"{}\" of one coordinate in problem \"{}\"", joint,
-                                experiment.scenes[s].name),
+                                experiment.problems[s].name),
                     fmt::format("a joint among: {}", fmt::join(known.all(), ", ")),
                     NearestSpelling(joint, known.all()));
     }
@@ -144,7 +144,7 @@ const Fields<RuleOfExperiment>& EnsembleFields() {
        {"", By(one_start, ReadStart)},
        {"branch_bound", Number(&Rule::branch_bound, kPositive),
         "Branch error beyond which a run has left its branch [rad]."},
-       {"problems", By(OneOrMoreSchema(TextSchema()), ReadSceneNames), "Names of problems."},
+       {"problems", By(OneOrMoreSchema(TextSchema()), ReadProblemNames), "Names of problems."},
        {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Horizons of cases [s]."},
        {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Tolerances of cases."},
        {"formulation", FormulationChoices(&Rule::formulations), "Formulations of cases."},
@@ -187,7 +187,7 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
 
 namespace {
 
-constexpr std::int64_t kMostUnits = 100'000;  ///< bars, windows, storeys
+constexpr std::int64_t kMaxUnits = 100'000;  ///< bars, windows, storeys
 
 /// {"family": "chain", ...} and so on; defaults of cranks are as in timing.
 struct ChainFamily {
@@ -210,7 +210,7 @@ const Fields<ChainFamily>& ChainFields() {
   static const Fields<ChainFamily> fields(
       "chain", "Closed chain of bars.",
       {{"family", ChoiceSchema({"chain"}), "Family type.", "a family"},
-       {"bars", IntegerList(&ChainFamily::bars, 3, kMostUnits), "Number of bars.",
+       {"bars", IntegerList(&ChainFamily::bars, 3, kMaxUnits), "Number of bars.",
         CountsExpected(3)},
        {"speed", Number(&ChainFamily::speed), "Speed of the first bar [rad/s]."}});
   return fields;
@@ -220,7 +220,7 @@ const Fields<LadderFamily>& LadderFields() {
   static const Fields<LadderFamily> fields(
       "ladder", "Windows in a row: parallel cranks with couplers between them.",
       {{"family", ChoiceSchema({"ladder"}), "Family type.", "a family"},
-       {"windows", IntegerList(&LadderFamily::windows, 1, kMostUnits), "Number of windows.",
+       {"windows", IntegerList(&LadderFamily::windows, 1, kMaxUnits), "Number of windows.",
         CountsExpected(1)},
        {"angle", Number(&LadderFamily::angle), "Angle of the cranks [rad]."},
        {"speed", Number(&LadderFamily::speed), "Speed of the cranks [rad/s]."}});
@@ -231,9 +231,9 @@ const Fields<GridFamily>& GridFields() {
   static const Fields<GridFamily> fields(
       "grid", "Storeys of windows.",
       {{"family", ChoiceSchema({"grid"}), "Family type.", "a family"},
-       {"storeys", IntegerList(&GridFamily::storeys, 1, kMostUnits), "Number of storeys.",
+       {"storeys", IntegerList(&GridFamily::storeys, 1, kMaxUnits), "Number of storeys.",
         CountsExpected(1)},
-       {"windows", IntegerList(&GridFamily::windows, 1, kMostUnits), "Windows in each storey.",
+       {"windows", IntegerList(&GridFamily::windows, 1, kMaxUnits), "Windows in each storey.",
         CountsExpected(1)},
        {"angle", Number(&GridFamily::angle),
         "Angle of the first storey's cranks [rad]. It increases by 0.1 per storey."},
@@ -259,7 +259,7 @@ class Members {
 
   template <class Build>
   void Add(std::size_t bodies, std::string counts, const Json& canonical, Build build,
-           const SceneObservation& observe = {}) {
+           const ObservedQuantities& observe = {}) {
     used_ += bodies;
     if (used_ > room_) return;
     FamilyMember member;
@@ -392,40 +392,40 @@ std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t ro
 namespace {
 
 /// Reads the mechanism file of a problem; its errors are added to the experiment's errors.
-void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentScene* scene) {
+void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentProblem* problem) {
   const std::string named = node.Text();
   if (named.empty()) return;
-  scene->path = files.Resolve(named);
-  if (!ExpectFile(node, scene->path, "a mechanism file")) return;
+  problem->path = files.Resolve(named);
+  if (!ExpectFile(node, problem->path, "a mechanism file")) return;
   try {
-    scene->mechanism = files.Mechanism(scene->path);
+    problem->mechanism = files.Mechanism(problem->path);
   } catch (const ConfigError& mistakes) {
     node.errors().AddText(mistakes.what());
   }
 }
 
 /// Returns a problem without name for each mechanism of "mechanism".
-std::vector<ExperimentScene> ReadMechanisms(const JsonNode& node, MechanismFiles& files,
-                                            std::size_t room) {
-  std::vector<ExperimentScene> scenes;
+std::vector<ExperimentProblem> ReadMechanisms(const JsonNode& node, MechanismFiles& files,
+                                              std::size_t room) {
+  std::vector<ExperimentProblem> problems;
   if (node.value().is_object() && node.value().contains("family")) {
     for (FamilyMember& member : ReadFamilyMembers(node, room)) {
-      ExperimentScene& scene = scenes.emplace_back();
-      scene.name = std::move(member.counts);
-      scene.mechanism = std::move(member.mechanism);
+      ExperimentProblem& problem = problems.emplace_back();
+      problem.name = std::move(member.counts);
+      problem.mechanism = std::move(member.mechanism);
     }
-    if (scenes.size() == 1) scenes.front().name.clear();
-    return scenes;
+    if (problems.size() == 1) problems.front().name.clear();
+    return problems;
   }
-  ExperimentScene& scene = scenes.emplace_back();
+  ExperimentProblem& problem = problems.emplace_back();
   if (node.value().is_object()) {
-    scene.mechanism = ReadMechanismObject(node);
+    problem.mechanism = ReadMechanismObject(node);
   } else if (node.value().is_string()) {
-    LoadMechanism(node, files, &scene);
+    LoadMechanism(node, files, &problem);
   } else {
     node.Fail("the path of a mechanism file, a mechanism, or {\"family\": ...}");
   }
-  return scenes;
+  return problems;
 }
 
 /// Scales the mechanism; known properties of angles stay valid.
@@ -437,80 +437,80 @@ void Resize(MechanismFile* mechanism, double factor) {
 
 /// Entry of "problems": several problems if a family has several counts. The base class contains
 /// the common values.
-struct SceneEntry : ExperimentScene {
+struct ProblemEntry : ExperimentProblem {
   MechanismFiles* files = nullptr;
   std::size_t room = 0;  ///< maximum number of bodies
   double scale = 1.0;
-  std::vector<ExperimentScene> scenes;
+  std::vector<ExperimentProblem> problems;
 };
 
-void ReadMechanism(const JsonNode& node, SceneEntry& entry) {
-  entry.scenes = ReadMechanisms(node, *entry.files, entry.room);
+void ReadMechanism(const JsonNode& node, ProblemEntry& entry) {
+  entry.problems = ReadMechanisms(node, *entry.files, entry.room);
 }
 
-void ReadTags(const JsonNode& node, SceneEntry& entry) {
+void ReadTags(const JsonNode& node, ProblemEntry& entry) {
   for (const JsonNode& tag : node.Elements("tags")) entry.tags.push_back(tag.Text());
 }
 
-const Fields<SceneEntry>& SceneFields() {
+const Fields<ProblemEntry>& ProblemFields() {
   static const Json mechanism =
       EitherSchema({TextSchema(),
                     FamilySchema(),
                     {{"$ref", "mechanism.schema.json#"}, {"words", "a [mechanism](#mechanism)"}}});
-  static const Fields<SceneEntry> fields(
+  static const Fields<ProblemEntry> fields(
       "problem", "A mechanism and its simulated time.",
       {{"mechanism", By(mechanism, ReadMechanism),
         "Path of a mechanism file, relative to this file; a family, with one problem per count; "
         "or a mechanism (mechanism.schema.json).",
         "the path of a mechanism file, a mechanism, or {\"family\": ...}"},
-       {"horizon", NumberList(&SceneEntry::horizons, kPositive), "Simulated time [s].",
+       {"horizon", NumberList(&ProblemEntry::horizons, kPositive), "Simulated time [s].",
         "a number > 0 or a list of them [s]"},
-       {"name", Text(&SceneEntry::name), "Name; default: the mechanism's name."},
+       {"name", Text(&ProblemEntry::name), "Name; default: the mechanism's name."},
        {"tags", By(ArraySchema(TextSchema()), ReadTags), "Tags for filters and tables."},
-       {"scale", Number(&SceneEntry::scale, {.min = 1e-12, .max = 1e12}),
+       {"scale", Number(&ProblemEntry::scale, {.min = 1e-12, .max = 1e12}),
         "Factor on all lengths. Gravity, forces and springs are scaled so that angles move as "
         "before."}});
   return fields;
 }
 
-std::vector<ExperimentScene> ReadScene(const JsonNode& node, MechanismFiles& files,
-                                       std::size_t room) {
-  SceneEntry entry;
+std::vector<ExperimentProblem> ReadProblem(const JsonNode& node, MechanismFiles& files,
+                                           std::size_t room) {
+  ProblemEntry entry;
   entry.files = &files;
   entry.room = room;
-  SceneFields().Read(node, &entry);
-  for (ExperimentScene& scene : entry.scenes) {
+  ProblemFields().Read(node, &entry);
+  for (ExperimentProblem& problem : entry.problems) {
     // An unreadable mechanism is named after its file, so that references to it stay valid.
-    const std::string own = scene.mechanism.description.name.empty()
-                                ? scene.path.stem().string()
-                                : scene.mechanism.description.name;
-    const std::string counts = scene.name.empty() ? "" : "-" + scene.name;
-    scene.name = entry.name.empty() ? own : entry.name + counts;
-    if (entry.scale > 0.0 && entry.scale != 1.0) Resize(&scene.mechanism, entry.scale);
-    scene.horizons = entry.horizons;
-    scene.tags = entry.tags;
+    const std::string own = problem.mechanism.description.name.empty()
+                                ? problem.path.stem().string()
+                                : problem.mechanism.description.name;
+    const std::string counts = problem.name.empty() ? "" : "-" + problem.name;
+    problem.name = entry.name.empty() ? own : entry.name + counts;
+    if (entry.scale > 0.0 && entry.scale != 1.0) Resize(&problem.mechanism, entry.scale);
+    problem.horizons = entry.horizons;
+    problem.tags = entry.tags;
   }
-  return std::move(entry.scenes);
+  return std::move(entry.problems);
 }
 
 /// Returns the number of bodies except ground.
-std::size_t BodiesOf(const ExperimentScene& scene) {
-  return scene.mechanism.description.bodies.size() - 1;
+std::size_t BodiesOf(const ExperimentProblem& problem) {
+  return problem.mechanism.description.bodies.size() - 1;
 }
 
-void ReadScenes(const JsonNode& node, ExperimentFile& experiment) {
+void ReadProblems(const JsonNode& node, ExperimentFile& experiment) {
   std::set<std::string> names;
   std::size_t bodies = 0;
   const std::vector<JsonNode> elements = node.Elements("problems");
   if (node.value().is_array() && elements.empty()) node.Fail("at least one problem");
   for (const JsonNode& element : elements) {
     const std::size_t room = kMaxBodies - std::min(kMaxBodies, bodies);
-    for (ExperimentScene& scene : ReadScene(element, *experiment.files, room)) {
-      if (!scene.name.empty() && !names.insert(scene.name).second) {
-        element.FailAs(fmt::format("problem \"{}\" again", scene.name), "a \"name\" of its own");
+    for (ExperimentProblem& problem : ReadProblem(element, *experiment.files, room)) {
+      if (!problem.name.empty() && !names.insert(problem.name).second) {
+        element.FailAs(fmt::format("problem \"{}\" again", problem.name), "a \"name\" of its own");
       }
-      bodies += BodiesOf(scene);
-      experiment.scenes.push_back(std::move(scene));
+      bodies += BodiesOf(problem);
+      experiment.problems.push_back(std::move(problem));
     }
     if (bodies > kMaxBodies) {
       element.FailAs(fmt::format("mechanisms with {} bodies so far", bodies),
@@ -566,8 +566,8 @@ const MechanismFile& MechanismFiles::Mechanism(const std::filesystem::path& path
   return known->second.mechanism;
 }
 
-FieldValue<ExperimentFile> ScenesValue() {
-  return By(ArraySchema(SceneFields().Schema(), 1), ReadScenes);
+FieldValue<ExperimentFile> ProblemsValue() {
+  return By(ArraySchema(ProblemFields().Schema(), 1), ReadProblems);
 }
 
 }  // namespace loopbench::harness

@@ -1,4 +1,4 @@
-// Runs of simplified scenes tell the same story as runs of the scenes themselves.
+// Runs of simplified problems tell the same story as runs of the problems themselves.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,11 +11,11 @@
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
-namespace compiled_scene_test {
+namespace simplified_problem_test {
 
 using namespace reference;
 
-const Column kColumn{"odca", Enforcement::kVelocity, Coordinates::kJoint,
+const Method kColumn{"odca", Enforcement::kVelocity, Coordinates::kJoint,
                      SolverKind::kRankRevealing};
 constexpr double kTolerance = 1e-10;
 /// Two runs at kTolerance over 1 s differ by their errors of integration.
@@ -36,14 +36,14 @@ MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / ("mechanisms/" + name + ".json"));
 }
 
-TEST(CompiledSceneTest, NothingToSaveLeavesTheRecordAsItWas) {
+TEST(SimplifiedProblemTest, NothingToSaveLeavesTheRecordAsItWas) {
   const MechanismFile file = Shipped("four-bar");
   const Record on = RunWith(file, CompileOptions()), off = RunWith(file, CompileOptions::None());
   EXPECT_EQ(on.Find("preprocessed"), nullptr);
   EXPECT_EQ(on.Text("state_hash"), off.Text("state_hash"));
 }
 
-TEST(CompiledSceneTest, TiltedFourBarRunsInThePlane) {
+TEST(SimplifiedProblemTest, TiltedFourBarRunsInThePlane) {
   MechanismFile file = Shipped("four-bar");
   file.description = InSpace(file.description, {0.3, -0.4, 0.5});
   const Record on = RunWith(file, CompileOptions()), off = RunWith(file, CompileOptions::None());
@@ -57,16 +57,17 @@ TEST(CompiledSceneTest, TiltedFourBarRunsInThePlane) {
   EXPECT_EQ(on.Number("rank_min"), off.Number("rank_min"));
 }
 
-TEST(CompiledSceneTest, AnglesThatAreWatchedInSpaceKeepRedundancyReleased) {
+TEST(SimplifiedProblemTest, AnglesThatAreWatchedInSpaceKeepRedundancyReleased) {
   MechanismFile file = Shipped("bennett");
   file.observe.branch_invariants = {{{"link2", 1.0}}};
-  const CompiledScene scene = CompileScene(file.description, file.observe, CompileOptions());
+  const SimplifiedProblem problem =
+      SimplifyProblem(file.description, file.observe, CompileOptions());
   CompileOptions expected = CompileOptions::None();
   expected.redundancy = true;
-  EXPECT_EQ(scene.compiled.done, expected);
+  EXPECT_EQ(problem.compiled.done, expected);
 }
 
-TEST(CompiledSceneTest, WeldedPiecesRunAsOneBar) {
+TEST(SimplifiedProblemTest, WeldedPiecesRunAsOneBar) {
   const Record on = RunWith(Shipped("welded-four-bar"), CompileOptions());
   const Record off = RunWith(Shipped("welded-four-bar"), CompileOptions::None());
   EXPECT_EQ(on.Text("preprocessed"), "welds");
@@ -75,7 +76,7 @@ TEST(CompiledSceneTest, WeldedPiecesRunAsOneBar) {
   }
 }
 
-TEST(CompiledSceneTest, TrussBecomesGround) {
+TEST(SimplifiedProblemTest, TrussBecomesGround) {
   const Record on = RunWith(Shipped("truss"), CompileOptions());
   const Record off = RunWith(Shipped("truss"), CompileOptions::None());
   EXPECT_EQ(on.Text("preprocessed"), "immovable");
@@ -84,7 +85,7 @@ TEST(CompiledSceneTest, TrussBecomesGround) {
   }
 }
 
-TEST(CompiledSceneTest, IslandsRunAloneAndAddUp) {
+TEST(SimplifiedProblemTest, IslandsRunAloneAndAddUp) {
   CompileOptions options;
   options.islands = true;
   const Record parts = RunWith(Shipped("four-islands"), options);
@@ -104,13 +105,13 @@ TEST(CompiledSceneTest, IslandsRunAloneAndAddUp) {
 }
 
 /// Whatever a run of the whole writes, but for series and what belongs to one sequence of steps.
-TEST(CompiledSceneTest, IslandsKeepTheCountsOfProjectionAndNewton) {
+TEST(SimplifiedProblemTest, IslandsKeepTheCountsOfProjectionAndNewton) {
   Experiment experiment = Single(Shipped("four-islands"));
   experiment.compile = CompileOptions();
   experiment.compile.islands = true;
-  Column column = kColumn;
-  column.enforcement = Enforcement::kPosition;
-  Case one = CaseOf(experiment, "four-islands", column, 1e-6, 0.2);
+  Method method = kColumn;
+  method.enforcement = Enforcement::kPosition;
+  Case one = CaseOf(experiment, "four-islands", method, 1e-6, 0.2);
   const Record projected = RunCase(experiment, one);
   ASSERT_EQ(projected.Text("outcome"), "finished") << projected.Text("message");
   EXPECT_GT(projected.Number("correction_max"), 0.0);
@@ -119,7 +120,7 @@ TEST(CompiledSceneTest, IslandsKeepTheCountsOfProjectionAndNewton) {
   EXPECT_GT(RunCase(experiment, one).Number("newton_iterations"), 0.0);
 }
 
-TEST(CompiledSceneTest, ObservedAnglesFollowTheirBodies) {
+TEST(SimplifiedProblemTest, ObservedAnglesFollowTheirBodies) {
   // what is observed is a small body welded to the pendulum at 0.3 rad
   MechanismFile file = Shipped("pendulum");
   MechanismDescription& d = file.description;
@@ -172,5 +173,5 @@ TEST(MergePartsTest, TakesTheWorstAndAddsTheWork) {
   EXPECT_EQ(whole.drift.value, (std::vector<double>{0.0, 2.0, 3.0, 1.0}));
 }
 
-}  // namespace compiled_scene_test
+}  // namespace simplified_problem_test
 }  // namespace loopbench::harness

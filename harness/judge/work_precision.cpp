@@ -1,4 +1,4 @@
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/work_precision.h"
 
 #include <fmt/format.h>
 
@@ -45,7 +45,7 @@ std::string NameOfCase(const Record& record) {
   return text;
 }
 
-std::string ErrorKey(std::span<const Record> records, const TradeoffOptions& options,
+std::string ErrorKey(std::span<const Record> records, const WorkPrecisionOptions& options,
                      std::vector<std::string>* remarks) {
   if (!options.error.empty()) {
     RequireKey("--error-key", options.error, records);
@@ -80,7 +80,7 @@ const Record& TimingOf(const Record& run, const Timings& timings) {
 }
 
 std::string CostKey(std::span<const Record> records, const Timings& timings,
-                    const TradeoffOptions& options, std::vector<std::string>* remarks) {
+                    const WorkPrecisionOptions& options, std::vector<std::string>* remarks) {
   if (options.cost.empty()) {
     // timings of other cases, such as timings at a common tolerance, do not match
     const bool any = std::ranges::any_of(records, [&](const Record& record) {
@@ -109,37 +109,38 @@ Record Joined(const Record& run, const Record& timing) {
   return joined;
 }
 
-std::string WhyNoCost(const TradeoffRow& row, const Tradeoff& tradeoff) {
+std::string WhyNoCost(const WorkPrecisionRow& row, const WorkPrecision& work_precision) {
   if (std::isfinite(row.cost)) return "";
-  const bool is_time = tradeoff.cost == kWall;
+  const bool is_time = work_precision.cost == kWall;
   if (is_time && row.timing.items().empty()) return "not timed";
   const std::string outcome = row.timing.Text("outcome");
   if (is_time && outcome != "finished") return "timing: " + outcome;
-  return "no " + tradeoff.cost;
+  return "no " + work_precision.cost;
 }
 
-std::string WhyNotCompared(const TradeoffRow& row, const Tradeoff& tradeoff) {
+std::string WhyNotCompared(const WorkPrecisionRow& row, const WorkPrecision& work_precision) {
   if (HasFailed(row.record)) {
     return fmt::format("{} at {:.3g} s", row.record.Text("outcome"),
                        row.record.Number("t_reached"));
   }
-  if (const std::string doubts = row.record.Text("warnings"); !doubts.empty()) {
-    return "warnings: " + doubts;
+  if (const std::string warnings = row.record.Text("warnings"); !warnings.empty()) {
+    return "warnings: " + warnings;
   }
-  if (!std::isfinite(row.error)) return "no " + tradeoff.error;
-  return WhyNoCost(row, tradeoff);
+  if (!std::isfinite(row.error)) return "no " + work_precision.error;
+  return WhyNoCost(row, work_precision);
 }
 
-TradeoffRow MakeRow(const Record& run, const Record& timing, const Tradeoff& tradeoff) {
-  TradeoffRow row{.record = Joined(run, timing), .timing = timing};
-  row.error = run.Number(tradeoff.error);
-  row.cost = row.record.Number(tradeoff.cost);
+WorkPrecisionRow MakeRow(const Record& run, const Record& timing,
+                         const WorkPrecision& work_precision) {
+  WorkPrecisionRow row{.record = Joined(run, timing), .timing = timing};
+  row.error = run.Number(work_precision.error);
+  row.cost = row.record.Number(work_precision.cost);
   const double certified = run.Number("reference_error");
-  if (IsErrorOfPositions(tradeoff.error) && row.error <= certified) {
+  if (IsErrorOfPositions(work_precision.error) && row.error <= certified) {
     row.is_bound = true;
     row.error += certified;
   }
-  row.reason = WhyNotCompared(row, tradeoff);
+  row.reason = WhyNotCompared(row, work_precision);
   return row;
 }
 
@@ -157,9 +158,9 @@ std::string NameOfProblem(const Record& record, const std::vector<std::string>& 
 
 /// Marks the front. Rows are sorted by cost, then error: a row is on the front if it is better than
 /// all before it, or equal to a row of the front.
-void MarkFront(std::vector<TradeoffRow>* rows) {
-  const TradeoffRow* last = nullptr;
-  for (TradeoffRow& row : *rows) {
+void MarkFront(std::vector<WorkPrecisionRow>* rows) {
+  const WorkPrecisionRow* last = nullptr;
+  for (WorkPrecisionRow& row : *rows) {
     if (!row.reason.empty()) continue;
     row.on_front = last == nullptr || row.error < last->error ||
                    (row.error == last->error && row.cost == last->cost);
@@ -167,9 +168,9 @@ void MarkFront(std::vector<TradeoffRow>* rows) {
   }
 }
 
-std::vector<std::string> FormulationsOf(const std::vector<TradeoffRow>& rows) {
+std::vector<std::string> FormulationsOf(const std::vector<WorkPrecisionRow>& rows) {
   std::vector<std::string> names;
-  for (const TradeoffRow& row : rows) {
+  for (const WorkPrecisionRow& row : rows) {
     const std::string name = row.record.Text("formulation");
     if (std::ranges::find(names, name) == names.end()) names.push_back(name);
   }
@@ -178,17 +179,17 @@ std::vector<std::string> FormulationsOf(const std::vector<TradeoffRow>& rows) {
 }
 
 /// Returns the first suitable row, which is the cheapest: rows are in order of cost.
-int CheapestOf(const std::vector<TradeoffRow>& rows, const std::string& formulation,
+int CheapestOf(const std::vector<WorkPrecisionRow>& rows, const std::string& formulation,
                double error_class) {
-  const auto found = std::ranges::find_if(rows, [&](const TradeoffRow& row) {
+  const auto found = std::ranges::find_if(rows, [&](const WorkPrecisionRow& row) {
     return row.reason.empty() && row.error <= error_class &&
            row.record.Text("formulation") == formulation;
   });
   return found == rows.end() ? -1 : static_cast<int>(found - rows.begin());
 }
 
-void FindCheapest(const std::vector<double>& classes, TradeoffProblem* problem) {
-  const std::vector<TradeoffRow>& rows = problem->rows;
+void FindCheapest(const std::vector<double>& classes, WorkPrecisionProblem* problem) {
+  const std::vector<WorkPrecisionRow>& rows = problem->rows;
   for (const double error_class : classes) {
     const std::size_t first = problem->cheapest.size();
     double least = std::numeric_limits<double>::infinity();
@@ -206,7 +207,7 @@ void FindCheapest(const std::vector<double>& classes, TradeoffProblem* problem) 
 }
 
 /// Compares costs; NaN comes last.
-bool IsCheaper(const TradeoffRow& a, const TradeoffRow& b) {
+bool IsCheaper(const WorkPrecisionRow& a, const WorkPrecisionRow& b) {
   const auto key = [](double value) {
     return std::isnan(value) ? std::numeric_limits<double>::infinity() : value;
   };
@@ -221,37 +222,37 @@ bool IsErrorOfPositions(const std::string& key) {
   return key.starts_with("error_position") || key == "error_path_max";
 }
 
-Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& options) {
+WorkPrecision MakeTradeoff(std::span<const Record> records, const WorkPrecisionOptions& options) {
   for (const std::string& key : options.per) RequireKey("--per", key, records);
   RequireConditions("--where", options.where, records);
-  Tradeoff tradeoff;
-  tradeoff.error = ErrorKey(records, options, &tradeoff.remarks);
+  WorkPrecision work_precision;
+  work_precision.error = ErrorKey(records, options, &work_precision.remarks);
   Timings timings;
   for (const Record& record : records) {
     if (record.Text("kind") == "timing") timings[NameOfCase(record)] = &record;
   }
-  tradeoff.cost = CostKey(records, timings, options, &tradeoff.remarks);
+  work_precision.cost = CostKey(records, timings, options, &work_precision.remarks);
   std::vector<Record> runs = Filter(records, {{"kind", {"accuracy"}}});
   SortRows(&runs);  // equal costs stay in the order of tables
   std::map<std::string, std::size_t> places;
   for (const Record& run : runs) {
-    TradeoffRow row = MakeRow(run, TimingOf(run, timings), tradeoff);
+    WorkPrecisionRow row = MakeRow(run, TimingOf(run, timings), work_precision);
     if (!Matches(row.record, options.where)) continue;
     const std::string name = NameOfProblem(run, options.per);
-    const auto [place, is_new] = places.try_emplace(name, tradeoff.problems.size());
-    if (is_new) tradeoff.problems.push_back({.name = name, .rows = {}, .cheapest = {}});
-    tradeoff.problems[place->second].rows.push_back(std::move(row));
+    const auto [place, is_new] = places.try_emplace(name, work_precision.problems.size());
+    if (is_new) work_precision.problems.push_back({.name = name, .rows = {}, .cheapest = {}});
+    work_precision.problems[place->second].rows.push_back(std::move(row));
   }
-  if (tradeoff.problems.empty()) {
+  if (work_precision.problems.empty()) {
     throw ConfigError(fmt::format("tradeoff: no accuracy record{}{}",
                                   options.where.empty() ? "" : " matches ", ToText(options.where)));
   }
-  for (TradeoffProblem& problem : tradeoff.problems) {
+  for (WorkPrecisionProblem& problem : work_precision.problems) {
     std::ranges::stable_sort(problem.rows, IsCheaper);
     MarkFront(&problem.rows);
     FindCheapest(options.classes, &problem);
   }
-  return tradeoff;
+  return work_precision;
 }
 namespace {
 
@@ -287,7 +288,7 @@ constexpr std::array kAspects = {
     Aspect{"repeats of timings", "repeats", true},
 };
 
-std::string ValueOf(const TradeoffRow& row, const Aspect& aspect) {
+std::string ValueOf(const WorkPrecisionRow& row, const Aspect& aspect) {
   const bool of_timing = aspect.is_of_machine && row.timing.Find(aspect.key) != nullptr;
   const std::string text = (of_timing ? row.timing : row.record).Text(aspect.key);
   return text.empty() ? aspect.standard : text;
@@ -300,11 +301,11 @@ struct Finding {
   std::vector<int> rows;            ///< numbers of rows with each value
 };
 
-Finding FindValues(const Tradeoff& tradeoff, const Aspect& aspect) {
+Finding FindValues(const WorkPrecision& work_precision, const Aspect& aspect) {
   Finding finding;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
     std::set<std::string> own;
-    for (const TradeoffRow& row : problem.rows) {
+    for (const WorkPrecisionRow& row : problem.rows) {
       if (!row.reason.empty()) continue;
       const std::string value = ValueOf(row, aspect);
       own.insert(value);
@@ -323,12 +324,12 @@ Finding FindValues(const Tradeoff& tradeoff, const Aspect& aspect) {
 
 /// "integrator (ode45 40, verner 38)"; long lists are cut.
 std::string Shares(const Aspect& aspect, const Finding& finding) {
-  constexpr std::size_t kMostShown = 8;
+  constexpr std::size_t kMaxShown = 8;
   std::string text = fmt::format("{} (", aspect.words);
-  for (std::size_t i = 0; i < std::min(finding.values.size(), kMostShown); ++i) {
+  for (std::size_t i = 0; i < std::min(finding.values.size(), kMaxShown); ++i) {
     text += fmt::format("{}{} {}", i == 0 ? "" : ", ", finding.values[i], finding.rows[i]);
   }
-  const std::size_t more = finding.values.size() - std::min(finding.values.size(), kMostShown);
+  const std::size_t more = finding.values.size() - std::min(finding.values.size(), kMaxShown);
   return text + (more > 0 ? fmt::format(" and {} more)", more) : ")");
 }
 
@@ -337,10 +338,10 @@ std::string Joined(const std::vector<std::string>& parts) {
 }
 
 /// Reasons without their numbers and how many rows have them: "singular 3, warnings: energy 2".
-std::string CountReasons(const Tradeoff& tradeoff, std::size_t* left_out) {
+std::string CountReasons(const WorkPrecision& work_precision, std::size_t* left_out) {
   std::map<std::string, int> counts;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
       if (row.reason.empty()) continue;
       ++*left_out;
       ++counts[row.reason.substr(0, row.reason.find(" at "))];
@@ -351,10 +352,10 @@ std::string CountReasons(const Tradeoff& tradeoff, std::size_t* left_out) {
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 
-std::vector<Record> TimingsOf(const Tradeoff& tradeoff) {
+std::vector<Record> TimingsOf(const WorkPrecision& work_precision) {
   std::vector<Record> timings;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
       if (!row.timing.items().empty()) timings.push_back(row.timing);
     }
   }
@@ -367,11 +368,11 @@ bool IsTime(const std::string& cost) {
 }
 
 /// Returns a line with the error, the certified error of references, and its influence.
-std::string ErrorLine(const Tradeoff& tradeoff) {
+std::string ErrorLine(const WorkPrecision& work_precision) {
   double least = INFINITY, most = 0.0;
   int known = 0, bounds = 0, beyond = 0;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
       if (!row.reason.empty()) continue;
       const double certified = row.record.Number("reference_error");
       if (std::isfinite(certified)) {
@@ -383,8 +384,8 @@ std::string ErrorLine(const Tradeoff& tradeoff) {
       beyond += row.record.Number("reference_valid_until") < row.record.Number("horizon") ? 1 : 0;
     }
   }
-  std::string line = fmt::format("error: {}", tradeoff.error);
-  if (known > 0 && tradeoff.error.starts_with("error_")) {
+  std::string line = fmt::format("error: {}", work_precision.error);
+  if (known > 0 && work_precision.error.starts_with("error_")) {
     line += fmt::format(", against references certified to {:.1e}", least);
     if (most > least) line += fmt::format(" to {:.1e}", most);
     line += " m";
@@ -400,20 +401,21 @@ std::string ErrorLine(const Tradeoff& tradeoff) {
   return line;
 }
 
-std::string CostLine(const Tradeoff& tradeoff) {
-  if (tradeoff.cost == "wall_s_median") {
+std::string CostLine(const WorkPrecision& work_precision) {
+  if (work_precision.cost == "wall_s_median") {
     return "cost: wall_s_median [s], simulations timed one at a time, without observers";
   }
-  const std::string unit = UnitOf(ColumnOf(tradeoff.cost, {}));
+  const std::string unit = UnitOf(ColumnOf(work_precision.cost, {}));
   std::string line =
-      fmt::format("cost: {}{}", tradeoff.cost, unit.empty() ? "" : " [" + unit + "]");
-  const bool is_count = tradeoff.cost.starts_with("rhs_e") || tradeoff.cost == "steps";
-  const auto implicit = [](const TradeoffRow& row) {
+      fmt::format("cost: {}{}", work_precision.cost, unit.empty() ? "" : " [" + unit + "]");
+  const bool is_count = work_precision.cost.starts_with("rhs_e") || work_precision.cost == "steps";
+  const auto implicit = [](const WorkPrecisionRow& row) {
     return row.reason.empty() && row.record.Number("newton_iterations") > 0;
   };
-  const bool any = std::ranges::any_of(tradeoff.problems, [&](const TradeoffProblem& problem) {
-    return std::ranges::any_of(problem.rows, implicit);
-  });
+  const bool any =
+      std::ranges::any_of(work_precision.problems, [&](const WorkPrecisionProblem& problem) {
+        return std::ranges::any_of(problem.rows, implicit);
+      });
   if (is_count && any) {
     line +=
         "; of implicit integrators it leaves out Jacobians and linear solves, so that they look "
@@ -423,10 +425,10 @@ std::string CostLine(const Tradeoff& tradeoff) {
 }
 
 /// Returns true if compared formulations run library code, which is not equally optimized.
-bool ComparesLibraryCode(const Tradeoff& tradeoff) {
+bool ComparesLibraryCode(const WorkPrecision& work_precision) {
   std::set<std::string> formulations;
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) {
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
       if (!row.reason.empty() || !row.record.Text("execution").empty()) continue;
       formulations.insert(row.record.Text("formulation"));
     }
@@ -436,11 +438,11 @@ bool ComparesLibraryCode(const Tradeoff& tradeoff) {
 
 }  // namespace
 
-std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
+std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) {
   std::vector<std::string> equal, unequal, unknown, lines;
   bool one_machine = true;
   for (const Aspect& aspect : kAspects) {
-    const Finding finding = FindValues(tradeoff, aspect);
+    const Finding finding = FindValues(work_precision, aspect);
     if (finding.values.empty()) continue;
     const bool is_single = finding.values.size() == 1;
     if (is_single && finding.values.front().empty()) {
@@ -454,19 +456,19 @@ std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
     }
     if (std::string_view(aspect.key) == "machine") one_machine = finding.is_equal;
   }
-  lines.push_back(ErrorLine(tradeoff));
-  lines.push_back(CostLine(tradeoff));
+  lines.push_back(ErrorLine(work_precision));
+  lines.push_back(CostLine(work_precision));
   if (!equal.empty()) lines.push_back("equal in all compared rows: " + Joined(equal));
   if (!unequal.empty()) lines.push_back("not equal (rows): " + Joined(unequal));
   if (!unknown.empty()) lines.push_back("not recorded: " + Joined(unknown));
   std::size_t all = 0, left_out = 0;
-  for (const TradeoffProblem& problem : tradeoff.problems) all += problem.rows.size();
-  const std::string reasons = CountReasons(tradeoff, &left_out);
+  for (const WorkPrecisionProblem& problem : work_precision.problems) all += problem.rows.size();
+  const std::string reasons = CountReasons(work_precision, &left_out);
   if (left_out > 0) {
     lines.push_back(fmt::format("{} of {} rows are not compared: {}", left_out, all, reasons));
   }
-  if (!IsTime(tradeoff.cost)) return lines;
-  if (ComparesLibraryCode(tradeoff)) {
+  if (!IsTime(work_precision.cost)) return lines;
+  if (ComparesLibraryCode(work_precision)) {
     lines.emplace_back(
         "not equal: the library's code. O-DCA has special code, vector instructions and fused "
         "multiply-add; other formulations have none. Equal code: execution generated; counts: "
@@ -475,7 +477,8 @@ std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff) {
   if (!one_machine) {
     lines.push_back("warning: the costs are times of more than one machine, which do not compare");
   }
-  for (std::string& line : NoiseWarnings(TimingsOf(tradeoff))) lines.push_back(std::move(line));
+  for (std::string& line : NoiseWarnings(TimingsOf(work_precision)))
+    lines.push_back(std::move(line));
   return lines;
 }
 

@@ -1,4 +1,4 @@
-#include "harness/tables/doubt_notes.h"
+#include "harness/tables/warning_notes.h"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,14 @@
 #include <map>
 #include <utility>
 
-#include "harness/analysis/doubts.h"
+#include "harness/analysis/warnings.h"
 #include "harness/config/published_series.h"
 #include "harness/tables/columns.h"
 
 namespace loopbench::harness {
 namespace {
 
-constexpr std::size_t kRowsNamed = 3, kScenesNamed = 6;
+constexpr std::size_t kRowsNamed = 3, kProblemsNamed = 6;
 
 // Meaning of a warning code, and its number in a row.
 struct Reason {
@@ -23,37 +23,37 @@ struct Reason {
 };
 
 const Reason kReasons[] = {
-    {kEnergyDoubt,
+    {kEnergyWarning,
      "error of the energy balance above 1 % of the exchanged energy, or larger than steps and "
      "tolerance explain",
      [](const Record& row) {
        return fmt::format("{:.2g} %, at most {:.2g} % expected", 100 * EnergyErrorShare(row),
                           100 * ExpectedEnergyShare(row));
      }},
-    {kSingularDoubt,
+    {kSingularWarning,
      "crosses singular configurations, where this level does not determine the branch",
      [](const Record& row) {
        return fmt::format("distance {:.1g} at {:.4g} s", row.Number("singularity_distance_min"),
                           row.Number("singularity_distance_min_t"));
      }},
-    {kSoftenedDoubt, "constraints were regularized away from singular configurations",
+    {kRegularizedWarning, "constraints were regularized away from singular configurations",
      [](const Record& row) {
        return fmt::format("{} of {} evaluations, distance {:.1g}",
                           row.Text("regularized_evaluations"), row.Text("rhs_evaluations"),
                           row.Number("singularity_distance_min"));
      }},
-    {kDriftDoubt, "drift is larger than steps and tolerance explain at this level",
+    {kDriftWarning, "drift is larger than steps and tolerance explain at this level",
      [](const Record& row) {
        return fmt::format("{:.1e} of a link or rad, at most {:.1e} expected", DriftShare(row),
-                          PromisedDriftShare(row));
+                          ExpectedDriftShare(row));
      }},
-    {kErrorDoubt,
+    {kErrorWarning,
      "distance from the reference above 1000 tolerances, or with fixed steps above 1 % of a link",
      [](const Record& row) {
        const bool only_points = row.Text("reference") != kPublished;
        return fmt::format("{:.1e} of a link{}", TrueErrorShare(row), only_points ? "" : " or rad");
      }},
-    {kRefinementDoubt, "finer tolerances do not converge to one final state",
+    {kRefinementWarning, "finer tolerances do not converge to one final state",
      [](const Record& row) {
        if (row.Find("refinement_difference") != nullptr) {
          return fmt::format("{:.1e} of a link or rad from the run at a tenth of its tolerance",
@@ -61,19 +61,19 @@ const Reason kReasons[] = {
        }
        return fmt::format("{} steps, state {}", row.Text("steps"), row.Text("state_hash"));
      }},
-    {kDriveDoubt, "steps longer than half a period of the fastest drive",
+    {kDriveWarning, "steps longer than half a period of the fastest drive",
      [](const Record& row) { return fmt::format("{:.2g} periods a step", PeriodsPerStep(row)); }},
-    {kStepsDoubt, "step control at its shortest step, or more than half of the steps rejected",
+    {kStepsWarning, "step control at its shortest step, or more than half of the steps rejected",
      [](const Record& row) {
        return fmt::format("{} rejected of {}, shortest {:.1e} s", row.Text("rejected"),
                           row.Number("steps") + row.Number("rejected"),
                           row.Number("step_shortest"));
      }},
-    {kMembersDoubt, "members of the ensemble failed",
+    {kMembersWarning, "members of the ensemble failed",
      [](const Record& row) {
        return row.Text("ensemble_failed") + " of " + row.Text("ensemble_size");
      }},
-    {kExponentDoubt, "the ensemble does not resolve the requested exponent",
+    {kExponentWarning, "the ensemble does not resolve the requested exponent",
      [](const Record& row) {
        return fmt::format("{:.2f} +- {:.2g}", row.Number("growth_exponent"),
                           row.Number("growth_spread"));
@@ -85,7 +85,7 @@ std::string NoteOf(const Reason& reason, std::span<const Record> rows,
   std::string names;
   std::size_t count = 0;
   for (const Record& row : rows) {
-    if (!HasDoubt(row, reason.code) || ++count > kRowsNamed) continue;
+    if (!HasWarning(row, reason.code) || ++count > kRowsNamed) continue;
     names += fmt::format("{}{} ({})", names.empty() ? "" : "; ", NameOfRow(row, keys),
                          reason.number(row));
   }
@@ -95,24 +95,24 @@ std::string NoteOf(const Reason& reason, std::span<const Record> rows,
 }
 
 // Runs of one problem, horizon and tolerance.
-using SceneKey = std::pair<std::string, std::pair<double, double>>;
+using ProblemKey = std::pair<std::string, std::pair<double, double>>;
 
-SceneKey SceneOf(const Record& record) {
+ProblemKey ProblemOf(const Record& record) {
   return {record.Text("problem_id"), {record.Number("horizon"), record.Number("rtol")}};
 }
 
 /// Returns a name with the parameters in which the store's `records` differ.
-std::string NameOfScene(const Record& record, std::span<const Record> records) {
+std::string NameOfProblem(const Record& record, std::span<const Record> records) {
   std::vector<std::string> keys = {"rtol", "horizon"};
-  const std::vector<std::string> telling = TellingKeys(records);
+  const std::vector<std::string> telling = DistinguishingKeys(records);
   for (const TableColumn& parameter : WithParameters({}, records)) {
     if (std::ranges::find(telling, parameter.key) != telling.end()) keys.push_back(parameter.key);
   }
-  return fmt::format("{}: {} {}", kDisagreementDoubt, record.Text("mechanism"),
+  return fmt::format("{}: {} {}", kDisagreementWarning, record.Text("mechanism"),
                      NameOfRow(record, keys));
 }
 
-// Describes the runs that decide if runs end differently (harness/analysis/doubts.h).
+// Describes the runs that decide if runs end differently (harness/analysis/warnings.h).
 std::string Deciding(const std::vector<Record>& runs) {
   const bool one_integrator = std::ranges::all_of(runs, [&](const Record& run) {
     return run.Text("integrator") == runs.front().Text("integrator");
@@ -122,9 +122,9 @@ std::string Deciding(const std::vector<Record>& runs) {
 }
 
 // Names the runs that agree with each other; each of `runs` has a cluster.
-std::string NoteOfScene(const std::vector<Record>& runs, std::span<const Record> records) {
+std::string NoteOfProblem(const std::vector<Record>& runs, std::span<const Record> records) {
   const std::string deciding = Deciding(runs);
-  const std::vector<std::string> keys = TellingKeys(runs);
+  const std::vector<std::string> keys = DistinguishingKeys(runs);
   std::map<std::int64_t, std::vector<Record>> clusters;
   for (const Record& run : runs) {
     clusters[static_cast<std::int64_t>(run.Number("agreement"))].push_back(run);
@@ -133,7 +133,7 @@ std::string NoteOfScene(const std::vector<Record>& runs, std::span<const Record>
   for (const auto& [number, members] : clusters) {
     std::vector<std::string> names;
     for (const Record& run : members) names.push_back(NameOfRow(run, keys));
-    const bool cleared = !HasDoubt(members.front(), kDisagreementDoubt);
+    const bool cleared = !HasWarning(members.front(), kDisagreementWarning);
     if (members.size() > 1) {
       text += fmt::format("; {} agree{}", fmt::join(names, ", "),
                           cleared ? ", also with " + deciding : "");
@@ -143,17 +143,17 @@ std::string NoteOfScene(const std::vector<Record>& runs, std::span<const Record>
     }
   }
   text += alone;
-  const std::string scene = NameOfScene(runs.front(), records);
-  if (clusters.size() == 1) return scene + ": another final state than with " + deciding + text;
+  const std::string problem = NameOfProblem(runs.front(), records);
+  if (clusters.size() == 1) return problem + ": another final state than with " + deciding + text;
   const PoseDifference worst = LargestDifference(runs);
   return fmt::format(
-      "{}: final states differ by {:.2g} links or rad ({}), more than {:.0f} tolerances{}", scene,
-      worst.largest, worst.body, kMostTolerances, text);
+      "{}: final states differ by {:.2g} links or rad ({}), more than {:.0f} tolerances{}", problem,
+      worst.largest, worst.body, kMaxTolerances, text);
 }
 
 }  // namespace
 
-std::vector<std::string> TellingKeys(std::span<const Record> rows) {
+std::vector<std::string> DistinguishingKeys(std::span<const Record> rows) {
   std::vector<std::string> keys;
   for (const std::string& key : CaseKeysOf(rows)) {
     if (key == "atol") continue;
@@ -179,44 +179,46 @@ std::string NameOfRow(const Record& row, const std::vector<std::string>& keys) {
   return name.empty() ? row.Text("mechanism") : name;
 }
 
-std::vector<std::pair<std::string, std::string>> MeaningsOfDoubts() {
+std::vector<std::pair<std::string, std::string>> MeaningsOfWarnings() {
   std::vector<std::pair<std::string, std::string>> meanings;
   for (const Reason& reason : kReasons) meanings.emplace_back(reason.code, reason.sentence);
-  meanings.emplace_back(kDisagreementDoubt, "other runs of the problem have other final states");
+  meanings.emplace_back(kDisagreementWarning, "other runs of the problem have other final states");
   return meanings;
 }
 
-std::vector<std::string> DoubtNotes(std::span<const Record> rows, std::span<const Record> records) {
-  if (std::ranges::none_of(rows, [](const Record& row) { return HasDoubt(row); })) return {};
+std::vector<std::string> WarningNotes(std::span<const Record> rows,
+                                      std::span<const Record> records) {
+  if (std::ranges::none_of(rows, [](const Record& row) { return HasWarning(row); })) return {};
   std::vector<std::string> notes = {
       "warnings of flagged runs (docs/reference/outcomes-and-warnings.md):"};
-  const std::vector<std::string> keys = TellingKeys(rows);
+  const std::vector<std::string> keys = DistinguishingKeys(rows);
   for (const Reason& reason : kReasons) {
     if (const std::string note = NoteOf(reason, rows, keys); !note.empty()) notes.push_back(note);
   }
-  std::vector<SceneKey> scenes;
+  std::vector<ProblemKey> problems;
   for (const Record& row : rows) {
-    if (!HasDoubt(row, kDisagreementDoubt)) continue;
-    if (std::ranges::find(scenes, SceneOf(row)) == scenes.end()) scenes.push_back(SceneOf(row));
+    if (!HasWarning(row, kDisagreementWarning)) continue;
+    if (std::ranges::find(problems, ProblemOf(row)) == problems.end())
+      problems.push_back(ProblemOf(row));
   }
-  for (std::size_t i = 0; i < std::min(scenes.size(), kScenesNamed); ++i) {
+  for (std::size_t i = 0; i < std::min(problems.size(), kProblemsNamed); ++i) {
     std::vector<Record> runs;
     std::ranges::copy_if(records, std::back_inserter(runs), [&](const Record& record) {
-      return record.Find("agreement") != nullptr && SceneOf(record) == scenes[i];
+      return record.Find("agreement") != nullptr && ProblemOf(record) == problems[i];
     });
     // no other run at this tolerance: no cluster
     if (!runs.empty()) {
-      notes.push_back(NoteOfScene(runs, records));
+      notes.push_back(NoteOfProblem(runs, records));
       continue;
     }
-    const auto alone =
-        std::ranges::find_if(rows, [&](const Record& row) { return SceneOf(row) == scenes[i]; });
-    notes.push_back(NameOfScene(*alone, records) +
+    const auto alone = std::ranges::find_if(
+        rows, [&](const Record& row) { return ProblemOf(row) == problems[i]; });
+    notes.push_back(NameOfProblem(*alone, records) +
                     ": another final state than with finer tolerances");
   }
-  if (scenes.size() > kScenesNamed) {
+  if (problems.size() > kProblemsNamed) {
     notes.push_back(fmt::format("{}: {} problems more; column agreement numbers the agreeing sets",
-                                kDisagreementDoubt, scenes.size() - kScenesNamed));
+                                kDisagreementWarning, problems.size() - kProblemsNamed));
   }
   return notes;
 }

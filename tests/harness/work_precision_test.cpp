@@ -1,6 +1,6 @@
 // What accuracy costs: joins of runs and timings, fronts against domination by definition, the
 // cheapest methods, what is left out and why.
-#include "harness/judge/tradeoff.h"
+#include "harness/judge/work_precision.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -13,27 +13,27 @@
 
 #include "harness/text/files.h"
 #include "tests/harness/cli_fixture.h"
-#include "tests/harness/tradeoff_records.h"
+#include "tests/harness/work_precision_records.h"
 
 namespace loopbench::harness {
-namespace tradeoff_test {
+namespace work_precision_test {
 
-using namespace tradeoff_records;
+using namespace work_precision_records;
 
-std::vector<TradeoffRow> OnlyRows(const Tradeoff& tradeoff) {
-  EXPECT_EQ(tradeoff.problems.size(), 1u);
-  return tradeoff.problems.front().rows;
+std::vector<WorkPrecisionRow> OnlyRows(const WorkPrecision& work_precision) {
+  EXPECT_EQ(work_precision.problems.size(), 1u);
+  return work_precision.problems.front().rows;
 }
 
 /// By definition: nobody is as good in both and better in one.
-bool IsBeaten(const TradeoffRow& row, const std::vector<TradeoffRow>& rows) {
-  return std::ranges::any_of(rows, [&](const TradeoffRow& other) {
+bool IsBeaten(const WorkPrecisionRow& row, const std::vector<WorkPrecisionRow>& rows) {
+  return std::ranges::any_of(rows, [&](const WorkPrecisionRow& other) {
     return other.reason.empty() && other.error <= row.error && other.cost <= row.cost &&
            (other.error < row.error || other.cost < row.cost);
   });
 }
 
-TEST(Tradeoff, TheFrontIsWhatNobodyBeats) {
+TEST(WorkPrecision, TheFrontIsWhatNobodyBeats) {
   std::mt19937 generator(7);
   std::uniform_int_distribution<int> any(1, 12);  // few values: many ties
   for (int trial = 0; trial < 50; ++trial) {
@@ -46,7 +46,7 @@ TEST(Tradeoff, TheFrontIsWhatNobodyBeats) {
     records[2].Set("warnings", std::string("energy"));
     records[4].Set("outcome", std::string("singular"));
     int front = 0;
-    for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {}))) {
+    for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {}))) {
       if (!row.reason.empty()) {
         EXPECT_FALSE(row.on_front) << row.reason;
         continue;
@@ -58,12 +58,12 @@ TEST(Tradeoff, TheFrontIsWhatNobodyBeats) {
   }
 }
 
-TEST(Tradeoff, TheCostIsThatOfTheSameCase) {
+TEST(WorkPrecision, TheCostIsThatOfTheSameCase) {
   std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
   records.push_back(TimingOf("odca", 0.5, 1e-7));  // of a case that was not run
   records.push_back(TimingOf("odca", 1e-3, 7.0));
   records.back().Set("horizon", 20.0);
-  for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {}))) {
+  for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {}))) {
     EXPECT_EQ(row.reason, "");
     const double expected = row.error == 1e-3 ? 0.1 : row.error == 1e-6 ? 0.2 : 0.4;
     EXPECT_EQ(row.cost, expected);
@@ -71,7 +71,7 @@ TEST(Tradeoff, TheCostIsThatOfTheSameCase) {
   }
 }
 
-TEST(Tradeoff, FixedStepsAreCasesOfTheirOwn) {
+TEST(WorkPrecision, FixedStepsAreCasesOfTheirOwn) {
   std::vector<Record> records;
   for (const double step : {0.1, 0.01}) {
     for (Record record : {RunOf("odca", 1e-3, step), TimingOf("odca", 1e-3, 1.0 / step)}) {
@@ -91,7 +91,7 @@ TEST(Tradeoff, FixedStepsAreCasesOfTheirOwn) {
   EXPECT_EQ(rows[1].cost, 100.0);
 }
 
-TEST(Tradeoff, RowsThatAreNotComparedSayWhy) {
+TEST(WorkPrecision, RowsThatAreNotComparedSayWhy) {
   std::vector<Record> records = Store({1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8}, {1, 1, 1, 1, 1, 1});
   records[0].Set("outcome", std::string("singular"));
   records[0].Set("t_reached", 0.312);
@@ -101,7 +101,8 @@ TEST(Tradeoff, RowsThatAreNotComparedSayWhy) {
   records[7].Set("wall_s_median", Value());
   records.erase(records.begin() + 9);  // the timing of the fifth
   std::vector<std::string> reasons;
-  for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {}))) reasons.push_back(row.reason);
+  for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {})))
+    reasons.push_back(row.reason);
   std::ranges::sort(reasons);
   EXPECT_EQ(reasons, (std::vector<std::string>{"", "no error_position_max", "not timed",
                                                "singular at 0.312 s", "timing: time-limit",
@@ -109,7 +110,7 @@ TEST(Tradeoff, RowsThatAreNotComparedSayWhy) {
 }
 
 /// What the reference cannot tell apart is not what a row may win by.
-TEST(Tradeoff, NoErrorIsBelievedBelowWhatTheReferenceIsCertifiedTo) {
+TEST(WorkPrecision, NoErrorIsBelievedBelowWhatTheReferenceIsCertifiedTo) {
   std::vector<Record> records = Store({1e-12, 3e-12}, {2.0, 1.0});
   for (Record& record : records) record.Set("reference_error", 2e-12);
   const auto rows = OnlyRows(MakeTradeoff(records, {}));
@@ -121,7 +122,7 @@ TEST(Tradeoff, NoErrorIsBelievedBelowWhatTheReferenceIsCertifiedTo) {
   EXPECT_FALSE(rows[1].on_front) << "as good as the other as far as anybody knows, and dearer";
 }
 
-TEST(Tradeoff, FallsBackAndSaysSo) {
+TEST(WorkPrecision, FallsBackAndSaysSo) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {1.0, 2.0});
   EXPECT_TRUE(MakeTradeoff(records, {}).remarks.empty());
   for (Record& record : records) {
@@ -129,33 +130,33 @@ TEST(Tradeoff, FallsBackAndSaysSo) {
     record.Set("closed_form_error_max", 0.5);
     record.Set("drift_position_max", 0.25);
   }
-  Tradeoff tradeoff = MakeTradeoff(records, {});
-  EXPECT_EQ(tradeoff.error, "closed_form_error_max");
-  ASSERT_EQ(tradeoff.remarks.size(), 1u);
-  EXPECT_NE(tradeoff.remarks[0].find("no record has error_position_max"), std::string::npos);
+  WorkPrecision work_precision = MakeTradeoff(records, {});
+  EXPECT_EQ(work_precision.error, "closed_form_error_max");
+  ASSERT_EQ(work_precision.remarks.size(), 1u);
+  EXPECT_NE(work_precision.remarks[0].find("no record has error_position_max"), std::string::npos);
   for (Record& record : records) record.Set("closed_form_error_max", Value());
   std::erase_if(records, [](const Record& record) { return record.Text("kind") == "timing"; });
-  tradeoff = MakeTradeoff(records, {});
-  EXPECT_EQ(tradeoff.error, "drift_position_max");
-  EXPECT_EQ(tradeoff.cost, "rhs_equivalents");
-  ASSERT_EQ(tradeoff.remarks.size(), 2u);
-  EXPECT_NE(tradeoff.remarks[0].find("no distance from the right motion"), std::string::npos);
-  EXPECT_NE(tradeoff.remarks[1].find("no accuracy case was timed"), std::string::npos);
+  work_precision = MakeTradeoff(records, {});
+  EXPECT_EQ(work_precision.error, "drift_position_max");
+  EXPECT_EQ(work_precision.cost, "rhs_equivalents");
+  ASSERT_EQ(work_precision.remarks.size(), 2u);
+  EXPECT_NE(work_precision.remarks[0].find("no distance from the right motion"), std::string::npos);
+  EXPECT_NE(work_precision.remarks[1].find("no accuracy case was timed"), std::string::npos);
 }
 
 /// The usual timings of an experiment are at one tolerance for all: of no accuracy case.
-TEST(Tradeoff, TimingsOfOtherCasesAreNoCost) {
+TEST(WorkPrecision, TimingsOfOtherCasesAreNoCost) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {1.0, 2.0});
   for (Record& record : records) {
     if (record.Text("kind") == "timing") record.Set("horizon", 1.0);
   }
   EXPECT_EQ(MakeTradeoff(records, {}).cost, "rhs_equivalents");
-  for (const TradeoffRow& row : OnlyRows(MakeTradeoff(records, {.cost = "wall_s"}))) {
+  for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {.cost = "wall_s"}))) {
     EXPECT_EQ(row.reason, "not timed");
   }
 }
 
-TEST(Tradeoff, RefusesWhatNoRecordHas) {
+TEST(WorkPrecision, RefusesWhatNoRecordHas) {
   const std::vector<Record> records = Store({1e-3}, {1.0});
   EXPECT_THROW(MakeTradeoff(records, {.error = "error_positoin_max"}), ConfigError);
   EXPECT_THROW(MakeTradeoff(records, {.error = "closed_form_error_max"}), ConfigError);
@@ -168,33 +169,34 @@ TEST(Tradeoff, RefusesWhatNoRecordHas) {
   EXPECT_THROW(MakeTradeoff(empty, {}), ConfigError);
 }
 
-TEST(Tradeoff, ConditionsSeeTheTimingToo) {
+TEST(WorkPrecision, ConditionsSeeTheTimingToo) {
   const std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
-  const Tradeoff fast = MakeTradeoff(records, {.where = {ParseCondition("wall_s_median<0.3")}});
+  const WorkPrecision fast =
+      MakeTradeoff(records, {.where = {ParseCondition("wall_s_median<0.3")}});
   EXPECT_EQ(OnlyRows(fast).size(), 2u);
 }
 
-TEST(Tradeoff, ProblemsAreComparedEachByItself) {
+TEST(WorkPrecision, ProblemsAreComparedEachByItself) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
   for (Record record : Store({1e-2, 1e-5}, {10.0, 20.0})) {
     record.Set("mechanism", std::string("slow"));
     record.Set("case_id", "slow" + record.Text("case_id"));
     records.push_back(record);
   }
-  const Tradeoff tradeoff = MakeTradeoff(records, {});
-  ASSERT_EQ(tradeoff.problems.size(), 2u);
-  EXPECT_EQ(tradeoff.problems[0].name, "four-bar, horizon 10");
-  for (const TradeoffProblem& problem : tradeoff.problems) {
-    for (const TradeoffRow& row : problem.rows) EXPECT_TRUE(row.on_front);
+  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  ASSERT_EQ(work_precision.problems.size(), 2u);
+  EXPECT_EQ(work_precision.problems[0].name, "four-bar, horizon 10");
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) EXPECT_TRUE(row.on_front);
   }
-  const Tradeoff one = MakeTradeoff(records, {.per = {"horizon"}});
+  const WorkPrecision one = MakeTradeoff(records, {.per = {"horizon"}});
   EXPECT_EQ(one.problems.size(), 1u);
 }
 
-TEST(Tradeoff, TheCheapestOfEachFormulationReachesTheError) {
+TEST(WorkPrecision, TheCheapestOfEachFormulationReachesTheError) {
   // odca 1e-4 at 0.1 and 1e-10 at 0.9, lagrange 1e-7 at 0.3
   const std::vector<Record> records = Store({1e-4, 1e-7, 1e-10}, {0.1, 0.3, 0.9});
-  const TradeoffProblem problem = MakeTradeoff(records, {}).problems.front();
+  const WorkPrecisionProblem problem = MakeTradeoff(records, {}).problems.front();
   std::vector<std::string> found;
   for (const Cheapest& one : problem.cheapest) {
     const std::string cost =
@@ -208,9 +210,9 @@ TEST(Tradeoff, TheCheapestOfEachFormulationReachesTheError) {
                                              "1e-09 lagrange none", "1e-09 odca 0.9 x1"}));
 }
 
-class TradeoffProgram : public CommandLineTest {};
+class WorkPrecisionProgram : public CommandLineTest {};
 
-TEST_F(TradeoffProgram, PrintsAndWritesWhatAccuracyCosts) {
+TEST_F(WorkPrecisionProgram, PrintsAndWritesWhatAccuracyCosts) {
   Write("pendulum.json", ReadFile(kConfigs / "mechanisms/pendulum.json"));
   Write("e.json", R"({"name": "e", "tolerances": [1e-4, 1e-6, 1e-8], "fixed_steps": [0.02],
     "integrator": ["ode45", "verner"], "problems": [{"mechanism": "pendulum.json", "horizon": 0.5}],
@@ -238,5 +240,5 @@ TEST_F(TradeoffProgram, PrintsAndWritesWhatAccuracyCosts) {
                {"problem,formulation"});
 }
 
-}  // namespace tradeoff_test
+}  // namespace work_precision_test
 }  // namespace loopbench::harness

@@ -1,4 +1,4 @@
-#include "harness/timing/yardstick.h"
+#include "harness/timing/calibration.h"
 
 #include <algorithm>
 #include <atomic>
@@ -44,7 +44,7 @@ std::atomic<double> alone = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-double YardstickNs() {
+double CalibrationNs() {
   using Clock = std::chrono::steady_clock;
   alignas(64) static thread_local double matrix[kRows][kRows];
   alignas(64) static thread_local double numbers[kNumbers];
@@ -63,6 +63,6 @@ double YardstickNs() {
   return least;
 }
 
-double YardstickAloneNs() { return alone; }
+double CalibrationBaselineNs() { return alone; }
 
 }  // namespace loopbench::harness

@@ -7,7 +7,7 @@
 
 #include "harness/record/record.h"
 
-namespace loopbench::harness::tradeoff_records {
+namespace loopbench::harness::work_precision_records {
 
 inline Record Keys(const std::string& kind, const std::string& formulation, double rtol) {
   Record record;
@@ -62,4 +62,4 @@ inline std::vector<Record> Store(const std::vector<double>& errors,
   return records;
 }
 
-}  // namespace loopbench::harness::tradeoff_records
+}  // namespace loopbench::harness::work_precision_records

@@ -1,5 +1,5 @@
 // Planted records turn each cell of a robustness map into each of its classes.
-#include "harness/judge/failure_map.h"
+#include "harness/judge/robustness_map.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/harness/failure_map_runs.h"
+#include "tests/harness/robustness_map_runs.h"
 
 namespace loopbench::harness {
-namespace failure_map_test {
+namespace robustness_map_test {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -36,7 +36,7 @@ MapRow Row() {
   return row;
 }
 
-const MapColumn kOdca{"O-DCA", {{"formulation", {"odca"}}}};
+const MapMethod kOdca{"O-DCA", {{"formulation", {"odca"}}}};
 
 MapCell CellOf(const std::vector<Record>& records, const MapRow& row = Row()) {
   return JudgeCell(row, 0, kOdca, records);
@@ -248,5 +248,5 @@ TEST(MapCell, OneReasonExcusesAllColumnsThatNeedNotHold) {
   EXPECT_EQ(CellOf({}, row).state, CellState::kNotMeasured);
 }
 
-}  // namespace failure_map_test
+}  // namespace robustness_map_test
 }  // namespace loopbench::harness

@@ -16,13 +16,13 @@ namespace loopbench::harness {
 // comparison with other runs does.
 
 /// Final poses are alike that differ by at most so many tolerances: over links and in rad.
-inline constexpr double kMostTolerances = 1000.0;
+inline constexpr double kMaxTolerances = 1000.0;
 
 struct Agreement {
   /// Runs of the same problem, horizon and tolerance with equal numbers have equal final poses. The
   /// largest such set is 1. 0 if there is no other run to compare with.
   std::int64_t cluster = 0;
-  bool doubted = false;
+  bool flagged = false;
   /// Agrees with a trusted run whose level restores the branch at every step.
   bool is_backed = false;
 };
@@ -60,21 +60,21 @@ PoseDifference DifferenceOf(const Record& a, const Record& b);
 PoseDifference LargestDifference(std::span<const Record> runs);
 
 // Reasons not to rely on a finished run: warnings from its own record and from other runs of its
-// problem (doubts.h).
+// problem (warnings.h).
 
-/// The codes of `doubts` (docs/reference/outcomes-and-warnings.md); programs may rely on them.
-inline constexpr const char* kEnergyDoubt = "energy";
-inline constexpr const char* kSingularDoubt = "singular-crossing";
-inline constexpr const char* kSoftenedDoubt = "regularized";
-inline constexpr const char* kDriftDoubt = "drift";
-inline constexpr const char* kMembersDoubt = "ensemble-failures";
-inline constexpr const char* kExponentDoubt = "exponent";
-inline constexpr const char* kDisagreementDoubt = "disagreement";
+/// The codes of `warnings` (docs/reference/outcomes-and-warnings.md); programs may rely on them.
+inline constexpr const char* kEnergyWarning = "energy";
+inline constexpr const char* kSingularWarning = "singular-crossing";
+inline constexpr const char* kRegularizedWarning = "regularized";
+inline constexpr const char* kDriftWarning = "drift";
+inline constexpr const char* kMembersWarning = "ensemble-failures";
+inline constexpr const char* kExponentWarning = "exponent";
+inline constexpr const char* kDisagreementWarning = "disagreement";
 
-inline constexpr const char* kErrorDoubt = "error";
-inline constexpr const char* kRefinementDoubt = "refinement";
-inline constexpr const char* kDriveDoubt = "drive";
-inline constexpr const char* kStepsDoubt = "steps";
+inline constexpr const char* kErrorWarning = "error";
+inline constexpr const char* kRefinementWarning = "refinement";
+inline constexpr const char* kDriveWarning = "drive";
+inline constexpr const char* kStepsWarning = "steps";
 
 /// Returns the expected drift growth at the record's level; empty for unknown levels.
 std::optional<DriftGrowth> GrowthAt(const Record& record);
@@ -94,7 +94,7 @@ double ExpectedEnergyShare(const Record& record);
 /// the last steps; projection leaves round-off, and some tolerance in regularized directions. Fixed
 /// steps have no expected drift except with projection.
 double DriftShare(const Record& record);
-double PromisedDriftShare(const Record& record);
+double ExpectedDriftShare(const Record& record);
 
 /// Returns the largest global error of points over the link length; NaN without a reference.
 double TrueErrorShare(const Record& record);
@@ -104,14 +104,14 @@ double PeriodsPerStep(const Record& record);
 
 /// Returns the warning codes from an accuracy record alone, separated by spaces. Returns "" if
 /// there are none or if the run did not finish.
-std::string OwnDoubts(const Record& record);
+std::string OwnWarnings(const Record& record);
 
 /// Sets `warnings` of every finished accuracy record, including warnings from comparisons of runs.
 /// Sets `agreement`: the runs of equal problem, horizon and tolerance with equal final poses.
-void SetDoubts(std::vector<Record>* records);
+void SetWarnings(std::vector<Record>* records);
 
 /// Returns true if the record has warning `code`, or any warning if `code` is "".
-bool HasDoubt(const Record& record, const std::string& code = "");
+bool HasWarning(const Record& record, const std::string& code = "");
 
 // Tests whether finer tolerances bring a method's runs nearer to one final pose. Convergence fails
 // for a wrong derivative, an ignored tolerance, or a motion without a limit.
@@ -121,7 +121,7 @@ bool HasDoubt(const Record& record, const std::string& code = "");
 inline constexpr double kRoundOffShare = 1e-11;
 
 struct Refinement {
-  bool doubted = false;
+  bool flagged = false;
   /// Largest difference of final poses from those at the column's finest tolerance, and of the run
   /// at the next coarser one; NaN where nothing was compared.
   double off = 0.0, off_before = 0.0;
@@ -129,7 +129,7 @@ struct Refinement {
 
 /// Returns one entry per record, in order. Compares finished accuracy runs that differ only in the
 /// tolerance, for at least three tolerances: distances from the finest run must shrink. If a
-/// distance exceeds 1000 tolerances (kMostTolerances) and has not shrunk by the fourth root of the
+/// distance exceeds 1000 tolerances (kMaxTolerances) and has not shrunk by the fourth root of the
 /// tolerances' ratio, the finer runs are flagged. So are two runs of more than a dozen steps that
 /// are equal in every bit and step: the tolerance had no effect.
 std::vector<Refinement> CompareTolerances(std::span<const Record> records);

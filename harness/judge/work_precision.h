@@ -18,7 +18,7 @@ namespace loopbench::harness {
 // the cheapest methods, because its error is unreliable.
 
 /// Options of the work-precision comparison.
-struct TradeoffOptions {
+struct WorkPrecisionOptions {
   /// Key of the error; "" for the first of UsualErrors() that records have.
   std::string error = "";
   /// Key of the cost, in accuracy records or in the timing of the same case. "wall_s" is the median
@@ -39,7 +39,7 @@ std::span<const char* const> UsualErrors();
 bool IsErrorOfPositions(const std::string& key);
 
 /// Accuracy run with its cost.
-struct TradeoffRow {
+struct WorkPrecisionRow {
   Record record;  ///< the run's record with additional keys of its timing
   Record timing;  ///< timing of the same case; without keys if there is none
   double error = std::numeric_limits<double>::quiet_NaN();
@@ -60,24 +60,24 @@ struct Cheapest {
                                                             ///< all formulations
 };
 
-/// Rows of one mechanism and horizon (TradeoffOptions::per), cheapest first, rows without cost
+/// Rows of one mechanism and horizon (WorkPrecisionOptions::per), cheapest first, rows without cost
 /// last; and for each error limit the cheapest row of each formulation.
-struct TradeoffProblem {
+struct WorkPrecisionProblem {
   std::string name;  ///< "four-bar, horizon 10"
-  std::vector<TradeoffRow> rows;
+  std::vector<WorkPrecisionRow> rows;
   std::vector<Cheapest> cheapest;
 };
 
-struct Tradeoff {
+struct WorkPrecision {
   std::string error;  ///< key of the error
   std::string cost;   ///< key of the cost; "wall_s_median" for "wall_s"
-  std::vector<TradeoffProblem> problems;
+  std::vector<WorkPrecisionProblem> problems;
   std::vector<std::string> remarks;  ///< one sentence for each substituted key
 };
 
 /// @throws ConfigError if no accuracy record passes `where`, no record has the error or the cost,
 /// or an option names a key that no record has.
-Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& options);
+WorkPrecision MakeTradeoff(std::span<const Record> records, const WorkPrecisionOptions& options);
 
 // Fairness of the comparison: settings that were equal and different among the compared rows, read
 // from the records.
@@ -86,6 +86,6 @@ Tradeoff MakeTradeoff(std::span<const Record> records, const TradeoffOptions& op
 /// with values and numbers of rows; settings missing in records; the error and the cost, with their
 /// accuracy; numbers of rows not compared, with reasons; warnings ("warning: ...") if costs are
 /// incomparable times.
-std::vector<std::string> FairnessStatement(const Tradeoff& tradeoff);
+std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision);
 
 }  // namespace loopbench::harness

@@ -8,13 +8,13 @@
 #include <vector>
 
 #include "harness/figures/judge_figures.h"
-#include "harness/judge/failure_map.h"
 #include "harness/judge/reports.h"
+#include "harness/judge/robustness_map.h"
 #include "harness/text/files.h"
-#include "tests/harness/failure_map_runs.h"
+#include "tests/harness/robustness_map_runs.h"
 
 namespace loopbench::harness {
-namespace failure_map_report_test {
+namespace robustness_map_report_test {
 
 testing::AssertionResult Contains(const std::string& text, const std::string& part) {
   return testing::IsSubstring("part", "text", part, text);
@@ -32,15 +32,15 @@ constexpr const char* kRules = R"({
        "not_applicable": {"multipliers": "none"}}]}]
 })";
 
-FailureMap SmallMap(const std::vector<Record>& records) {
-  return MakeFailureMap(ParseMapRules(kRules, "map.json"), records);
+RobustnessMap SmallMap(const std::vector<Record>& records) {
+  return MakeRobustnessMap(ParseMapRules(kRules, "map.json"), records);
 }
 
 std::vector<Record> SmallRecords() {
   return {RunOf("odca", 1e-8, 2.5e-7, 0.0), RunOf("lagrange", 1e-8, 0.5, 0.0)};
 }
 
-TEST(FailureMapReport, ListsEveryCellWithEveryDigit) {
+TEST(RobustnessMapReport, ListsEveryCellWithEveryDigit) {
   EXPECT_EQ(ToCsv(MapCellTable(SmallMap(SmallRecords()))),
             "group,row,method,state,class,outcome,measure,value,unit,limit,ratio,t_reached,holding,"
             "records,cases,required,reason,case_id,with_warnings,warnings\n"
@@ -53,16 +53,16 @@ TEST(FailureMapReport, ListsEveryCellWithEveryDigit) {
             "singular,two,multipliers,not applicable,not applicable,,,,,,,,0,0,1,false,none,,0,\n");
 }
 
-TEST(FailureMapReport, NamesCellsThatHoldInDoubt) {
+TEST(RobustnessMapReport, NamesCellsThatHoldWithWarnings) {
   std::vector<Record> records = SmallRecords();
-  EXPECT_EQ(CountDoubts(SmallMap(records)), "0 of 1 cells that hold have runs with warnings");
+  EXPECT_EQ(CountFlagged(SmallMap(records)), "0 of 1 cells that hold have runs with warnings");
   for (Record& record : records) record.Set("warnings", std::string("energy drift"));
-  const FailureMap map = SmallMap(records);
-  EXPECT_EQ(CountDoubts(map), "1 of 1 cells that hold have runs with warnings");
+  const RobustnessMap map = SmallMap(records);
+  EXPECT_EQ(CountFlagged(map), "1 of 1 cells that hold have runs with warnings");
   EXPECT_TRUE(Contains(MapMarkdown(map, {}), "O-DCA | 1 of 1 | drift 1, energy 1 |"));
 }
 
-TEST(FailureMapReport, PrintsCellsByMethod) {
+TEST(RobustnessMapReport, PrintsCellsByMethod) {
   const std::string text = ToText(MapTable(SmallMap(SmallRecords())));
   EXPECT_TRUE(Contains(text, "one, \"1e-8\"  ok 2.5e-07  inaccurate 0.5\n"));
   EXPECT_TRUE(Contains(text, "two          ?           -\n"));
@@ -74,7 +74,7 @@ TEST(FailureMapReport, PrintsCellsByMethod) {
   EXPECT_TRUE(Contains(coloured, "\033[32mok 2.5e-07"));
 }
 
-TEST(FailureMapReport, PageHasLimitsReasonsAndProvenance) {
+TEST(RobustnessMapReport, PageHasLimitsReasonsAndProvenance) {
   const std::string page = MapMarkdown(SmallMap(SmallRecords()), {"command: loopbench robustness"});
   EXPECT_TRUE(
       Contains(page, "| one, \"1e-8\" | holds branch 2.5e-07 rad | inaccurate branch 0.5 rad |"));
@@ -83,23 +83,23 @@ TEST(FailureMapReport, PageHasLimitsReasonsAndProvenance) {
   EXPECT_TRUE(Contains(page, "command: loopbench robustness"));
 }
 
-TEST(FailureMapReport, ListsDemandsThatAreNotMet) {
+TEST(RobustnessMapReport, ListsDemandsThatAreNotMet) {
   const std::vector<std::string> broken = BrokenDemands(SmallMap(SmallRecords()));
   ASSERT_EQ(broken.size(), 2u);
   EXPECT_TRUE(Contains(broken[0], "multipliers / one, \"1e-8\": inaccurate branch 0.5 rad"));
   EXPECT_TRUE(Contains(broken[1], "O-DCA / two: not measured (no record matches)"));
 }
 
-TEST(FailureMapReport, RemarksOnKeysThatNoRecordHas) {
+TEST(RobustnessMapReport, RemarksOnKeysThatNoRecordHas) {
   MapRules rules = ParseMapRules(kRules, "map.json");
   rules.columns[0].select[0].key = "formulatoin";
-  const FailureMap map = MakeFailureMap(rules, SmallRecords());
+  const RobustnessMap map = MakeRobustnessMap(rules, SmallRecords());
   ASSERT_EQ(map.remarks.size(), 1u);
   EXPECT_EQ(map.remarks[0],
             "no record has the key \"formulatoin\" (did you mean \"formulation\"?)");
 }
 
-TEST(FailureMapFigure, FoldsRowsOfAnExtremeWorstFirst) {
+TEST(RobustnessMapFigure, FoldsRowsOfAnExtremeWorstFirst) {
   MapRules rules = ParseMapRules(kRules, "map.json");
   MapGroup better = rules.groups[0];
   better.label = "a long name";
@@ -107,7 +107,7 @@ TEST(FailureMapFigure, FoldsRowsOfAnExtremeWorstFirst) {
   better.rows.pop_back();
   better.rows[0].decides.clear();  // what ends well holds
   rules.groups.push_back(better);
-  std::vector<FoldedGroup> groups = Folded(MakeFailureMap(rules, SmallRecords()));
+  std::vector<FoldedGroup> groups = Folded(MakeRobustnessMap(rules, SmallRecords()));
   ASSERT_EQ(groups.size(), 2u);
   // one row holds and one is not measured; one is inaccurate and one not applicable
   EXPECT_EQ(groups[0].label, "singular");
@@ -120,11 +120,11 @@ TEST(FailureMapFigure, FoldsRowsOfAnExtremeWorstFirst) {
   EXPECT_EQ(groups[1].label, "better");
   EXPECT_EQ(groups[1].Share(), 1.0);
   std::ranges::reverse(rules.groups);
-  EXPECT_EQ(Folded(MakeFailureMap(rules, SmallRecords()))[0].label, "singular");
+  EXPECT_EQ(Folded(MakeRobustnessMap(rules, SmallRecords()))[0].label, "singular");
 }
 
-TEST(FailureMapFigure, HasAGlyphAndShadeForEachCell) {
-  const FailureMap map = SmallMap(SmallRecords());
+TEST(RobustnessMapFigure, HasAGlyphAndShadeForEachCell) {
+  const RobustnessMap map = SmallMap(SmallRecords());
   const MapDrawing drawing = DrawMap(map);
   for (const char* text :
        {"\"O-DCA\"", "\"singular\"", "\"Two methods\"", "\"33 %\"", "\"?\"", "\"not measured\"",
@@ -146,20 +146,20 @@ TEST(FailureMapFigure, HasAGlyphAndShadeForEachCell) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST(FailureMapFigure, IsAtMostAPageTall) {
+TEST(RobustnessMapFigure, IsAtMostAPageTall) {
   MapRules rules = ParseMapRules(kRules, "map.json");
   const MapGroup one = rules.groups[0];
   for (int i = 0; i < 40; ++i) {
     rules.groups.push_back(one);
     rules.groups.back().label = fmt::format("group {} with a name that is as long as two lines", i);
   }
-  EXPECT_LE(DrawMap(MakeFailureMap(rules, {})).page.height, PointsOf(240.0));
+  EXPECT_LE(DrawMap(MakeRobustnessMap(rules, {})).page.height, PointsOf(240.0));
 }
 
-TEST(FailureMapFigure, IsTheSameOfItsCsv) {
+TEST(RobustnessMapFigure, IsTheSameOfItsCsv) {
   MapRules rules = ParseMapRules(kRules, "map.json");
   rules.groups[0].label = "=\"a, b\"\n#";  // as much as CSV escapes
-  const FailureMap map = MakeFailureMap(rules, SmallRecords());
+  const RobustnessMap map = MakeRobustnessMap(rules, SmallRecords());
   const std::string csv = "# a note\n" + ToCsv(MapCellTable(map));
   EXPECT_EQ(DrawMap(MapFromCsv(rules, csv, "map.csv")).script, DrawMap(map).script);
   const auto refusal = [&](const std::string& text) -> std::string {
@@ -180,5 +180,5 @@ TEST(FailureMapFigure, IsTheSameOfItsCsv) {
   EXPECT_TRUE(Contains(refusal(other), "map.csv:3: found state \"hold\""));
 }
 
-}  // namespace failure_map_report_test
+}  // namespace robustness_map_report_test
 }  // namespace loopbench::harness

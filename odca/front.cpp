@@ -98,9 +98,11 @@ class Front {
 }  // namespace
 
 JoinSum JoinToFront(const BodyGraph& graph, std::span<const int> bodies, int dim, BodyMarks* marks,
-                    std::vector<Join>* joins) {
+                    std::vector<Join>* joins, int start) {
   // from a body with fewest joints: one between hubs, or an end
-  const int start = *std::ranges::min_element(bodies, {}, [&](int b) { return graph.degree(b); });
+  if (std::ranges::find(bodies, start) == bodies.end()) {
+    start = *std::ranges::min_element(bodies, {}, [&](int b) { return graph.degree(b); });
+  }
   return Front(graph, bodies, dim, marks).Run(start, joins);
 }
 

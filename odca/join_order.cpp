@@ -19,10 +19,18 @@ class Orderer {
  public:
   Orderer(const BodyGraph& graph, int dim) : graph_(graph), dim_(dim), marks_(graph.num_bodies()) {}
 
-  std::vector<Join> Run() {
+  std::vector<Join> Run(int start) {
     std::vector<int> all(graph_.num_bodies() - 1);
     for (int body = 1; body < graph_.num_bodies(); ++body) all[body - 1] = body;
-    for (const std::vector<int>& part : Connected(all)) Order(part);
+    for (const std::vector<int>& part : Connected(all)) {
+      if (start == 0) {
+        Order(part);
+      } else {
+        Mark(part);
+        JoinToFront(graph_, part, dim_, &marks_, &joins_, start);
+        Unmark(part);
+      }
+    }
     return std::move(joins_);
   }
 
@@ -133,8 +141,8 @@ double JoinCost(double rows, double handles, double kept, double dim) {
 }
 
 std::vector<Join> OrderJoins(int num_bodies, std::span<const PlanJoint> joints,
-                             std::span<const int> waiting, int dim) {
-  return Orderer(BodyGraph(num_bodies, joints, waiting), dim).Run();
+                             std::span<const int> waiting, int dim, int start) {
+  return Orderer(BodyGraph(num_bodies, joints, waiting), dim).Run(start);
 }
 
 }  // namespace loopbench::odca

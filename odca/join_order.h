@@ -35,8 +35,9 @@ struct Join {
 double JoinCost(double rows, double handles, double kept, double dim);
 
 /// The joins of all bodies, children first. `waiting`: joints to Ground that no join closes, by
-/// body. Every join has at least one joint between its sides; separate parts stay separate.
+/// body. Every join has at least one joint between its sides; separate parts stay separate. With a
+/// body `start` all parts are fronts, that of this body from there.
 std::vector<Join> OrderJoins(int num_bodies, std::span<const PlanJoint> joints,
-                             std::span<const int> waiting, int dim);
+                             std::span<const int> waiting, int dim, int start = 0);
 
 }  // namespace loopbench::odca

@@ -46,17 +46,24 @@
 
 namespace loopbench::odca {
 
-/// Calls `call` with the rows of a node, as a constant for one pin in the plane or one revolute
-/// joint in space.
+/// Calls `call` with the rows of a node, as a constant for one joint that leaves one direction
+/// free, or three in space.
 template <class Space, class Call>
 [[gnu::always_inline]] inline auto WithRows(const PlanNode& node, const Call& call) {
-  return node.joints.size() == 1 ? WithSize<Space::kDim - 1>(node.rows, call) : call(node.rows);
+  return node.joints.size() == 1 ? WithSize<Space::kDim - 1, 3>(node.rows, call) : call(node.rows);
 }
 /// Returns the rows of a joint of a node, given the rows of the node.
 template <class Rows>
 int RowsOf(const NodeJoint& joint, Rows) {
   constexpr int kRows = kKnownSize<Rows>;
   return kRows > 0 ? kRows : joint.rows;
+}
+
+/// Calls `call` with the numbers of a handle, as a constant for a body and for joints that leave
+/// few directions free.
+template <class Space, class Call>
+[[gnu::always_inline]] inline auto WithWidth(const Handle& handle, const Call& call) {
+  return WithSize<Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
 }
 
 template <class Space, class S>
@@ -68,24 +75,28 @@ class Joins {
   /// Assembles from the leaves up, at the current positions.
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
 
-  /// Returns the number of handles of a node that stay on the boundary; a leaf has one. The sweep
-  /// keeps lists with an entry per such handle and per row of all nodes; `places_` has the index of
-  /// a node's first entries.
-  int kept(int n) const { return places_[n].kept; }
-  int first_handle(int n) const { return places_[n].handle; }
-  int first_row(int n) const { return places_[n].row; }
-  int num_handles() const { return num_handles_; }
-  int num_rows() const { return num_rows_; }
-
-  const Block<Space, S>& LeafZ(int n) const { return Z_[places_[n].z]; }
+  /// Acceleration of leaf n by a wrench.
+  Acceleration<Space, S> Response(int n, const Wrench<Space, S>& F) const;
+  /// Acceleration of a leaf that is held, from the wrench on its body and c0 of its hold.
+  Acceleration<Space, S> Held(int n, const Wrench<Space, S>& F,
+                              const Components<Space, S>& c0) const;
+  /// phi of the hold of a leaf, from its acceleration and the other wrenches on it.
+  Components<Space, S> HoldingForce(int n, const Acceleration<Space, S>& A,
+                                    const Wrench<Space, S>& F) const;
   /// Rows c of a joint, at the centres of mass: the wrenches on P and Q that unit forces along D
   /// make.
-  const Wrench<Space, S>* c_P(const NodeJoint& joint) const { return &c_[c_offset_[joint.index]]; }
-  const Wrench<Space, S>* c_Q(const NodeJoint& joint) const { return c_P(joint) + joint.rows; }
-  /// V of an inner node on one of its kept handles (index into node.handles): its rows, one after
-  /// the other, each a motion.
-  const Acceleration<Space, S>* V(const PlanNode& node, int n, int handle) const {
-    return &Y_[places_[n].y + handle * node.rows];
+  const Wrench<Space, S>* c(int joint, bool at_Q, int rows) const {
+    return &c_[c_offset_[joint] + (at_Q ? rows : 0)];
+  }
+  const Wrench<Space, S>* c_P(const NodeJoint& joint) const {
+    return c(joint.index, false, joint.rows);
+  }
+  const Wrench<Space, S>* c_Q(const NodeJoint& joint) const {
+    return c(joint.index, true, joint.rows);
+  }
+  /// V of an inner node on one of its kept handles: row after row.
+  const S* V(const PlanNode& node, int n, const Handle& handle) const {
+    return &Y_[places_[n].y + handle.number * node.rows];
   }
   /// v := T v for the rows of an inner node, and v := T^T v.
   template <class Rows>
@@ -118,24 +129,33 @@ class Joins {
   int largest_matrix() const { return largest_matrix_; }
 
  private:
-  /// Storage of a node's numbers. Leaves have one handle and no rows.
+  /// Storage of a node's numbers.
   struct Place {
-    int z = 0;       ///< first block of Z (kept x kept, by columns)
-    int y = 0;       ///< first motion of Y: rows per handle before the join
-    int x = 0;       ///< first number of X
-    int handle = 0;  ///< first of the kept handles
-    int kept = 1;
-    int row = 0;
+    int z = 0;      ///< first number of Z, `size` x `size`, both triangles
+    int size = 0;   ///< of the boundary
+    int y = 0;      ///< first number of Y: of each handle before the join, row after row
+    int x = 0;      ///< first number of X
     int loop = -1;  ///< index of the loop solver
+    int hold = 0;   ///< of a held leaf, first of its free directions
     int bodies = 1;
+  };
+  /// Inertia in ground axes; the rotational one of held bodies alone.
+  struct Body {
+    typename Inertia<Space, S>::Matrix rotational, rotational_inverse;
+    S mass = S(0), per_mass = S(0);
+  };
+  /// A free direction of a held body, with T; and M times it.
+  struct FreeDirection {
+    Acceleration<Space, S> g;
+    Wrench<Space, S> Mg;
   };
   enum class Pass { kPhysical, kGeometric, kRegularized };
 
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
-  void FillLeaf(const Kinematics<Space, S>& kinematics, const Inertia<Space, S>& inertia, int n);
-  template <class Rows>
-  void FillJoints(const Kinematics<Space, S>& kinematics, Masses masses, const PlanNode& node,
-                  Rows rows);
+  void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n);
+  void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n);
+  void FillRows(const Kinematics<Space, S>& kinematics, Masses masses, const PlanSide& side);
+  std::span<const FreeDirection> FreeDirections(int n) const;
   template <class Rows>
   void FormResponse(const PlanNode& node, const Place& place, Rows rows);
   template <class Rows>
@@ -152,15 +172,18 @@ class Joins {
   const Plan& plan_;
   SolverKind solver_;
   std::vector<Place> places_;
-  std::vector<Block<Space, S>> Z_;
-  std::vector<Acceleration<Space, S>> Y_;  ///< Y of each node; on handles that stay then V = T Y
-  std::vector<Wrench<Space, S>> c_;        ///< rows c_P, then c_Q of each joint
-  std::vector<int> c_offset_;              ///< of each mechanism joint in c_
+  std::vector<Body> bodies_;  ///< by leaf
+  std::vector<FreeDirection> free_;
+  std::vector<S> Z_;
+  std::vector<S> Y_;                        ///< Y of each node; on handles that stay then V = T Y
+  std::vector<Wrench<Space, S>> c_;         ///< rows c_P, then c_Q of each joint
+  std::vector<Acceleration<Space, S>> Mc_;  ///< responses to c; of a hold, duals of its c
+  std::vector<int> c_offset_;               ///< of each mechanism joint in c_
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;
   MatrixX<S> columns_;
   std::vector<int> lone_leaves_;  ///< bodies that no joint touches
-  int num_handles_ = 0, num_rows_ = 0, largest_matrix_ = 0;
+  int largest_matrix_ = 0;
   bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;
   S rcond_ = S(1), smallest_weight_ = S(1);

@@ -10,21 +10,16 @@
 
 namespace loopbench::odca {
 
-namespace {
-
-PlanOptions DefaultPlan(SolverKind solver) {
-  return {.grounding = solver == SolverKind::kAsPublished ? Grounding::kAtRoot : Grounding::kEager};
-}
-
-}  // namespace
-
 template <class Space, class S>
 std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>& mechanism) {
   std::vector<PlanJoint> joints;
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     const int rows = joint.num_constraints();
-    if (rows > 0) joints.push_back({j, joint.from, joint.to, rows});
+    // the exact directions of a joint that is cut are orthogonal up to its violation; prescribed
+    // motions that contradict a loop are judged in its equations
+    const bool may_hold = joint.num_drives == 0 && (joint.in_tree() || !mechanism.is_redundant());
+    if (rows > 0) joints.push_back({j, joint.from, joint.to, rows, may_hold});
   }
   return joints;
 }
@@ -38,7 +33,7 @@ Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options) 
 
 template <class Space, class S>
 Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options)
-    : Odca(mechanism, options, DefaultPlan(options.solver)) {}
+    : Odca(mechanism, options, PlanOptionsOf(options.solver)) {}
 
 template <class Space, class S>
 Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options,
@@ -61,7 +56,7 @@ void Odca<Space, S>::MakeShortCut([[maybe_unused]] const FormulationOptions& opt
     if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
     short_cut_ = std::move(path);
   } else {
-    short_cut_ = pins::AssemblySweep::Make(mechanism_, plan_);
+    short_cut_ = pins::AssemblySweep::Make(mechanism_, MakePlan(mechanism_));
   }
 }
 
@@ -83,7 +78,7 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
 
 template <class Space, class S>
 void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
-  sweep_.Solve(equations_.b(), equations_.c0(), equations_.A());
+  sweep_.Solve(equations_.b(), equations_.wrenches(), equations_.c0(), equations_.A());
   equations_.Read(*kinematics_, x);
   if (lambda != nullptr) equations_.Read(sweep_.multipliers(), *lambda);
 }

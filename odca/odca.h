@@ -26,8 +26,7 @@ class PathLane;
 template <class Space, class S>
 class Odca final : public ConstraintSolver<Space, S> {
  public:
-  /// `mechanism` must outlive the solver. As published, joints to Ground close at the root (the
-  /// paper's section 3.1); else as early as possible. `plan` overrides that choice.
+  /// `mechanism` must outlive the solver. `plan` overrides PlanOptionsOf().
   Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
   Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options,
        const PlanOptions& plan);

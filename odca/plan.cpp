@@ -7,15 +7,22 @@
 
 namespace loopbench::odca {
 
-namespace {
+/// A body of a boundary, before and after a join.
+struct BoundaryBody {
+  int body = 0;
+  int child = 0;
+  int rows = 0;       ///< of its open joints
+  int open_rows = 0;  ///< of those that stay open
+};
 
-/// A PlanNode that owns its lists.
+/// A PlanNode whose boundary is bodies.
 struct Draft {
   PlanNode node;
-  std::vector<Handle> handles;
-  std::vector<int> kept;
-  std::vector<NodeJoint> joints;
+  std::vector<BoundaryBody> bodies;
+  std::vector<int> joints;  ///< positions in the list of joints
 };
+
+namespace {
 
 /// An assembly while the nodes are written.
 struct Assembly {
@@ -31,7 +38,7 @@ class Planner {
   Planner(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options)
       : joints_(joints),
         options_(options),
-        open_joints_(num_bodies, 0),
+        open_rows_(num_bodies, 0),
         closed_(joints.size(), false) {
     assemblies_.resize(num_bodies);
     assembly_of_.resize(num_bodies);
@@ -42,8 +49,8 @@ class Planner {
     }
     for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
       const int from = joints[j].from, to = joints[j].to;
-      ++open_joints_[from];
-      ++open_joints_[to];
+      open_rows_[from] += joints[j].rows;
+      open_rows_[to] += joints[j].rows;
       if (from == 0 || to == 0) {
         assemblies_[std::max(from, to)].ground_joints.push_back(j);
       } else {
@@ -53,12 +60,12 @@ class Planner {
     }
   }
 
-  std::vector<Draft> Run() {
+  std::vector<Draft> Run(int start) {
     const int num_bodies = static_cast<int>(assemblies_.size());
     const std::vector<int> waiting = GroundLeaves();
     std::vector<int> number(num_bodies);  // assembly by its number in the joins
     std::iota(number.begin(), number.end(), 0);
-    for (const Join& join : OrderJoins(num_bodies, joints_, waiting, options_.dim)) {
+    for (const Join& join : OrderJoins(num_bodies, joints_, waiting, options_.dim, start)) {
       number.push_back(Merge(number[join.left], number[join.right]));
     }
     for (Assembly& assembly : assemblies_) {
@@ -156,21 +163,16 @@ class Planner {
     node.children[0] = a.node;
     node.children[1] = b != nullptr ? b->node : -1;
     for (int child = 0; child < (b != nullptr ? 2 : 1); ++child) {
-      const std::vector<int>& boundary = child == 0 ? a.boundary : b->boundary;
-      for (int place = 0; place < static_cast<int>(boundary.size()); ++place) {
-        draft.handles.push_back({boundary[place], child, place, false});
+      for (int body : child == 0 ? a.boundary : b->boundary) {
+        draft.bodies.push_back({body, child, open_rows_[body], 0});
       }
     }
-    const auto place_of = [&](int body) {
-      const auto it = std::ranges::find(draft.handles, body, &Handle::body);
-      return it == draft.handles.end() ? -1 : static_cast<int>(it - draft.handles.begin());
-    };
     bool touches_ground = false;
     for (int j : list) {
       const PlanJoint& joint = joints_[j];
-      --open_joints_[joint.from];
-      --open_joints_[joint.to];
-      draft.joints.push_back({joint.index, joint.rows, place_of(joint.from), place_of(joint.to)});
+      open_rows_[joint.from] -= joint.rows;
+      open_rows_[joint.to] -= joint.rows;
+      draft.joints.push_back(j);
       node.rows += joint.rows;
       touches_ground |= joint.from == 0 || joint.to == 0;
     }
@@ -178,12 +180,9 @@ class Planner {
     const bool self_join = b == nullptr && !touches_ground;
     node.closes_loop = list.size() > 1 || self_join || (a.reaches_ground && other_reaches);
     a.boundary.clear();
-    for (int h = 0; h < static_cast<int>(draft.handles.size()); ++h) {
-      Handle& handle = draft.handles[h];
-      handle.kept = open_joints_[handle.body] > 0;
-      if (!handle.kept) continue;
-      draft.kept.push_back(h);
-      a.boundary.push_back(handle.body);
+    for (BoundaryBody& body : draft.bodies) {
+      body.open_rows = open_rows_[body.body];
+      if (body.open_rows > 0) a.boundary.push_back(body.body);
     }
     a.reaches_ground |= other_reaches;
     if (b != nullptr) {
@@ -231,37 +230,260 @@ class Planner {
 
   std::span<const PlanJoint> joints_;
   PlanOptions options_;
-  std::vector<int> open_joints_;      ///< joints still to come, by body
+  std::vector<int> open_rows_;        ///< rows of joints still to come, by body
   std::vector<bool> closed_;          ///< joints between assemblies
   std::vector<int> assembly_of_;      ///< forest of merged places, see Find()
   std::vector<Assembly> assemblies_;  ///< by place: at first the body's own
   std::vector<Draft> drafts_;
 };
 
+/// Multiply-adds of a join of `rows` rows that keeps so many numbers, without those of JointWork().
+long JoinWork(long rows, long kept) {
+  long sum = rows * rows * rows / 6 + rows;   // factor of X
+  sum += rows * (rows + 1) / 2 * kept;        // V
+  sum += rows * (kept * (kept + 1) / 2);      // V^T V
+  return sum + 2 * rows * (kept + rows / 2);  // vectors, up and down
+}
+
+/// Multiply-adds of a joint of a join on one of its bodies, whose child has so many numbers (0 for
+/// a leaf): Y and X, and the vectors. `above`: rows of the join before this joint's.
+long JointWork(long rows, long above, bool is_body, long numbers, long dim) {
+  const long force = rows * dim;
+  if (!is_body) return force;
+  return 2 * force + rows * dim * numbers + dim * (rows * above + rows * (rows + 1) / 2);
+}
+
+/// Multiply-adds of a body alone with so many rows of joints, and `held` rows of its hold or 0:
+/// M^-1 C^T and C M^-1 C^T, and the vectors.
+long LeafWork(long rows, long held, bool is_body, long dim) {
+  const long apply = dim * dim / 3;  // M^-1 is diagonal but for three rotations
+  const long triangle = rows * (rows + 1) / 2, project = is_body ? 0 : rows * dim;
+  if (held == 0) return (rows + 1) * apply + (is_body ? 0 : dim * triangle) + project;
+  const long free = dim - held;
+  long sum = free * apply + free * free * free / 6 + free;                     // H^T M H
+  sum += 3 * dim * (free * (free + 1) / 2);                                    // and with T
+  sum += rows * free * dim + (is_body ? rows * free * dim : free * triangle);  // Z
+  return sum + 2 * dim * (held + 2 * free) + apply + project;                  // vectors
+}
+
+/// Takes nodes that only hold a body to Ground from the list; the joint of each body, or -1.
+std::vector<int> HoldLeaves(int num_bodies, std::span<const PlanJoint> joints, int dim,
+                            std::vector<Draft>& drafts) {
+  const int leaves = num_bodies - 1;
+  std::vector<int> holds(num_bodies, -1), number(leaves + drafts.size());
+  std::iota(number.begin(), number.end(), 0);
+  std::vector<Draft> rest;
+  for (int n = 0; n < static_cast<int>(drafts.size()); ++n) {
+    Draft& draft = drafts[n];
+    for (int& child : draft.node.children) child = child < 0 ? child : number[child];
+    const int body = draft.node.children[0] + 1;
+    const PlanJoint& joint = joints[draft.joints.front()];
+    const bool on_ground = joint.from == 0 || joint.to == 0;
+    if (body < num_bodies && holds[body] < 0 && on_ground && !draft.node.closes_loop &&
+        joint.may_hold && 2 * joint.rows > dim) {
+      holds[body] = draft.joints.front();
+      number[leaves + n] = body - 1;
+    } else {
+      number[leaves + n] = leaves + static_cast<int>(rest.size());
+      rest.push_back(std::move(draft));
+    }
+  }
+  drafts = std::move(rest);
+  return holds;
+}
+
+/// Chooses for each body between its directions and the rows of its joints: whichever costs less
+/// over all joins with this body, given the choice of the others.
+std::vector<bool> CheapestBases(int num_bodies, std::span<const PlanJoint> joints,
+                                std::span<const int> holds, std::span<const Draft> drafts,
+                                int dim) {
+  std::vector<long> rows(num_bodies, 0), held(num_bodies, 0);
+  for (const PlanJoint& joint : joints) {
+    for (int body : {joint.from, joint.to}) rows[body] += joint.rows;
+  }
+  std::vector<bool> is_body(num_bodies);
+  for (int body = 1; body < num_bodies; ++body) {
+    held[body] = holds[body] < 0 ? 0 : joints[holds[body]].rows;
+    rows[body] -= held[body];
+    is_body[body] = rows[body] > 2 * dim;
+  }
+  std::vector<std::vector<int>> joins(num_bodies);
+  for (int n = 0; n < static_cast<int>(drafts.size()); ++n) {
+    for (const BoundaryBody& body : drafts[n].bodies) joins[body.body].push_back(n);
+  }
+  const int leaves = num_bodies - 1;
+  const auto work = [&](const Draft& draft) {
+    const auto width = [&](int body, long open) { return open > 0 && is_body[body] ? dim : open; };
+    long numbers[2] = {0, 0}, kept = 0, above = 0;
+    for (const BoundaryBody& body : draft.bodies) {
+      numbers[body.child] += width(body.body, body.rows);
+      kept += width(body.body, body.open_rows);
+    }
+    long sum = JoinWork(draft.node.rows, kept);
+    for (int j : draft.joints) {
+      for (int body : {joints[j].from, joints[j].to}) {
+        if (body == 0) continue;
+        const int child = std::ranges::find(draft.bodies, body, &BoundaryBody::body)->child;
+        const bool is_leaf = draft.node.children[child] < leaves;
+        sum += JointWork(joints[j].rows, above, is_body[body], is_leaf ? 0 : numbers[child], dim);
+      }
+      above += joints[j].rows;
+    }
+    return sum;
+  };
+  for (int body = 1; body < num_bodies; ++body) {
+    long sums[2];
+    for (int choice : {0, 1}) {
+      is_body[body] = choice == 1;
+      sums[choice] = LeafWork(rows[body], held[body], is_body[body], dim);
+      for (int n : joins[body]) sums[choice] += work(drafts[n]);
+    }
+    is_body[body] = sums[1] < sums[0];
+  }
+  return is_body;
+}
+
+/// Up to so many bodies all fronts are tried: a chain of them is not cut in two, and is deep.
+constexpr int kFewBodies = 16;
+
 }  // namespace
 
+PlanOptions PlanOptionsOf(SolverKind solver) {
+  if (solver == SolverKind::kAsPublished) return {.grounding = Grounding::kAtRoot};
+  return {.grounding = Grounding::kEager, .basis = BoundaryBasis::kCheapest};
+}
+
 Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options)
-    : num_leaves_(num_bodies - 1) {
-  const std::vector<Draft> drafts = Planner(num_bodies, joints, options).Run();
-  std::size_t handles = 0, kept = 0, closed = 0;
-  for (const Draft& draft : drafts) {
-    handles += draft.handles.size();
-    kept += draft.kept.size();
-    closed += draft.joints.size();
+    : Plan(num_bodies, joints, options, 0) {
+  if (options.basis != BoundaryBasis::kCheapest || num_leaves_ > kFewBodies) return;
+  for (int start = 1; start < num_bodies; ++start) {
+    Plan other(num_bodies, joints, options, start);
+    if (other.operations(options.dim) < operations(options.dim)) *this = std::move(other);
   }
-  // spans stay valid: the lists never exceed their reserved size
-  handles_.reserve(handles);
-  kept_.reserve(kept);
-  joints_.reserve(closed);
-  const auto append = [](auto& all, const auto& list) {
-    const auto first = all.insert(all.end(), list.begin(), list.end());
-    return std::span(first, all.end());
+}
+
+Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start)
+    : num_leaves_(num_bodies - 1) {
+  std::vector<Draft> drafts = Planner(num_bodies, joints, options).Run(start);
+  std::vector<int> holds(num_bodies, -1);
+  std::vector<bool> is_body(num_bodies, true);
+  if (options.basis == BoundaryBasis::kCheapest) {
+    holds = HoldLeaves(num_bodies, joints, options.dim, drafts);
+    is_body = CheapestBases(num_bodies, joints, holds, drafts, options.dim);
+  }
+  AddLeaves(joints, holds, is_body, options.dim);
+  AddNodes(joints, drafts);
+}
+
+void Plan::AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
+                     const std::vector<bool>& is_body, int dim) {
+  const auto each_side = [&](auto&& take) {
+    for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
+      take(joints[j].from, PlanSide{j, joints[j].rows, false});
+      take(joints[j].to, PlanSide{j, joints[j].rows, true});
+    }
   };
+  std::vector<int> first(num_leaves_ + 2, 0);
+  each_side([&](int body, const PlanSide& side) { first[body + 1] += holds[body] != side.joint; });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  sides_.resize(static_cast<std::size_t>(first.back()));
+  std::vector<int> next = first;
+  leaves_.resize(static_cast<std::size_t>(num_leaves_));
+  each_side([&](int body, const PlanSide& side) {
+    if (holds[body] != side.joint) {
+      sides_[next[body]++] = side;
+    } else {
+      leaves_[body - 1].hold = {joints[side.joint].index, side.rows, side.at_Q};
+    }
+  });
+  for (int n = 0; n < num_leaves_; ++n) {
+    Leaf& leaf = leaves_[n];
+    leaf.sides = std::span(sides_).subspan(first[n + 1], first[n + 2] - first[n + 1]);
+    leaf.is_body = is_body[n + 1];
+    leaf.slot = num_slots_;
+    if (leaf.is_body) leaf.width = dim;
+    if (!leaf.is_body) {
+      for (const PlanSide& side : leaf.sides) leaf.width += side.rows;
+    }
+    num_slots_ += leaf.width;
+  }
+}
+
+/// Writes the lists of all nodes, with the handles of bodies or of their open joints.
+void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts) {
+  std::vector<std::vector<Handle>> boundary(leaves_.size() + drafts.size());
+  for (int n = 0; n < num_leaves_; ++n) {
+    const Leaf& leaf = leaves_[n];
+    Handle handle{.body = n + 1, .width = leaf.width, .slot = leaf.slot};
+    if (leaf.is_body) boundary[n].push_back(handle);
+    for (const PlanSide& side : leaf.is_body ? std::span<const PlanSide>() : leaf.sides) {
+      handle.joint = side.joint;
+      handle.width = side.rows;
+      boundary[n].push_back(handle);
+      handle.slot += side.rows;
+    }
+  }
+  std::vector<int> row_of(joints.size(), 0);
+  std::vector<std::size_t> first_handle, first_kept, first_joint;
   for (const Draft& draft : drafts) {
     PlanNode& node = nodes_.emplace_back(draft.node);
-    node.handles = append(handles_, draft.handles);
-    node.kept = append(kept_, draft.kept);
-    node.joints = append(joints_, draft.joints);
+    first_handle.push_back(handles_.size());
+    first_kept.push_back(kept_.size());
+    first_joint.push_back(joints_.size());
+    const std::size_t first = handles_.size();
+    for (int child = 0; child < 2; ++child) {
+      if (node.children[child] < 0) continue;
+      int place = 0;
+      for (Handle handle : boundary[node.children[child]]) {
+        handle.child = child;
+        handle.place = place;
+        handle.number = node.numbers;
+        place += handle.width;
+        node.numbers += handle.width;
+        handles_.push_back(handle);
+      }
+      boundary[node.children[child]] = {};
+    }
+    const std::span handles = std::span(handles_).subspan(first);
+    for (int j : draft.joints) {
+      row_of[j] = num_rows_;
+      const auto handle_at = [&](int body) {
+        const auto at = std::ranges::find_if(handles, [&](const Handle& handle) {
+          return handle.body == body && (handle.is_body() || handle.joint == j);
+        });
+        return body == 0 ? -1 : static_cast<int>(at - handles.begin());
+      };
+      joints_.push_back({joints[j].index, joints[j].rows, handle_at(joints[j].from),
+                         handle_at(joints[j].to), num_rows_});
+      num_rows_ += joints[j].rows;
+    }
+    const auto stays = [&](const Handle& handle) {
+      return handle.is_body()
+                 ? std::ranges::find(draft.bodies, handle.body, &BoundaryBody::body)->open_rows > 0
+                 : std::ranges::find(draft.joints, handle.joint) == draft.joints.end();
+    };
+    for (int h = 0; h < static_cast<int>(handles.size()); ++h) {
+      handles[h].kept = stays(handles[h]);
+      if (!handles[h].kept) continue;
+      kept_.push_back(h);
+      node.kept_numbers += handles[h].width;
+      boundary[num_leaves_ + nodes_.size() - 1].push_back(handles[h]);
+    }
+  }
+  for (Handle& handle : handles_) {
+    const int j = handle.joint;
+    handle.force = handle.is_body() ? num_rows_ + handle.width * (handle.body - 1) : row_of[j];
+    if (!handle.is_body()) handle.joint = joints[j].index;
+  }
+  for (PlanSide& side : sides_) side.joint = joints[side.joint].index;
+  const auto cut = [](auto& all, const std::vector<std::size_t>& firsts, std::size_t n) {
+    const std::size_t end = n + 1 < firsts.size() ? firsts[n + 1] : all.size();
+    return std::span(all).subspan(firsts[n], end - firsts[n]);
+  };
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    nodes_[n].handles = cut(handles_, first_handle, n);
+    nodes_[n].kept = cut(kept_, first_kept, n);
+    nodes_[n].joints = cut(joints_, first_joint, n);
   }
 }
 
@@ -294,23 +516,31 @@ int Plan::loop_joins() const {
 }
 
 long Plan::operations(int dim) const {
-  const long d = dim;
-  long sum = num_leaves_ * d * d;
+  const auto width = [dim](const Handle& handle) { return handle.is_body() ? dim : handle.width; };
+  long sum = 0;
+  for (const Leaf& leaf : leaves_) {
+    long rows = 0;
+    for (const PlanSide& side : leaf.sides) rows += side.rows;
+    const int held = leaf.hold.joint < 0 ? 0 : leaf.hold.rows;
+    sum += LeafWork(rows, held, leaf.is_body, dim);
+  }
   for (const PlanNode& node : nodes_) {
-    const long rows = node.rows, kept = static_cast<long>(node.kept.size());
-    // Z C^T: each end of a joint meets the handles of its child
+    long numbers[2] = {0, 0}, kept = 0, above = 0;
+    for (const Handle& handle : node.handles) {
+      numbers[handle.child] += width(handle);
+      if (handle.kept) kept += width(handle);
+    }
+    sum += JoinWork(node.rows, kept);
     for (const NodeJoint& joint : node.joints) {
       for (int end : {joint.from, joint.to}) {
         if (end < 0) continue;
-        const auto met = std::ranges::count(node.handles, node.handles[end].child, &Handle::child);
-        sum += joint.rows * d * d * met;
+        const Handle& handle = node.handles[end];
+        const bool is_leaf = node.children[handle.child] < num_leaves_;
+        sum += JointWork(joint.rows, above, handle.is_body(), is_leaf ? 0 : numbers[handle.child],
+                         dim);
       }
+      above += joint.rows;
     }
-    sum += 2 * d * rows * (rows + 1) / 2;             // X
-    sum += rows * rows * rows / 6 + rows;             // its factor
-    sum += d * rows * (rows + 1) / 2 * kept;          // V
-    sum += rows * d * d * kept * (kept + 1) / 2;      // V^T V
-    sum += 2 * rows * (2 * d + d * kept + rows / 2);  // vectors, up and down
   }
   return sum;
 }

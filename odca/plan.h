@@ -4,7 +4,8 @@
 // The assembly tree covers the graph of bodies and joints. Its leaves are the bodies. An inner node
 // joins two assemblies, or one assembly with itself or with Ground, through a list of joints. It
 // keeps as boundary only the bodies of joints not yet closed. Ground is an assembly with zero
-// response and has no handle.
+// response and has no handle. A body of a boundary is one handle, with all its directions, or a
+// handle per open joint, with the rows of this joint (BoundaryBasis).
 //
 // Three rules build the tree; the cheapest result is used (join_order.h). A chain or ladder of n
 // bodies has depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
@@ -21,6 +22,8 @@
 #include <string>
 #include <vector>
 
+#include "mechanism/formulation/options.h"
+
 namespace loopbench::odca {
 
 /// One joint with constraints, for the planner. Body 0 is Ground.
@@ -28,6 +31,9 @@ struct PlanJoint {
   int index = 0;  ///< name of the joint for the caller
   int from = 0, to = 0;
   int rows = 0;  ///< constrained directions
+  /// On Ground: its rows and the directions that it leaves free are orthogonal to each other, so
+  /// that its body may be held (Leaf).
+  bool may_hold = true;
 };
 
 /// When joints to Ground are closed.
@@ -44,24 +50,60 @@ enum class Closing {
   kOneByOne,  ///< the first joins, each further one is a self-join: smallest matrices
 };
 
+/// Numbers by which a body of a boundary is known.
+enum class BoundaryBasis {
+  kBodies,    ///< all directions of the body, as the paper has it
+  kCheapest,  ///< those, or the rows of its open joints: by body, whichever costs less
+};
+
 struct PlanOptions {
   Grounding grounding = Grounding::kEager;
   Closing closing = Closing::kTogether;
-  int dim = 6;  ///< directions of a body: 3 in the plane, 6 in space; weight of join costs
+  BoundaryBasis basis = BoundaryBasis::kBodies;
+  int dim = 6;  ///< directions of a body: 3 in the plane, 6 in space
 };
 
-/// A body of a node's boundary: its child (0 or 1), and its index there.
+/// As published, joints to Ground close at the root (the paper's section 3.1) and boundaries are
+/// bodies; else joints to Ground close as early as possible, and boundaries cost least.
+PlanOptions PlanOptionsOf(SolverKind solver);
+
+/// A part of a node's boundary: a body, or the side of one of its open joints.
 struct Handle {
   int body = 0;
+  int joint = -1;  ///< index of the joint, -1 for the whole body
+  int width = 0;   ///< rows of the joint, or directions of the body
   int child = 0;
-  int place = 0;  ///< index into the child's kept handles
+  int place = 0;   ///< of its first number among those of the child
+  int number = 0;  ///< of its first number among those of both children
+  int slot = 0;    ///< of its first number among those of all leaves
+  int force = 0;   ///< of the force there: of a row, or after all rows of a direction of a body
   bool kept = false;
+
+  bool is_body() const { return joint < 0; }
 };
 
 struct NodeJoint {
   int index = 0;
   int rows = 0;
   int from = -1, to = -1;  ///< index into the node's handles, -1 for Ground
+  int row = 0;             ///< first of its rows among those of all nodes
+};
+
+/// A joint on a body.
+struct PlanSide {
+  int joint = -1;
+  int rows = 0;
+  bool at_Q = false;
+};
+
+/// A body alone: its handles are itself, or all of its sides. A body that a joint with few free
+/// directions holds to Ground is a leaf with this joint, which is in no node.
+struct Leaf {
+  std::span<const PlanSide> sides;
+  PlanSide hold;  ///< that joint; -1 if there is none
+  bool is_body = true;
+  int width = 0;
+  int slot = 0;
 };
 
 /// A join. Nodes 0 .. bodies-2 of a plan are leaves (body i+1 is node i) and have no PlanNode.
@@ -70,14 +112,18 @@ struct PlanNode {
   int rows = 0;                ///< size of X
   /// X may lose rank: both sides reach Ground, several joints, self-join.
   bool closes_loop = false;
+  int numbers = 0;                    ///< of the children's boundaries
+  int kept_numbers = 0;               ///< of the boundary afterwards
   std::span<const Handle> handles;    ///< boundary of the children before the join, child 0 first
   std::span<const int> kept;          ///< indices into handles: the boundary afterwards, in order
   std::span<const NodeJoint> joints;  ///< closed here
 };
 
+struct Draft;
+
 class Plan {
  public:
-  /// `num_bodies` counts Ground.
+  /// `num_bodies` counts Ground. Small plans are the cheapest of several by operations().
   Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options = {});
   Plan(Plan&&) = default;
   Plan& operator=(Plan&&) = default;
@@ -86,22 +132,34 @@ class Plan {
   int num_nodes() const { return num_leaves_ + static_cast<int>(nodes_.size()); }
   /// Inner nodes in order of execution; node number = num_leaves() + position.
   const std::vector<PlanNode>& nodes() const { return nodes_; }
+  const std::vector<Leaf>& leaves() const { return leaves_; }
+  int num_rows() const { return num_rows_; }    ///< of all nodes
+  int num_slots() const { return num_slots_; }  ///< numbers of all leaves' handles
 
   int depth() const;         ///< longest path from a leaf to a root, in joins
   int largest_join() const;  ///< rows of the largest X
-  int most_handles() const;  ///< largest number of bodies of any node before its join
+  int most_handles() const;  ///< largest number of handles of any node before its join
   int loop_joins() const;    ///< nodes that close loops
   /// Multiply-adds of one assembly and one vector pass with `dim` directions per body, as
   /// Sweep::operations() counts them without regularized directions.
   long operations(int dim) const;
 
  private:
+  /// With one order of joins: that of the rules, or from body after body.
+  Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start);
+  void AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
+                 const std::vector<bool>& is_body, int dim);
+  void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts);
+
   int num_leaves_;
+  int num_rows_ = 0, num_slots_ = 0;
   std::vector<PlanNode> nodes_;
+  std::vector<Leaf> leaves_;
   // the lists of all nodes, end to end in order of execution: a sweep streams them
   std::vector<Handle> handles_;
   std::vector<int> kept_;
   std::vector<NodeJoint> joints_;
+  std::vector<PlanSide> sides_;
 };
 
 }  // namespace loopbench::odca

@@ -1,5 +1,7 @@
 #include "odca/sweep.h"
 
+#include <algorithm>
+
 #include "mechanism/algebra/instantiate.h"
 
 namespace loopbench::odca {
@@ -8,12 +10,12 @@ template <class Space, class S>
 Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
     : plan_(plan),
       joins_(mechanism, plan, solver),
-      b_(joins_.num_handles(), Acceleration<Space, S>::Zero()),
-      F_(joins_.num_handles(), Wrench<Space, S>::Zero()),
+      b_(plan.num_slots(), S(0)),
+      F_(plan.num_rows() + Space::kDim * plan.num_leaves(), S(0)),
+      start_(plan.num_leaves(), Acceleration<Space, S>::Zero()),
       phi_(mechanism.joints().size(), Components<Space, S>::Zero()),
       residual_(phi_),
-      s_(joins_.num_rows(), S(0)),
-      forces_(plan.largest_join(), S(0)) {}
+      s_(plan.num_rows(), S(0)) {}
 
 template <class Space, class S>
 Outcome Sweep<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
@@ -23,42 +25,67 @@ Outcome Sweep<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
 
 template <class Space, class S>
 void Sweep<Space, S>::Solve(std::span<const Acceleration<Space, S>> b,
+                            std::span<const Wrench<Space, S>> wrenches,
                             std::span<const Components<Space, S>> c0,
                             std::span<Acceleration<Space, S>> A) {
-  for (int n = 0; n < plan_.num_leaves(); ++n) {
-    A[n + 1].setZero();
-    b_[joins_.first_handle(n)] = b[n + 1];
-  }
-  A[kGround].setZero();  // the inertial frame of (33-34)
+  for (Acceleration<Space, S>& acceleration : A) acceleration.setZero();  // Ground's too (33-34)
   for (Components<Space, S>& phi : phi_) phi.setZero();
-  Correct(c0, A);
+  Correct(b, wrenches, c0, A);
   if (!joins_.regularized()) return;
   Residual(c0, A);
-  for (int n = 0; n < plan_.num_leaves(); ++n) b_[joins_.first_handle(n)].setZero();
-  Correct(residual_, A);
+  Correct({}, {}, residual_, A);
 }
 
 /// At the leaves A = Z F + b (1-4, 45-46) with all forces known, including the joints' own.
 template <class Space, class S>
-void Sweep<Space, S>::Correct(std::span<const Components<Space, S>> c0,
+void Sweep<Space, S>::Correct(std::span<const Acceleration<Space, S>> b,
+                              std::span<const Wrench<Space, S>> wrenches,
+                              std::span<const Components<Space, S>> c0,
                               std::span<Acceleration<Space, S>> A) {
   const int leaves = plan_.num_leaves();
+  std::ranges::fill(F_, S(0));
+  const auto wrench = [&](int n) { return b.empty() ? Wrench<Space, S>::Zero() : wrenches[n + 1]; };
+  for (int n = 0; n < leaves; ++n) {
+    const Leaf& leaf = plan_.leaves()[n];
+    if (leaf.hold.joint >= 0) {
+      start_[n] = joins_.Held(n, wrench(n), c0[leaf.hold.joint]);
+      operations_ += Space::kDim * (2 * Space::kDim - leaf.hold.rows);
+    } else {
+      start_[n] = b.empty() ? Acceleration<Space, S>::Zero() : b[n + 1];
+    }
+    S* slot = &b_[leaf.slot];
+    if (leaf.is_body) {
+      LOOPBENCH_UNROLL
+      for (int d = 0; d < Space::kDim; ++d) slot[d] = start_[n][d];
+      continue;
+    }
+    for (const PlanSide& side : leaf.sides) {
+      const Wrench<Space, S>* c = joins_.c(side.joint, side.at_Q, side.rows);
+      for (int i = 0; i < side.rows; ++i) *slot++ = c[i].dot(start_[n]);
+      operations_ += Space::kDim * side.rows;
+    }
+  }
   for (int n = leaves; n < plan_.num_nodes(); ++n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
     WithRows<Space>(node, [&](auto rows) { Up(node, n, rows, c0); });
   }
-  // a root's boundary is empty; a body without joints is a root whose one handle feels no force
-  for (int n = 0; n < leaves; ++n) F_[joins_.first_handle(n)].setZero();
   for (int n = plan_.num_nodes() - 1; n >= leaves; --n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
     WithRows<Space>(node, [&](auto rows) { Down(node, n, rows); });
   }
   for (int n = 0; n < leaves; ++n) {
-    const int handle = joins_.first_handle(n);
-    A[n + 1] += b_[handle];
-    A[n + 1] += Apply<Acceleration<Space, S>>(joins_.LeafZ(n), F_[handle]);
+    const PlanSide& hold = plan_.leaves()[n].hold;
+    Wrench<Space, S> F;
+    LOOPBENCH_UNROLL
+    for (int d = 0; d < Space::kDim; ++d) F[d] = F_[plan_.num_rows() + Space::kDim * n + d];
+    const Acceleration<Space, S> all = start_[n] + joins_.Response(n, F);
+    A[n + 1] += all;
+    operations_ += Space::kDim * Space::kDim / 3;
+    if (hold.joint < 0) continue;
+    const Components<Space, S> phi = joins_.HoldingForce(n, all, F + wrench(n));
+    for (int i = 0; i < hold.rows; ++i) phi_[hold.joint][i] += phi[i];
+    operations_ += Space::kDim * (2 * Space::kDim - hold.rows);
   }
-  operations_ += static_cast<long>(leaves) * Space::kDim * Space::kDim;
 }
 
 /// r = C A + c0 of every joint: D^T times the difference of the two sides of (7), without udot.
@@ -87,69 +114,88 @@ template <class Space, class S>
 template <class Rows>
 void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows,
                          std::span<const Components<Space, S>> c0) {
-  S* s = &s_[joins_.first_row(n)];
+  S* s = &s_[node.joints.front().row];
   int row = 0;
-  const auto b_of = [&](int f) -> const Acceleration<Space, S>& {
-    const Handle& handle = node.handles[f];
-    return b_[joins_.first_handle(node.children[handle.child]) + handle.place];
-  };
   for (const NodeJoint& joint : node.joints) {
     const int count = RowsOf(joint, rows);
-    for (int i = 0; i < count; ++i, ++row) {
-      s[row] = c0[joint.index][i];  // (15, 42, 68)
-      if (joint.from >= 0) s[row] += joins_.c_P(joint)[i].dot(b_of(joint.from));
-      if (joint.to >= 0) s[row] += joins_.c_Q(joint)[i].dot(b_of(joint.to));
+    for (int i = 0; i < count; ++i) s[row + i] = c0[joint.index][i];  // (15, 42, 68)
+    for (const bool at_Q : {false, true}) {
+      const int h = at_Q ? joint.to : joint.from;
+      if (h < 0) continue;
+      const S* b = &b_[node.handles[h].slot];
+      if (!node.handles[h].is_body()) {
+        for (int i = 0; i < count; ++i) s[row + i] += b[i];
+        continue;
+      }
+      const Wrench<Space, S>* c = joins_.c(joint.index, at_Q, joint.rows);
+      for (int i = 0; i < count; ++i) {
+        S sum = s[row + i];
+        LOOPBENCH_UNROLL
+        for (int d = 0; d < Space::kDim; ++d) sum += c[i][d] * b[d];
+        s[row + i] = sum;
+      }
+      operations_ += Space::kDim * count;
     }
+    row += count;
   }
   joins_.Apply(node, n, rows, s);  // (21)
-  const int kept = joins_.kept(n);
-  for (int e = 0; e < kept; ++e) {
-    Acceleration<Space, S> b = b_of(node.kept[e]);
-    const Acceleration<Space, S>* V = joins_.V(node, n, node.kept[e]);
-    for (int i = 0; i < rows; ++i) b -= V[i] * s[i];  // (29-30, 72)
-    b_[joins_.first_handle(n) + e] = b;
+  for (int e : node.kept) {
+    const Handle& handle = node.handles[e];
+    const S* V = joins_.V(node, n, handle);
+    S* b = &b_[handle.slot];
+    WithWidth<Space>(handle, [&](auto known) {
+      const int width = known;
+      for (int i = 0; i < rows; ++i) {
+        LOOPBENCH_UNROLL
+        for (int a = 0; a < width; ++a) b[a] -= V[i * width + a] * s[i];  // (29-30, 72)
+      }
+    });
   }
-  operations_ += rows * (2 * Space::kDim + Space::kDim * kept + rows / 2);
+  operations_ += rows * (node.kept_numbers + rows / 2);
 }
 
 /// phi = -T^T (s + V F) are the measure numbers of a series join (17), of the base and terminal
-/// joint, the solution of (42), and of a coupled loop (64). The force on a handle of a child is the
-/// external force F^ext of (47-48) plus c phi, the D phi of (13, 18, 39, 59, 65) moved from Mo to
-/// the centre of mass.
+/// joint, the solution of (42), and of a coupled loop (64). The force on a body is the external
+/// force F^ext of (47-48) plus c phi, the D phi of (13, 18, 39, 59, 65) moved from Mo to the centre
+/// of mass.
 template <class Space, class S>
 template <class Rows>
 void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows) {
-  const int kept = joins_.kept(n);
-  const Wrench<Space, S>* F_kept = F_.data() + joins_.first_handle(n);
-  S* phi = forces_.data();
-  for (int i = 0; i < rows; ++i) phi[i] = -s_[joins_.first_row(n) + i];
-  for (int e = 0; e < kept; ++e) {
-    const Acceleration<Space, S>* V = joins_.V(node, n, node.kept[e]);
-    for (int i = 0; i < rows; ++i) phi[i] -= V[i].dot(F_kept[e]);
+  const int first = node.joints.front().row;
+  S* phi = &F_[first];
+  for (int i = 0; i < rows; ++i) phi[i] = -s_[first + i];
+  for (int e : node.kept) {
+    const Handle& handle = node.handles[e];
+    const S* V = joins_.V(node, n, handle);
+    const S* F = &F_[handle.force];
+    WithWidth<Space>(handle, [&](auto known) {
+      const int width = known;
+      for (int i = 0; i < rows; ++i) {
+        S sum = phi[i];
+        LOOPBENCH_UNROLL
+        for (int a = 0; a < width; ++a) sum -= V[i * width + a] * F[a];
+        phi[i] = sum;
+      }
+    });
   }
   joins_.ApplyTransposed(node, n, rows, phi);  // (17, 42, 64)
-  const auto force_on = [&](int f) -> Wrench<Space, S>& {
-    const Handle& handle = node.handles[f];
-    return F_[joins_.first_handle(node.children[handle.child]) + handle.place];
-  };
-  int next = 0;
-  for (int f = 0; f < static_cast<int>(node.handles.size()); ++f) {
-    if (node.handles[f].kept) {
-      force_on(f) = F_kept[next++];  // F^ext of (47-48)
-    } else {
-      force_on(f).setZero();
-    }
-  }
-  int row = 0;
   for (const NodeJoint& joint : node.joints) {
     const int count = RowsOf(joint, rows);
-    for (int i = 0; i < count; ++i, ++row) {
-      phi_[joint.index][i] += phi[row];
-      if (joint.from >= 0) force_on(joint.from) += joins_.c_P(joint)[i] * phi[row];
-      if (joint.to >= 0) force_on(joint.to) += joins_.c_Q(joint)[i] * phi[row];  // (18, 39, 65)
+    for (int i = 0; i < count; ++i) phi_[joint.index][i] += phi[i];
+    for (const bool at_Q : {false, true}) {
+      const int h = at_Q ? joint.to : joint.from;
+      if (h < 0) continue;
+      const Wrench<Space, S>* c = joins_.c(joint.index, at_Q, joint.rows);
+      auto sum = Wrench<Space, S>::Zero();
+      for (int i = 0; i < count; ++i) sum += c[i] * phi[i];  // (18, 39, 47-48, 65)
+      S* F = &F_[plan_.num_rows() + Space::kDim * (node.handles[h].body - 1)];
+      LOOPBENCH_UNROLL
+      for (int d = 0; d < Space::kDim; ++d) F[d] += sum[d];
+      operations_ += Space::kDim * count;
     }
+    phi += count;
   }
-  operations_ += rows * (2 * Space::kDim + Space::kDim * kept + rows / 2);
+  operations_ += rows * (node.kept_numbers + rows / 2);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Sweep<Space, S>;

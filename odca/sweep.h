@@ -4,12 +4,13 @@
 //   up     s   = T (C b + c0)             from the children's b                (21, 68)
 //          b'  = b - V^T s                to the parent                        (29-30, 72)
 //   down   phi = -T^T (s + V F)           from the forces outside              (17, 42, 64)
-//          F_child = [F; 0] + C^T phi     to the children                      (18, 39, 47-48, 65)
-//   leaf   A   = Z F + b                                                       (1-4, 45-46)
+//          F_body += C^T phi              on the bodies of the joints          (18, 39, 47-48, 65)
+//   leaf   A   = M^-1 F_body + b                                               (1-4, 45-46)
 //
 // Symbols, axes and points of reference are defined in joins.h: a motion or force of a body is at
-// its centre of mass, in ground axes. Accelerations of assemblies are never formed; only forces are
-// handed down. A body's acceleration follows when all forces on it are known.
+// its centre of mass, in ground axes. The outside force on the side of an open joint is this
+// joint's phi, that on a body the sum of its joints closed above: both are known when a node is
+// reached downwards, and no force is handed on. Accelerations of assemblies are never formed.
 //
 // Joins close loops one after another. If constraints are dependent, one join may be much worse
 // conditioned than the simultaneous solution of all constraints, and round-off spoils the result.
@@ -33,10 +34,11 @@ class Sweep {
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
   const Joins<Space, S>& joins() const { return joins_; }
 
-  /// Computes `A` of each body from `b`, the free acceleration of each body (index = body), and
-  /// `c0`, Space::kDim numbers per mechanism joint. Requires Assemble(). Allocates nothing.
-  void Solve(std::span<const Acceleration<Space, S>> b, std::span<const Components<Space, S>> c0,
-             std::span<Acceleration<Space, S>> A);
+  /// Computes `A` of each body from `b`, the free acceleration of each body (index = body), its
+  /// wrench M b, and `c0`, Space::kDim numbers per mechanism joint. Requires Assemble(). Allocates
+  /// nothing.
+  void Solve(std::span<const Acceleration<Space, S>> b, std::span<const Wrench<Space, S>> wrenches,
+             std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
 
   /// Returns phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint
   /// force: components along the columns of D, which may mix moments and forces. Zero if the plan
@@ -52,19 +54,21 @@ class Sweep {
   void Up(const PlanNode& node, int n, Rows rows, std::span<const Components<Space, S>> c0);
   template <class Rows>
   void Down(const PlanNode& node, int n, Rows rows);
-  /// Runs up and down over the values in b_; adds to A and phi_.
-  void Correct(std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
+  /// Runs up and down; adds to A and phi_. Without `b` the bodies' free accelerations are zero.
+  void Correct(std::span<const Acceleration<Space, S>> b,
+               std::span<const Wrench<Space, S>> wrenches, std::span<const Components<Space, S>> c0,
+               std::span<Acceleration<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.
   void Residual(std::span<const Components<Space, S>> c0,
                 std::span<const Acceleration<Space, S>> A);
 
   const Plan& plan_;
   Joins<Space, S> joins_;
-  std::vector<Acceleration<Space, S>> b_;  ///< by kept handle
-  std::vector<Wrench<Space, S>> F_;        ///< as b_
+  std::vector<S> b_;  ///< of all handles, by slot: a join changes those that stay
+  std::vector<S> F_;  ///< phi of all rows, then wrenches of bodies
+  std::vector<Acceleration<Space, S>> start_;  ///< of leaves without forces of their joints
   std::vector<Components<Space, S>> phi_, residual_;
-  std::vector<S> s_;       ///< by row
-  std::vector<S> forces_;  ///< phi of one node
+  std::vector<S> s_;  ///< by row
   long operations_ = 0;
 };
 

@@ -149,9 +149,9 @@ void PrintCoordinates(const Structure& structure, const ExplainView& view) {
 }
 
 template <class Space>
-odca::Plan PlanFor(const MechanismDescription& description, odca::Grounding grounding) {
+odca::Plan PlanFor(const MechanismDescription& description, SolverKind solver) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
-  return odca::MakePlan(mechanism, {.grounding = grounding});
+  return odca::MakePlan(mechanism, odca::PlanOptionsOf(solver));
 }
 
 void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView& view) {
@@ -162,11 +162,9 @@ void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView
                    {"largest", "largest join", Format::kInteger, {}},
                    {"loops", "joins that close loops", Format::kInteger, {}}};
   for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
-    const auto grounding =
-        solver == SolverKind::kAsPublished ? odca::Grounding::kAtRoot : odca::Grounding::kEager;
     const odca::Plan plan = description.space == SpaceKind::kPlanar
-                                ? PlanFor<Planar>(description, grounding)
-                                : PlanFor<Spatial>(description, grounding);
+                                ? PlanFor<Planar>(description, solver)
+                                : PlanFor<Spatial>(description, solver);
     Record row;
     row.Set("solver", std::string(ToString(solver)));
     row.Set("depth", std::int64_t{plan.depth()});

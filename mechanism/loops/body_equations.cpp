@@ -16,13 +16,24 @@ BodyEquations<Space, S>::BodyEquations(const Mechanism<Space, S>& mechanism)
       known_(VectorX<S>::Zero(mechanism.num_u())) {}
 
 /// b = M^-1 times the wrench, at the centre of mass in ground axes: the part of the paper's zeta_i3
-/// that is the same at both handles, before its shift.
+/// that is the same at both handles, before its shift. Moments, less w x I w, are taken to axes of
+/// the body, where the inertia is constant.
 template <class Space, class S>
-void BodyEquations<Space, S>::SetFree(const Kinematics<Space, S>& kinematics) {
+void BodyEquations<Space, S>::SetFree(const Kinematics<Space, S>& kinematics, bool turning) {
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
-    b_[body] = {kinematics.RotationalInverse(inertia, body) * wrenches_[body].angular,
-                wrenches_[body].linear / inertia.mass};
+    Angular<Space, S> alpha = inertia.rotational_inverse * wrenches_[body].angular;
+    if constexpr (Space::kRot == 3) {
+      const Rotation<Space, S>& R = kinematics.poses()[body].R;
+      Angular<Space, S> moment = R.transpose() * wrenches_[body].angular;
+      if (turning) {
+        const Angular<Space, S> w = R.transpose() * kinematics.motions()[body].angular;
+        moment -= CrossAngular<S>(w, inertia.rotational * w);
+        wrenches_[body].angular = R * moment;
+      }
+      alpha = R * (inertia.rotational_inverse * moment);
+    }
+    b_[body] = {alpha, wrenches_[body].linear / inertia.mass};
   }
 }
 
@@ -35,11 +46,11 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
     const Joint<Space, S>& joint = mechanism_.joints()[index];
     c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
   }
+  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
   if (force.size() == 0) {
     for (Acceleration<Space, S>& b : b_) b.setZero();
     return;
   }
-  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
     const JointState<Space, S>& state = kinematics.joints()[step.joint];
@@ -50,7 +61,7 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
     wrenches_[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
     wrenches_[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
   }
-  SetFree(kinematics);
+  SetFree(kinematics, false);
 }
 
 /// n_Q - n_P - g is the part of (7) besides the accelerations at centres of mass and H udot, at Mo
@@ -60,12 +71,7 @@ template <class Space, class S>
 void BodyEquations<Space, S>::SetState(const Kinematics<Space, S>& kinematics,
                                        const VectorX<S>& feedback) {
   AppliedForces<Space, S>(kinematics, wrenches_);
-  for (int body = 1; body < mechanism_.num_bodies(); ++body) {
-    const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
-    const Angular<Space, S>& w = kinematics.motions()[body].angular;
-    wrenches_[body].angular -= CrossAngular<S>(w, kinematics.RotationalInertia(inertia, body) * w);
-  }
-  SetFree(kinematics);
+  SetFree(kinematics, true);
   for (std::size_t j = 0; j < c0_.size(); ++j) {
     const Joint<Space, S>& joint = mechanism_.joints()[j];
     const JointState<Space, S>& state = kinematics.joints()[j];
@@ -88,6 +94,7 @@ template <class Space, class S>
 void BodyEquations<Space, S>::SetMissed(const Kinematics<Space, S>& kinematics) {
   known_.setZero();
   for (Acceleration<Space, S>& b : b_) b.setZero();
+  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
   for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
 }

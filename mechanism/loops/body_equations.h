@@ -34,6 +34,8 @@ class BodyEquations {
   void SetMissed(const Kinematics<Space, S>& kinematics);
 
   std::span<const Acceleration<Space, S>> b() const { return b_; }
+  /// M b, without the rounding errors of b.
+  std::span<const Wrench<Space, S>> wrenches() const { return wrenches_; }
   std::span<const Components<Space, S>> c0() const { return c0_; }
   /// For the solution: of all bodies, with Ground's zero.
   std::span<Acceleration<Space, S>> A() { return A_; }
@@ -44,8 +46,8 @@ class BodyEquations {
   void Read(std::span<const Components<Space, S>> phi, VectorX<S>& lambda) const;
 
  private:
-  /// b_ for wrenches_.
-  void SetFree(const Kinematics<Space, S>& kinematics);
+  /// b_ for wrenches_, at the speeds of `kinematics` or at rest.
+  void SetFree(const Kinematics<Space, S>& kinematics, bool turning);
 
   const Mechanism<Space, S>& mechanism_;
   std::vector<Wrench<Space, S>> wrenches_;

@@ -8,14 +8,13 @@ namespace loopbench {
 
 namespace {
 
-/// Transforms directions of a joint to its own axes; unless some are released, they are given in
-/// ground axes.
+/// Transforms directions of a joint to its own axes: some may be given in ground axes
+/// (Kinematics::Release()).
 template <class Space, class S>
 MatrixX<S> ToOwnAxes(const Kinematics<Space, S>& kinematics, const Joint<Space, S>& joint,
                      const JointState<Space, S>& state) {
   const int size = joint.num_directions();
-  const bool own =
-      !joint.kind->rotation_invariant || joint.num_drives > 0 || joint.num_released > 0;
+  const bool own = joint.kind->basis != nullptr || joint.num_drives > 0 || joint.num_released > 0;
   if (own) return MatrixX<S>::Identity(size, size);
   const Rotation<Space, S> R = kinematics.poses()[joint.from].R * joint.X_PF.R;
   MatrixX<S> T(size, size);

@@ -20,7 +20,7 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
     size_ += r;
     numbers += r * r;
   }
-  inverse_scales_.assign(numbers, S(0));
+  scales_.assign(numbers, S(0));
   if (scratch_ == nullptr) scratch_ = std::make_shared<LoopScratch<S>>(size_);
   if (size_ <= kSmallTriangle) {
     small_.setIdentity(size_, size_);
@@ -32,14 +32,12 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
   inverse_norms_.setOnes(size_);
 }
 
-/// Factors X_free = K K^T by Cholesky and stores K^-1, lower triangular.
+/// Factors X_free = K K^T by Cholesky: lower triangular, with reciprocals on the diagonal.
 template <class S>
 void LoopSolver<S>::SetScale(int joint, const JointMatrix<S>& free_response) {
   const Part& part = parts_[joint];
-  S* inverse = &inverse_scales_[part.scale];
-  std::copy_n(free_response.data(), part.rows * part.rows, inverse);
-  FactorLower(inverse, part.rows);
-  InvertLower(inverse, part.rows);
+  std::copy_n(free_response.data(), part.rows * part.rows, &scales_[part.scale]);
+  FactorLower(&scales_[part.scale], part.rows);
 }
 
 /// B := K^-1 B, K being block-diagonal: a block per joint.
@@ -47,7 +45,7 @@ template <class S>
 void LoopSolver<S>::ScaleRows(Eigen::Ref<MatrixX<S>> B) const {
   for (Eigen::Index column = 0; column < B.cols(); ++column) {
     for (const Part& part : parts_) {
-      MultiplyLower(&inverse_scales_[part.scale], part.rows, B.col(column).data() + part.row);
+      MultiplyLower(&scales_[part.scale], part.rows, B.col(column).data() + part.row);
     }
   }
 }
@@ -86,11 +84,24 @@ bool LoopSolver<S>::FactorPlain(const ConstRef& X, S scale, S tolerance) {
   return rcond_ > tolerance;
 }
 
-/// "scaled": K^-1 X K^-T = L L^T, T = L^-1 K^-1.
+template <class S>
+S LoopSolver<S>::InversePivot(int i) const {
+  return size_ <= kSmallTriangle ? small_(i, i) : S(1) / cholesky_.matrixLLT()(i, i);
+}
+
+/// "scaled": X = (K L) (K L)^T. A pivot of L L^T is the square of the ratio of two diagonals.
 template <class S>
 bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   form_ = Form::kScaled;
-  rcond_ = Cholesky(Scaled(X));
+  rcond_ = S(0);
+  if (!(Cholesky(X) > S(0))) return false;
+  rcond_ = S(1);
+  for (const Part& part : parts_) {
+    for (int i = 0; i < part.rows; ++i) {
+      const S ratio = scales_[part.scale + i * (part.rows + 1)] / InversePivot(part.row + i);
+      if (!(ratio * ratio >= rcond_)) rcond_ = ratio * ratio;  // also for NaN
+    }
+  }
   return rcond_ >= S(kSuspicious);
 }
 
@@ -100,6 +111,7 @@ template <class S>
 void LoopSolver<S>::FactorGeometric(const ConstRef& X_geometric, double regularization) {
   using std::sqrt;
   form_ = Form::kGeometric;
+  for (const Part& part : parts_) InvertLower(&scales_[part.scale], part.rows);
   const auto scaled = Scaled(X_geometric);
   auto work = scratch_->work.topLeftCorner(size_, size_);
   work = scaled;
@@ -139,8 +151,8 @@ bool LoopSolver<S>::FactorRegularized(const ConstRef& X) {
 /// K^-1 first, then U^T and the inverse norms, then L^-1, as far as the form has them.
 template <class S>
 void LoopSolver<S>::Apply(Eigen::Ref<MatrixX<S>> B) const {
-  if (form_ != Form::kPlain) ScaleRows(B);
   if (IsGeometric()) {
+    ScaleRows(B);
     auto vector = scratch_->vector.head(size_);
     for (Eigen::Index c = 0; c < B.cols(); ++c) {
       vector.noalias() = directions_.transpose() * B.col(c);
@@ -167,9 +179,9 @@ void LoopSolver<S>::ApplyTransposed(Eigen::Ref<VectorX<S>> v) const {
     vector = inverse_norms_.cwiseProduct(v);
     v.noalias() = directions_ * vector;
   }
-  if (form_ == Form::kPlain) return;
+  if (!IsGeometric()) return;
   for (const Part& part : parts_) {
-    MultiplyLowerTransposed(&inverse_scales_[part.scale], part.rows, v.data() + part.row);
+    MultiplyLowerTransposed(&scales_[part.scale], part.rows, v.data() + part.row);
   }
 }
 

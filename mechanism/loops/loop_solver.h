@@ -16,7 +16,10 @@
 // bodies alone. The eigenvalues of the factored matrix lie in [0, number of joints]. If a pivot is
 // below kSuspicious, the next two replace this one.
 //
-//     K^-1 X K^-T = L L^T,      T = L^-1 K^-1
+//     X = (K L) (K L)^T,        T = (K L)^-1
+//
+// As K is lower triangular, K L is the Cholesky factor of X itself, and its diagonal over K's is
+// L's: T costs no scaling, and only the decision needs K.
 //
 // *Geometric*, for X_g, the response of the same mechanism with unit masses, and weights w_i
 // (direction_weights.h).
@@ -75,7 +78,7 @@ class LoopSolver {
 
   int size() const { return size_; }
 
-  /// The K of each joint, from its free response; `which` as used by the next factorisation.
+  /// The K of each joint, from its free response, for the next factorisation.
   void SetScale(int joint, const JointMatrix<S>& free_response);
 
   /// Plain Cholesky. False when a pivot falls below `tolerance` times `scale`, the size that
@@ -104,7 +107,7 @@ class LoopSolver {
  private:
   struct Part {
     int row = 0, rows = 0;
-    int scale = 0;  ///< first number in inverse_scales_
+    int scale = 0;  ///< first number in scales_
   };
   enum class Form { kNone, kPlain, kScaled, kGeometric, kRegularized };
   bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kRegularized; }
@@ -112,12 +115,14 @@ class LoopSolver {
   auto Scaled(const ConstRef& X);
   /// Factors A = L L^T; returns its smallest pivot (smallest diagonal squared), or 0 on failure.
   S Cholesky(const ConstRef& A);
+  /// Returns 1 / L_ii of the last Cholesky().
+  S InversePivot(int i) const;
   void ScaleRows(Eigen::Ref<MatrixX<S>> B) const;
 
   int size_ = 0;
   Form form_ = Form::kNone;
   std::vector<Part> parts_;          ///< the joints
-  std::vector<S> inverse_scales_;    ///< K^-1 of each joint, by columns
+  std::vector<S> scales_;            ///< K of each joint, K^-1 if geometric, by columns
   MatrixX<S> small_;                 ///< L as in lower_triangle.h, for small sizes
   Eigen::LLT<MatrixX<S>> cholesky_;  ///< L elsewhere
   MatrixX<S> directions_;            ///< U

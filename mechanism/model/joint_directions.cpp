@@ -1,6 +1,7 @@
 // Directions H and D of the joints at the current poses, and which of them are imposed. Frames and
 // symbols: kinematics.cpp.
 #include <algorithm>
+#include <span>
 
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/model/kinematics.h"
@@ -10,16 +11,17 @@ namespace loopbench {
 namespace {
 
 /// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
-/// or a shift along one, all different, so D^T H = 0 holds as it is (9). The plane has one axis to
-/// rotate about, which is normal to it.
+/// or a shift along one, all different, so D^T H = 0 holds as it is (9). Shifts may be along the
+/// axes of ground. The plane has one axis to rotate about, which is normal to it.
 template <class Space, class S>
-void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R, bool ground_shifts,
               Basis<Space, S>& basis) {
   for (int i = 0; i < Space::kDim; ++i) {
     const int axis = kind.axes[i];
     basis[i].setZero();
     if (axis >= Space::kRot) {
-      basis[i].linear = R.col(axis - Space::kRot);
+      const int shift = axis - Space::kRot;
+      basis[i].linear = ground_shifts ? Linear<Space, S>::Unit(shift) : R.col(shift);
     } else if constexpr (Space::kRot == 1) {
       basis[i].angular[0] = S(1);
     } else {
@@ -60,6 +62,14 @@ Pose<Space, S> Moved(Pose<Space, S> X, const Velocity<Space, S>& V, S time) {
 template <class Space, class S>
 bool AnyAxes(const Joint<Space, S>& joint) {
   return joint.kind->rotation_invariant && joint.num_drives == 0 && joint.num_released == 0;
+}
+
+/// Ground axes are valid for shifts if D spans all of them. Products with them cost nothing.
+template <class Space, class S>
+bool HasGroundShifts(const Joint<Space, S>& joint) {
+  const auto H = std::span(joint.kind->axes).first(joint.kind->num_u);
+  return joint.num_drives == 0 && joint.num_released == 0 &&
+         std::ranges::none_of(H, [](int axis) { return axis >= Space::kRot; });
 }
 
 }  // namespace
@@ -117,7 +127,7 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
   if (joint.kind->basis != nullptr) {
     SetBasisAt<Space, S>(*joint.kind, R_WF, joint_poses_[index], basis);
   } else {
-    SetBasis<Space, S>(*joint.kind, R_WF, basis);
+    SetBasis<Space, S>(*joint.kind, R_WF, HasGroundShifts(joint), basis);
   }
   OrderDirections(index, basis);
 }

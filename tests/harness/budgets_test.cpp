@@ -38,12 +38,12 @@ constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
     {"mechanism/algebra",       { 2080,  22,   0},  1900},
     {"mechanism/description",   { 2000,  28,   1},  1750},
-    {"mechanism/model",         { 2883,  22,   2},  2300},
-    {"mechanism/loops",         { 2920,  23,   2},  1900},
+    {"mechanism/model",         { 2893,  22,   2},  2300},
+    {"mechanism/loops",         { 2936,  23,   2},  1900},
     {"mechanism/start",         { 1551,  14,   4},   700},
     {"mechanism/formulation",   { 2224,  21,   4},  1500},
     {"mechanism/simplify",      { 3250,  25,   5},  2600},
-    {"odca",                    { 6410,  47,   5},  3900},
+    {"odca",                    { 6990,  47,   5},  3900},
     {"lagrange",                {  377,   4,   4},   350},
     {"reduction",               { 1610,  12,   4},  1350},
     {"harness/text",            { 1570,  12,   0},   900},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 1970,  10,   7},  1500},
     {"harness/cli",             { 8302,  32,  29},  3600},
     {"peers",                   {  709,  12,   5},   650},
-    {"",                        {86310, 510, 238}, 62000}
+    {"",                        {86922, 510, 238}, 62000}
 };
 // clang-format on
 

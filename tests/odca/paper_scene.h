@@ -119,7 +119,9 @@ class Scene {
 
   /// Evaluates the code under test; its answers follow.
   Outcome Evaluate(SolverKind solver) {
-    odca_.emplace(mechanism_, FormulationOptions{.solver = solver});
+    PlanOptions plan = PlanOptionsOf(solver);
+    plan.basis = BoundaryBasis::kBodies;  // as the paper has it
+    odca_.emplace(mechanism_, FormulationOptions{.solver = solver}, plan);
     VectorX<double> udot;
     const Outcome outcome = (*odca_)->Evaluate(0.0, state_.q, state_.u, udot);
     accelerations_.assign(mechanism_.num_bodies(), Acceleration<Space, double>::Zero());

@@ -176,7 +176,12 @@ std::vector<Response> Responses(const Odca<Space, double>& odca) {
   const Plan& plan = odca.plan();
   std::vector<Response> responses;
   for (int n = 0; n < plan.num_leaves(); ++n) {
-    responses.push_back({{n + 1}, {n + 1}, joins.LeafZ(n).eigen().template cast<Real>(), false});
+    RealMatrix Z(d, d);
+    for (int k = 0; k < d; ++k) {
+      const auto unit = Wrench<Space, double>::Unit(k);
+      Z.col(k) = joins.Response(n, unit).eigen().template cast<Real>();
+    }
+    responses.push_back({{n + 1}, {n + 1}, Z, false});
   }
   for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
     const PlanNode& node = plan.nodes()[n - plan.num_leaves()];
@@ -196,15 +201,14 @@ std::vector<Response> Responses(const Odca<Space, double>& odca) {
         const Handle& at_f = node.handles[node.kept[f]];
         auto block = response.Z.block(d * e, d * f, d, d);
         if (at_e.child == at_f.child) {
-          block =
-              responses[node.children[at_e.child]].Z.block(d * at_e.place, d * at_f.place, d, d);
+          block = responses[node.children[at_e.child]].Z.block(at_e.place, at_f.place, d, d);
         }
-        const auto* V_e = joins.V(node, n, node.kept[e]);
-        const auto* V_f = joins.V(node, n, node.kept[f]);
-        for (int i = 0; i < node.rows; ++i) {
-          block -= V_e[i].eigen().template cast<Real>() *
-                   V_f[i].eigen().template cast<Real>().transpose();
-        }
+        const auto V = [&](const Handle& handle) {
+          using RowByRow = Eigen::Matrix<double, Eigen::Dynamic, d, Eigen::RowMajor>;
+          return RealMatrix(Eigen::Map<const RowByRow>(joins.V(node, n, handle), node.rows, d)
+                                .template cast<Real>());
+        };
+        block -= V(at_e).transpose() * V(at_f);
       }
     }
     std::ranges::sort(response.all);

@@ -40,16 +40,16 @@ TEST(SweepTest, NoMatrixIsLargerThanThePlansLargestJoin) {
     const Mechanism<Planar, double> mechanism(graph, Coordinates::kJoint);
     const Odca<Planar, double> odca(mechanism, {});
     const int rows = odca.plan().largest_join();
-    int kept = 1;
+    int boundary = 0;
+    for (const Leaf& leaf : odca.plan().leaves()) boundary = std::max(boundary, leaf.width);
     for (const PlanNode& node : odca.plan().nodes()) {
-      kept = std::max(kept, static_cast<int>(node.kept.size()));
+      boundary = std::max(boundary, node.kept_numbers);
     }
-    const int boundary = Planar::kDim * kept;
     EXPECT_LE(odca.sweep().joins().largest_matrix(), std::max(rows * rows, boundary * boundary));
   }
   const Mechanism<Planar, double> chain(Chain(1000), Coordinates::kJoint);
-  EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().joins().largest_matrix()), 36)
-      << "two handles of three directions";
+  EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().joins().largest_matrix()), 16)
+      << "two handles of two rows";
 }
 
 #ifdef LOOPBENCH_PRECISIONS

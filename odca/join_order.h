@@ -35,8 +35,8 @@ struct Join {
 double JoinCost(double rows, double handles, double kept, double dim);
 
 /// The joins of all bodies, children first. `waiting`: joints to Ground that no join closes, by
-/// body. Every join has at least one joint between its sides; separate parts stay separate. With a
-/// body `start` all parts are fronts, that of this body from there.
+/// body. Every join has at least one joint between its sides; separate parts stay separate. If
+/// `start` is a body, every part is joined body after body, and its part begins with it.
 std::vector<Join> OrderJoins(int num_bodies, std::span<const PlanJoint> joints,
                              std::span<const int> waiting, int dim, int start = 0);
 

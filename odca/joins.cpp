@@ -10,7 +10,7 @@ namespace loopbench::odca {
 
 namespace {
 
-/// Multiply-adds of M^-1 c: M^-1 is diagonal but for three rotations.
+/// Multiply-adds of M^-1 c: M^-1 is diagonal except for three rotations.
 template <class Space>
 constexpr int kApply = Space::kRot* Space::kRot + Space::kLin;
 
@@ -222,9 +222,9 @@ void Joins<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses ma
                  3 * Space::kDim * (size * (size + 1) / 2);
 }
 
-/// Z of body n + 1, M^-1 in ground axes or that of the held body, or C Z C^T: the paper's zeta_ij
-/// of the handles at r_i and r_j are S(r_i) M^-1 S(r_j)^T, for bodies k and k+1 (1-4) and body 2
-/// (45-46).
+/// Z of body n + 1, or C Z C^T. Z is M^-1 in ground axes, or the response of the held body. The
+/// paper's zeta_ij of the handles at r_i and r_j are S(r_i) M^-1 S(r_j)^T, for bodies k and k+1
+/// (1-4) and body 2 (45-46).
 template <class Space, class S>
 void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n) {
   const Leaf& leaf = plan_.leaves()[n];

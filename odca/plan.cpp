@@ -256,7 +256,7 @@ long JointWork(long rows, long above, bool is_body, long numbers, long dim) {
 /// Multiply-adds of a body alone with so many rows of joints, and `held` rows of its hold or 0:
 /// M^-1 C^T and C M^-1 C^T, and the vectors.
 long LeafWork(long rows, long held, bool is_body, long dim) {
-  const long apply = dim * dim / 3;  // M^-1 is diagonal but for three rotations
+  const long apply = dim * dim / 3;  // M^-1 is diagonal except for three rotations
   const long triangle = rows * (rows + 1) / 2, project = is_body ? 0 : rows * dim;
   if (held == 0) return (rows + 1) * apply + (is_body ? 0 : dim * triangle) + project;
   const long free = dim - held;

@@ -73,9 +73,9 @@ struct Handle {
   int joint = -1;  ///< index of the joint, -1 for the whole body
   int width = 0;   ///< rows of the joint, or directions of the body
   int child = 0;
-  int place = 0;   ///< of its first number among those of the child
-  int number = 0;  ///< of its first number among those of both children
-  int slot = 0;    ///< of its first number among those of all leaves
+  int place = 0;   ///< index of its first number in the boundary of the child
+  int number = 0;  ///< index of its first number in both boundaries
+  int slot = 0;    ///< index of its first number in all leaves
   int force = 0;   ///< of the force there: of a row, or after all rows of a direction of a body
   bool kept = false;
 
@@ -86,7 +86,7 @@ struct NodeJoint {
   int index = 0;
   int rows = 0;
   int from = -1, to = -1;  ///< index into the node's handles, -1 for Ground
-  int row = 0;             ///< first of its rows among those of all nodes
+  int row = 0;             ///< index of its first row in all nodes
 };
 
 /// A joint on a body.
@@ -145,7 +145,7 @@ class Plan {
   long operations(int dim) const;
 
  private:
-  /// With one order of joins: that of the rules, or from body after body.
+  /// With one order of joins: by the rules (`start` 0), or body after body from `start`.
   Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start);
   void AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
                  const std::vector<bool>& is_body, int dim);

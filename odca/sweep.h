@@ -9,8 +9,8 @@
 //
 // Symbols, axes and points of reference are defined in joins.h: a motion or force of a body is at
 // its centre of mass, in ground axes. The outside force on the side of an open joint is this
-// joint's phi, that on a body the sum of its joints closed above: both are known when a node is
-// reached downwards, and no force is handed on. Accelerations of assemblies are never formed.
+// joint's phi. On a body it is the sum over its joints that close further up. Both are known when
+// the downward pass reaches a node. Accelerations of assemblies are never formed.
 //
 // Joins close loops one after another. If constraints are dependent, one join may be much worse
 // conditioned than the simultaneous solution of all constraints, and round-off spoils the result.

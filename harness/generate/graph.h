@@ -42,8 +42,8 @@ inline void PoseLaneSines(const double* angles, double* sines, double* cosines) 
 // reordered. x - x stays: it tests whether x is finite.
 //
 // A graph that keeps its numbers folds constants only if they are 0, 1 or -1. Operations on other
-// constants remain nodes, known at the recording. Rounding then decides no operation: mechanisms
-// with other masses or lengths have the same graph with other numbers.
+// constants remain nodes, whose values are known at the recording. Rounding then decides no
+// operation: mechanisms with other masses or lengths have the same graph with other numbers.
 
 enum class Operation : std::uint8_t {
   kInput,

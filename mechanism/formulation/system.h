@@ -145,8 +145,8 @@ class System final : public Ode<S> {
   bool IsOffBranch() const;
   /// Rates of the works, if they are asked for, at the kinematics' speeds.
   void PutPower(std::span<S> rates);
-  /// Factors at the current positions; where directions are regularized, looks at what is beside
-  /// them (passage.h), and regularizes less where they are regular.
+  /// Factors at the current positions. If directions are regularized, examines positions beside
+  /// (passage.h): carries the forces of a branch, or regularizes less at regular positions.
   Outcome FactorBranch();
   bool AtPassage() const { return options_.enforcement == Enforcement::kPosition; }
   /// udot_ and, unless null, lambda at the current state, with the shares of released directions.

@@ -231,8 +231,8 @@ TEST(ShippedExperiments, AllReadAndExpand) {
 TEST(ShippedExperiments, PaperRunsEveryProblemColumnToleranceAndHorizon) {
   const Experiment paper = ReadExperiment(kConfigs / "experiments/paper/paper.json");
   const std::vector<Case> cases = Expand(paper);
-  // Five problems with two horizons and five with one; 12 methods and, but for the long runs, 3 at
-  // level projection; 4 tolerances.
+  // Five problems have two horizons, five have one. Each runs 12 methods at 4 tolerances; short
+  // runs also have 3 methods at level projection.
   EXPECT_EQ(paper.methods.size(), 15u);
   EXPECT_EQ(cases.size(), ((5u * 2u + 5u) * 12u + 10u * 3u) * 4u);
   const auto ensembles =

@@ -172,8 +172,8 @@ Record FixedRun(const std::string& level, double drift) {
   return record;
 }
 
-/// Nothing is promised of a fixed step's errors, so that only a loop that is none any more is
-/// flagged; what a projection leaves does not depend on the step.
+/// Errors of fixed steps have no expected size, so only a loop that has come apart is flagged. The
+/// error of a projection does not depend on the step.
 TEST(FixedSteps, PromiseNothingButTheProjection) {
   EXPECT_EQ(OwnWarnings(FixedRun("acceleration", 0.19)), "");
   EXPECT_EQ(OwnWarnings(FixedRun("acceleration", 0.21)), "drift");  // a tenth of a link

@@ -20,7 +20,7 @@ using ByCase = std::vector<std::vector<double>>;  ///< [case][commit]
 /// What a machine does to times that are the same.
 struct Machine {
   ByCase noise;         ///< of their logarithms
-  ByCase calibrations;  ///< [ns]; none where it is not known how fast the machine was
+  ByCase calibrations;  ///< [ns]; none if the speed of the machine is unknown
 };
 
 /// What a file of noise says of a machine whose cores others share, about the medians: for each
@@ -209,7 +209,7 @@ TEST_F(PlantedHistory, NothingIsMadeUpOnAMachineThatOthersKeepBusy) {
   EXPECT_LE(false_alarms_.size(), 1u) << testing::PrintToString(false_alarms_);
 }
 
-// The same times without the calibration that was measured beside them: they hide what is in them.
+// Equal times without their calibration: the speed of the machine hides the planted step.
 TEST_F(PlantedHistory, WithoutACalibrationASharedMachineHidesThem) {
   Machine machine = SharedMachine();
   machine.calibrations.clear();

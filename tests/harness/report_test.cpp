@@ -164,7 +164,7 @@ TEST(Report, CountsAreThoseOfTheTables) {
   }
 }
 
-// Rows are told apart by what differs, and every row is of a problem.
+// Names of rows contain the keys that differ. Every row belongs to a problem.
 TEST(Report, NamesSayWhatDiffers) {
   std::vector<Record> records = SomeRecords();
   const ReportData data = MakeReport(records, {.store = "here"});

@@ -1,4 +1,4 @@
-// Runs of simplified problems tell the same story as runs of the problems themselves.
+// Runs of simplified problems have the results of runs of the whole problems.
 #include <gtest/gtest.h>
 
 #include <cmath>

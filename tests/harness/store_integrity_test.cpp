@@ -354,7 +354,7 @@ TEST_F(StoreIntegrity, OfALargeStoreOnlyChosenParametersAreRead) {
   EXPECT_EQ(some[1].Text("case_id"), "3");
   EXPECT_EQ(some.back().Text("case_id"), "19993");
   EXPECT_EQ(chosen("mass<1").size(), 4000u);
-  // what is measured, and what tells columns of a problem apart, is chosen later
+  // measured values, and keys that distinguish methods of a problem, are selected later
   EXPECT_EQ(chosen("outcome=crashed").size(), 20'000u);
   // damage in what is read is named by its line, all else is as in a small store
   text[text.find("\"mass\":1.5") + 7] = '2';

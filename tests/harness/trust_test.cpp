@@ -1,5 +1,5 @@
-// Planted wrong results: each is flagged, by the reference where there is one and by what runs say
-// of themselves and of each other where there is none; and right ones are not.
+// Planted wrong results: each is flagged by its reference or, without a reference, by its own
+// warnings and by disagreement. Correct results are not flagged.
 #include <gtest/gtest.h>
 
 #include <cmath>

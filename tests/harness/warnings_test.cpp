@@ -125,7 +125,7 @@ TEST(Warnings, SingularPassagesCountBelowLevelPosition) {
   EXPECT_EQ(With("velocity", across), "singular-crossing");
   EXPECT_EQ(With("projection", across), "");
   EXPECT_EQ(With("acceleration", {{"singularity_distance_min", 1e-4}}), "singular-crossing");
-  // loops too large for the distance know whether they were regularized
+  // loops too large for the distance report regularized evaluations
   EXPECT_EQ(With("acceleration", {{"singularity_distance_min", Value()},
                                   {"regularized_evaluations", std::int64_t{3}}}),
             "singular-crossing");
@@ -242,7 +242,7 @@ TEST(Agreement, RunsThatEndElsewhereMakeAllOfTheirToleranceFlagged) {
   EXPECT_EQ(WarningsAndClusters(Problem(1e-6, 3.0009)), ":1 :1 :1 ");
   EXPECT_EQ(WarningsAndClusters(Problem(1e-8, 3.0009)),
             "disagreement:1 disagreement:1 disagreement:2 ");
-  // nobody to be compared with: another problem, another horizon, a run that failed
+  // no other run to compare with: another problem, another horizon, a failed run
   for (const auto& [key, value] :
        std::vector<std::pair<std::string, Value>>{{"problem_id", std::string("other")},
                                                   {"horizon", 10.0},
@@ -290,7 +290,7 @@ TEST(Agreement, RunsThatWarningThemselvesDecideNothing) {
   // but not where nobody's level keeps one
   records[0].Set("enforcement", std::string("velocity"));
   EXPECT_EQ(WarningsAndClusters(records), ":1 :1 singular-crossing:1 ");
-  // if all have warnings, all are compared: nobody is cleared by numbers
+  // if all runs have warnings, all are compared, and a majority clears none
   records = Problem(1e-8, 2.0);
   records[0].Set("enforcement", std::string("velocity"));
   for (Record& record : records) record.Set("singularity_crossings", std::int64_t{1});

@@ -169,10 +169,10 @@ TEST(Lagrange, LeavesSuspiciousPositionsToTheDenseEquations) {
   EXPECT_TRUE(system.solver().is_sparse());
 }
 
-/// What is answered sparsely is right: O-DCA, which judges joint by joint, regularizes nothing
-/// there and has the same accelerations. Dense equations judge all loops at once, whose responses
-/// are the wider apart the more there are: from some 50 windows on they regularize where sparse
-/// ones answer.
+/// Accelerations of the sparse equations are right: O-DCA, which judges joint by joint, regularizes
+/// nothing there and has the same accelerations. Dense equations judge all loops at once, whose
+/// responses are the wider apart the more there are: from some 50 windows on they regularize where
+/// sparse ones answer.
 TEST(Lagrange, AnswersNothingSparselyThatHasLostRank) {
   for (const int windows : {1, 3, 10, 40}) {
     const Mechanism<Planar, double> mechanism(Ladder(windows, 1.0, 0.0), Coordinates::kJoint);

@@ -47,7 +47,7 @@ TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
                                 : Compare(mechanism, GetParam(), q, u);
       ASSERT_EQ(both.outcome, Outcome::kFinished);
       ++states;
-      // What the general sweep regularizes is not to be had here. What is refused is near that:
+      // The path sweep refuses states that the general sweep regularizes, and states near them:
       // limits are 1e-4 of traces, of which the smallest eigenvalue is a twentieth at least for
       // these arms and radii, and det / trace is half the smallest of X at least: 0.004.
       EXPECT_TRUE(!both.evaluated || both.general.smallest_weight == 1.0) << path.name;

@@ -138,7 +138,7 @@ TEST_P(DrivenPassage, KeepsTheBranchAtLevelPosition) {
                    [&](const Snapshot& at) { worst = std::max(worst, LargestError(known, at)); });
       ASSERT_EQ(run.result.outcome, Outcome::kFinished) << known.description.name;
       ASSERT_EQ(run.last.t, 8.0);
-      // closed loops have the drive's angle but for rounding, except in the width of
+      // closed loops have the drive's angle up to round-off, except in the width of
       // regularization, where steps leave errors of the tolerance magnified by one over a speed of
       // 0.1 or more, and regularization some 4e-6 of its own, whatever the tolerance
       EXPECT_LE(worst, 1e3 * tolerance + 1e-5) << known.description.name << " " << tolerance;

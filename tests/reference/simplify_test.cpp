@@ -1,6 +1,6 @@
-// Models of a problem against the whole one, point by point: exact ones agree to what the
-// integrator leaves, the error of approximate ones goes to zero as what they neglect does, and
-// where it is not small they are wrong.
+// Models of a problem against the whole mechanism, point by point. Exact models agree up to errors
+// of the integrator. The error of approximate models vanishes with the neglected quantity, and is
+// large if that quantity is large.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -24,8 +24,8 @@ const Method kOdcaPosition{.formulation = "odca",
 
 class Passage : public testing::TestWithParam<Method> {
  protected:
-  /// In absolute coordinates every joint can come apart, and what is regularized in a step that
-  /// ends near a singular position is not taken away in full: a share of that step's own error.
+  /// In absolute coordinates every joint can come apart. If a step ends near a singular position,
+  /// the projection leaves a share of its error in regularized directions.
   double Branch(double tolerance) const {
     const bool absolute = GetParam().coordinates == Coordinates::kAbsolute;
     return absolute ? std::max(1e-8, 0.1 * tolerance) : 1e-8;

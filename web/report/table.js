@@ -139,7 +139,7 @@ const LoopbenchTable = (() => {
       this.pick(this.rows[next]);
     }
 
-    // Shows all that is known of a row: every column, its warnings in words, and the command that prints it.
+    // Shows all columns of a row, its warnings in words, and the command that prints it.
     pick(row, tell = true) {
       this.chosen = row;
       this.draw();

@@ -16,8 +16,7 @@ myst_heading_anchors = 4
 root_doc = "docs/index"
 include_patterns = ["*.md", "docs/**", "results/**/*.md", "*/README.md", "configs/**/*.md", "tests/*/README.md"]
 # tables of results with thousands of rows: their CSV files are easier to read
-exclude_patterns = ["build", "results/runs", "results/*/full", "results/extremes/robustness-map.md", "results/paper/drift.md",
-                    "results/precision/precision.md"]
+exclude_patterns = ["build", "results/runs", "results/*/full", "results/extremes/robustness-map.md"]
 suppress_warnings = ["myst.header"]  # tables that commands write begin with a heading of level 2
 html_theme = "furo"
 # KaTeX from libjs-katex typesets equations, so that pages load nothing from other sites

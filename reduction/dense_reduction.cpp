@@ -242,6 +242,14 @@ bool DenseReduction<Space, S>::Review(const Kinematics<Space, S>& kinematics) {
   return true;
 }
 
+template <class Space, class S>
+void DenseReduction<Space, S>::AppendMode(std::vector<int>& mode) const {
+  mode.push_back(outgrown_);
+  mode.insert(mode.end(), dependent_.begin(), dependent_.end());
+  mode.push_back(-1);
+  mode.insert(mode.end(), rows_.begin(), rows_.end());
+}
+
 #define LOOPBENCH_INSTANTIATE(Space, S) template class DenseReduction<Space, S>;
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

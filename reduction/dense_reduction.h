@@ -66,6 +66,7 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   /// The partition.
   void Start(const Kinematics<Space, S>& kinematics) override;
   bool Review(const Kinematics<Space, S>& kinematics) override;
+  void AppendMode(std::vector<int>& mode) const override;
 
  private:
   /// LU of J_D, J being current; the reciprocal condition.

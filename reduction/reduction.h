@@ -35,6 +35,9 @@ class SparseOrDense final : public ConstraintSolver<Space, double> {
   bool CompleteSpeeds(Kinematics<Space, double>& kinematics, VectorX<double>& u) override;
   void Start(const Kinematics<Space, double>& kinematics) override;
   bool Review(const Kinematics<Space, double>& kinematics) override;
+  void AppendMode(std::vector<int>& mode) const override {
+    if (dense_ != nullptr) dense_->AppendMode(mode);
+  }
   std::string WhySingular() const override;
 
   /// Returns true if the last Factor() was sparse.

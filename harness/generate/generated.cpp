@@ -17,7 +17,7 @@ namespace {
 // A first miss may be alone: starts at rest have branches of their own. Each further recording,
 // also after one that failed, needs twice as many misses as the one before.
 constexpr int kFirstMisses = 2, kMaxDoublings = 20;
-constexpr std::size_t kMaxBranches = 8;
+constexpr std::size_t kMaxBranches = 8, kMaxModes = 16;
 
 /// Adds the time of its life to a sum [s].
 class Timer {
@@ -56,8 +56,11 @@ class LaneCalls final : public Together {
   }
   void GiveBack(int lane) { taken_[lane] = false; }
 
-  /// Branches of one mode of one mechanism, by the key of the first.
-  std::vector<std::shared_ptr<const Code>>& Shared(const std::string& key) { return shared_[key]; }
+  /// Branches of one mode of the mechanism of a first recording with this key.
+  std::vector<std::shared_ptr<const Code>>& Shared(const std::string& first_key,
+                                                   const std::vector<double>& mode) {
+    return shared_[{first_key, mode}];
+  }
   /// The code of equal recordings in all modes, which lanes evaluate together; null at first.
   std::shared_ptr<const Code>& CodeOf(const std::string& key) { return codes_[key]; }
 
@@ -103,7 +106,8 @@ class LaneCalls final : public Together {
   std::array<bool, kLanes> taken_{};
   std::array<Call, kLanes> calls_;
   std::vector<Lanes> x_, y_, w_;
-  std::map<std::string, std::vector<std::shared_ptr<const Code>>> shared_;
+  std::map<std::pair<std::string, std::vector<double>>, std::vector<std::shared_ptr<const Code>>>
+      shared_;
   std::map<std::string, std::shared_ptr<const Code>> codes_;
 };
 
@@ -155,21 +159,33 @@ GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
   subject_.keeps_numbers = true;
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
-  NoteStart();
-  misses_left_ = kFirstMisses;
-  x_[0] = start_.t;
-  system.ToState(start_.q, start_.u, std::span(x_).subspan(1));
+  FindMode();
+  mode_->misses_left = kFirstMisses;
+  x_[0] = mode_->start.t;
+  system.ToState(mode_->start.q, mode_->start.u, std::span(x_).subspan(1));
   const Timer timer(seconds_);
   AddBranch();
 }
 
 template <class Space>
-void GeneratedDerivative<Space>::NoteStart() {
-  start_ = {system_.kinematics().time(), system_.q(), system_.u()};
-  subject_.options = system_.options();
-  // gains that the level has chosen meanwhile
-  if (subject_.options.enforcement == Enforcement::kBaumgarte) {
-    subject_.options.gains = system_.level().gains();
+void GeneratedDerivative<Space>::FindMode() {
+  choices_.clear();
+  for (const Released& released : system_.kinematics().released()) {
+    choices_.push_back(released.joint);
+    choices_.insert(choices_.end(), released.directions.begin(), released.directions.end());
+    choices_.push_back(-1);
+  }
+  system_.solver().AppendMode(choices_);
+  const BaumgarteGains& gains = system_.level().gains();
+  scratch_.assign({gains.alpha, gains.beta});
+  scratch_.insert(scratch_.end(), choices_.begin(), choices_.end());
+  if (mode_ != nullptr && key_ == scratch_) return;
+  const Timer timer(seconds_);  // graphs are large
+  key_ = scratch_;
+  if (modes_.size() >= kMaxModes && !modes_.contains(key_)) modes_.clear();
+  mode_ = &modes_[key_];
+  if (mode_->branches.empty()) {
+    mode_->start = {system_.kinematics().time(), system_.q(), system_.u()};
   }
 }
 
@@ -179,23 +195,30 @@ void GeneratedDerivative<Space>::AddBranch() {
     return code->recorded.graph.Holds(code->recorded.graph.Values(x_));
   };
   const auto add = [&](std::shared_ptr<const Code> code) {
-    branches_.insert(branches_.begin(), Branch{std::move(code)});
+    mode_->branches.insert(mode_->branches.begin(), Branch{std::move(code)});
   };
-  if (shared_ != nullptr) {
-    const auto known = std::ranges::find_if(*shared_, holds);
-    if (known != shared_->end()) return add(*known);
+  if (!first_key_.empty()) {
+    const auto& shared = lane_->calls().Shared(first_key_, key_);
+    const auto known = std::ranges::find_if(shared, holds);
+    if (known != shared.end()) return add(*known);
   }
-  RecordedFunction recorded = RecordFunction(subject_, start_, x_[0], {x_.begin() + 1, x_.end()});
+  // gains that the level has chosen meanwhile
+  if (subject_.options.enforcement == Enforcement::kBaumgarte) {
+    subject_.options.gains = system_.level().gains();
+  }
+  RecordedFunction recorded =
+      RecordFunction(subject_, mode_->start, x_[0], {x_.begin() + 1, x_.end()});
   for (int i = 0; i < system_.num_state_speeds(); ++i) {
     if (system_.state_speed(i) != recorded.carried_speeds[static_cast<std::size_t>(i)]) {
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
   if (lane_ == nullptr) return add(Compile(std::move(recorded), false));
-  if (shared_ == nullptr) shared_ = &lane_->calls().Shared(recorded.key);
+  if (first_key_.empty()) first_key_ = recorded.key;
   std::shared_ptr<const Code>& code = lane_->calls().CodeOf(recorded.key);
   if (code == nullptr) code = Compile(std::move(recorded), true);
-  if (std::ranges::find(*shared_, code) == shared_->end()) shared_->push_back(code);
+  auto& shared = lane_->calls().Shared(first_key_, key_);
+  if (std::ranges::find(shared, code) == shared.end()) shared.push_back(code);
   add(code);
 }
 
@@ -211,15 +234,6 @@ std::shared_ptr<const Code> GeneratedDerivative<Space>::Compile(RecordedFunction
   room_.resize(std::max(room_.size(), static_cast<std::size_t>(compiled.room)));
   std::vector<double> constants = ConstantsOf(recorded);
   return std::make_shared<Code>(Code{std::move(recorded), compiled, std::move(constants)});
-}
-
-template <class Space>
-void GeneratedDerivative<Space>::ModeChanged() {
-  const Timer timer(seconds_);  // graphs are large
-  branches_.clear();
-  shared_ = nullptr;
-  NoteStart();
-  attempts_ = misses_left_ = 0;  // the next evaluation is recorded
 }
 
 template <class Space>
@@ -244,14 +258,15 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
                                           std::span<double> ydot) {
   if (y.size() + 1 != x_.size() || ydot.size() < y.size()) return false;
   SetInputs(t, y);
-  for (std::size_t i = 0; i < branches_.size(); ++i) {
-    if (!CallDerivative(*branches_[i].derivative, ydot)) continue;
-    if (i > 0) std::swap(branches_[0], branches_[i]);
+  auto& [start, branches, misses_left, attempts] = *mode_;
+  for (std::size_t i = 0; i < branches.size(); ++i) {
+    if (!CallDerivative(*branches[i].derivative, ydot)) continue;
+    if (i > 0) std::swap(branches[0], branches[i]);
     return true;
   }
   ++misses_;
-  if (--misses_left_ > 0 || branches_.size() >= kMaxBranches) return false;
-  misses_left_ = kFirstMisses << std::min(++attempts_, kMaxDoublings);
+  if (--misses_left > 0 || branches.size() >= kMaxBranches) return false;
+  misses_left = kFirstMisses << std::min(++attempts, kMaxDoublings);
   const Timer timer(seconds_);
   try {
     AddBranch();
@@ -266,7 +281,7 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
                                           std::span<double> jacobian) {
   if (y.size() + 1 != x_.size()) return false;
   SetInputs(t, y);
-  for (Branch& branch : branches_) {
+  for (Branch& branch : mode_->branches) {
     const RecordedFunction& recorded = branch.derivative->recorded;
     const bool is_known = branch.jacobian != nullptr || branch.has_no_jacobian;
     if (!is_known && recorded.graph.Holds(recorded.graph.Values(x_))) {

@@ -2,11 +2,11 @@
 //
 // A recording is valid if all its comparisons have their recorded outcomes (graph.h). Otherwise the
 // library evaluates; after several such evaluations the branch of the current state is recorded
-// too. Compiled branches stay until the mode of the system changes. Batched runs (members of an
-// ensemble) call compiled code together, each in a lane of a function for kLanes states
-// (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a single run.
-// In each mode a member records its first branch. If another member has recorded an equal one, both
-// have the same mode and mechanism, and the member takes further branches from there.
+// too. Branches are valid in one mode of the system; earlier modes keep theirs. Batched runs
+// (members of an ensemble) call compiled code together, each in a lane of a function for kLanes
+// states (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a
+// single run. A member records its first branch. If another member has recorded an equal one, both
+// have the same mechanism, and the member takes branches of all modes from there.
 //
 // Compiled code receives the recorded constants. Two recordings share it if they differ in the
 // numbers of constants alone: members of an ensemble, or cases of a sweep over lengths or masses. A
@@ -14,6 +14,7 @@
 // code.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -45,16 +46,18 @@ class GeneratedDerivative final : public CompiledDerivative {
 
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
   bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) override;
-  void ModeChanged() override;
+  void StepAccepted() override { FindMode(); }
   std::int64_t misses() const override { return misses_; }
   double seconds() const override { return seconds_; }
 
   /// Branches that are compiled for the current mode.
-  int branches() const { return static_cast<int>(branches_.size()); }
+  int branches() const { return static_cast<int>(mode_->branches.size()); }
+  /// Modes with branches.
+  int modes() const { return static_cast<int>(modes_.size()); }
 
  private:
-  /// Notes time, positions and speeds of the system, which start the mode of recordings.
-  void NoteStart();
+  /// Makes mode_ the mode of the system.
+  void FindMode();
   /// Adds the branch at x_, of the batch or recorded.
   void AddBranch();
   /// Puts time and state where compiled functions read them.
@@ -68,18 +71,25 @@ class GeneratedDerivative final : public CompiledDerivative {
     std::shared_ptr<const Code> jacobian = {};  ///< compiled at its first use
     bool has_no_jacobian = false;               ///< it is too long
   };
+  using ModeKey = std::vector<double>;  ///< released directions, gains, choices of the solver
+  struct Mode {
+    RecordingStart start;          ///< where the system came into it
+    std::vector<Branch> branches;  ///< last used branch first
+    int misses_left = 0;           ///< until the next branch is recorded
+    int attempts = 0;              ///< recordings
+  };
 
   RecordingSubject subject_;
   const Contraction contraction_;
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
-  std::vector<std::shared_ptr<const Code>>* shared_ = nullptr;  ///< by the batch, in this mode
-  RecordingStart start_;
-  std::vector<Branch> branches_;  ///< last used branch first
+  std::string first_key_;       ///< of the first recording of a run with a lane
+  std::map<ModeKey, Mode> modes_;
+  Mode* mode_ = nullptr;
+  ModeKey key_, scratch_;  ///< of mode_
+  std::vector<int> choices_;
   std::vector<double> x_, room_;  ///< time and state; intermediate values
   std::int64_t misses_ = 0;
-  int misses_left_ = 0;  ///< until the next branch is recorded
-  int attempts_ = 0;     ///< recordings in this mode
   double seconds_ = 0.0;
 };
 

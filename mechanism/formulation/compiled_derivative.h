@@ -18,8 +18,8 @@ class CompiledDerivative {
   /// column. Returns false as Evaluate() does, and if it cannot be compiled.
   virtual bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) = 0;
 
-  /// Notes that the mode of the system has changed: earlier branches are no longer valid.
-  virtual void ModeChanged() = 0;
+  /// Notes an accepted step, after which the mode of the system may be another.
+  virtual void StepAccepted() = 0;
 
   /// Calls that returned false.
   virtual std::int64_t misses() const = 0;

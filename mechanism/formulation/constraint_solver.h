@@ -111,6 +111,8 @@ class ConstraintSolver {
   /// Called at accepted steps, the only other place where the mode may change. Returns true if it
   /// did: factors are then recomputed, and the state may carry other speeds.
   virtual bool Review(const Kinematics<Space, S>& kinematics);
+  /// Appends the choices that make the mode, if there are any.
+  virtual void AppendMode(std::vector<int>&) const {}
 
   /// Returns details of a Factor() that ended as kSingular, for messages; "" (the default) if none.
   virtual std::string WhySingular() const { return {}; }

@@ -36,16 +36,14 @@ void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q
 }
 
 template <class Space, class S>
-bool FactoredState<Space, S>::AcceptReleased() {
-  if (stress_ == nullptr) return false;
-  const std::vector<Released> before = released_;
+void FactoredState<Space, S>::AcceptReleased() {
+  if (stress_ == nullptr) return;
   released_ = stress_->Choose(kinematics_);
   if (kinematics_.released() != released_) {
     const VectorX<S> q = kinematics_.q(), u = kinematics_.u();
     SetPositions(q);
     SetSpeeds(u);
   }
-  return released_ != before;
 }
 
 template <class Space, class S>

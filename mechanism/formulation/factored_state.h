@@ -50,8 +50,8 @@ class FactoredState {
   /// Adds to speeds the share of the released directions (self_stress.h), after Factor().
   void ShareSpeeds(VectorX<S>& u);
   /// Releases the most suitable directions at the current positions from now on. The equations stay
-  /// the same to first order in the drift. Returns true if the directions changed.
-  bool AcceptReleased();
+  /// the same to first order in the drift.
+  void AcceptReleased();
   /// Releases the mechanism's choice again: runs do not depend on runs before.
   void ForgetReleased() { released_ = mechanism().released(); }
 

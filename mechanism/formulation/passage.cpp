@@ -12,8 +12,8 @@ namespace {
 /// Positions that show a passage at a distance are this far away [rad, or mechanism lengths, of the
 /// fastest body], ten widths of regularization.
 constexpr double kBeside = 2e-3;
-/// Distance of the nearest positions with forces, in these units: smooth forces have errors of 1e-9.
-/// Other forces use kBeside at least, and up to kFar if nearer positions are regularized.
+/// Distance of the nearest positions with forces, in these units: smooth forces err by 1e-9. Other
+/// forces use kBeside at least, and up to kFar if nearer positions are regularized.
 constexpr double kNear = 8e-3, kFar = 4e-2;
 /// Share of the force, or of applied forces if more, by which interpolations with all and with
 /// fewer pairs differ at most if it is smooth.

@@ -276,13 +276,13 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();
   accepted_t_ = t;
-  const bool releases_others = state_.AcceptReleased();
+  state_.AcceptReleased();
   const bool changed_solver = solver_->Review(kinematics);
   if (changed_solver) state_.ForgetFactors();
   if (drives_ != nullptr && IsOffBranch()) drives_->LeaveBranch();
   const bool changed = changed_solver || accepted == Accepted::kModeChanged;
   if (changed) ++mode_changes_;
-  if ((changed || releases_others) && compiled_ != nullptr) compiled_->ModeChanged();
+  if (compiled_ != nullptr) compiled_->StepAccepted();
   step_end_version_ = kinematics.position_version();
   if (!changed && accepted != Accepted::kProjected) return false;
   ToState(q(), u(), y);

@@ -42,7 +42,7 @@ TEST(BenchmarkSet, IsReadWithMembersKindsAndColumns) {
 }
 
 TEST(BenchmarkSet, TakesMembersIntoSpaceAndSimplifiesThem) {
-  const BenchmarkSet set = ReadBenchmarks(kConfigs / "benchmarks/compile.json");
+  const BenchmarkSet set = ReadBenchmarks(kConfigs / "benchmarks/simplifications.json");
   std::map<std::string, MechanismDescription> members;
   for (const BenchmarkGroup& group : set.groups) {
     for (const BenchmarkMember& member : group.members) members[member.name] = member.Make();

@@ -1,7 +1,5 @@
 // Trajectories against closed forms and published numbers, and reactions against statics.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <iostream>
@@ -54,8 +52,8 @@ Written WriteTrajectory(const MechanismFile& mechanism, const Method& method,
   one.integrator = integrator;
   one.step = step;
   Written written;
-  written.path = std::filesystem::path(testing::TempDir()) /
-                 fmt::format("loopbench-trajectory-{}.csv", ::getpid());
+  static const TemporaryFolder folder("loopbench-trajectory-test");
+  written.path = folder.path() / "motion.csv";
   written.record = RunCase(experiment, one, nullptr, written.path);
   EXPECT_EQ(written.record.Text("outcome"), "finished") << written.record.Text("message");
   written.rows = ReadTrajectory(written.path);

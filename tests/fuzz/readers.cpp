@@ -88,7 +88,7 @@ void CallReader(std::string_view kind, std::string_view bytes) {
         [bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
   } else if (kind == "claim") {
     Call<ConfigError>([bytes] { harness::ParseClaims(bytes, "claims.json"); });
-  } else if (kind == "robustness") {
+  } else if (kind == "map") {
     Call<ConfigError>([bytes] { harness::ParseMapRules(bytes, "map.json"); });
   } else if (kind == "benchmark") {
     Call<ConfigError>([bytes] { harness::ParseBenchmarks(bytes, "configs/benchmarks/fuzz.json"); });

@@ -14,8 +14,8 @@ namespace loopbench::fuzz {
 /// Benchmark's JSON, a line of a store, and a store (baselines are stores). Files of other programs
 /// are XML to import, the loops beside it, published series, and trajectories.
 inline constexpr std::array<std::string_view, 12> kKinds = {
-    "mechanism", "experiment", "claim",  "robustness", "benchmark", "measurement",
-    "record",    "store",      "import", "sidecar",    "series",    "trajectory"};
+    "mechanism", "experiment", "claim",  "map",     "benchmark", "measurement",
+    "record",    "store",      "import", "sidecar", "series",    "trajectory"};
 
 /// Throws std::logic_error when a message is not fit to be shown, and for an unknown kind.
 void CallReader(std::string_view kind, std::string_view bytes);

@@ -86,10 +86,10 @@ class BenchIn final : public TrialBench {
     IntegratorResult fastest;
     for (int i = 0; i < kMaxDisturbed; ++i) {
       const double before = CalibrationNs();
-      const IntegratorResult one = Run(choice, cpu_s, nullptr);
+      const IntegratorResult result = Run(choice, cpu_s, nullptr);
       const double slower = std::max(before, CalibrationNs());
-      if (i == 0 || one.wall_s < fastest.wall_s) fastest = one;
-      if (one.outcome != Outcome::kFinished || one.wall_s > kLongTrial_s ||
+      if (i == 0 || result.wall_s < fastest.wall_s) fastest = result;
+      if (result.outcome != Outcome::kFinished || result.wall_s > kLongTrial_s ||
           slower < kOtherSpeed * CalibrationBaselineNs()) {
         break;
       }
@@ -99,12 +99,12 @@ class BenchIn final : public TrialBench {
 
   IntegratorResult Run(const Choice& choice, double cpu_s, ErrorMeter* meter) {
     Coordinated& in = choice.method.coordinates == Coordinates::kJoint ? joint_ : absolute_;
-    Case one;
-    one.method = choice.method;
-    one.integrator = choice.integrator;
-    one.rtol = one.atol = choice.rtol;
-    one.limits.cpu_s = cpu_s;
-    IntegratorOptions options = OptionsOf(one, in.mechanism.stop_times());
+    Case entry;
+    entry.method = choice.method;
+    entry.integrator = choice.integrator;
+    entry.rtol = entry.atol = choice.rtol;
+    entry.limits.cpu_s = cpu_s;
+    IntegratorOptions options = OptionsOf(entry, in.mechanism.stop_times());
     options.fixed_step = choice.step;
     const auto system = MakeFormulation<Space>(choice.method, in.mechanism);
     IntegratorResult result;

@@ -58,8 +58,8 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
   }
   if (structure.rounding > 0.0) {
     std::string joints;
-    for (const RedundantDirection& one : structure.redundant) {
-      const std::string& name = description.joints[one.joint].name;
+    for (const RedundantDirection& redundant : structure.redundant) {
+      const std::string& name = description.joints[redundant.joint].name;
       if (joints.find('"' + name + '"') != std::string::npos) continue;
       joints += (joints.empty() ? "\"" : ", \"") + name + '"';
     }

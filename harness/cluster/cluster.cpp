@@ -190,8 +190,8 @@ void CountCases(ClusterRun* run) {
     run->cases.assign(parts, 0.0);
     std::set<std::string> ids;  // a case of two files counts once
     for (const Experiment& experiment : workload.some()) {
-      for (const Case& one : SelectCases(experiment, files.filter)) {
-        if (!ids.insert(RunId(Identified(experiment, one).keys)).second) continue;
+      for (const Case& entry : SelectCases(experiment, files.filter)) {
+        if (!ids.insert(RunId(Identified(experiment, entry).keys)).second) continue;
         run->cases[all++ % parts] += 1.0;
       }
     }

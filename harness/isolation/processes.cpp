@@ -466,19 +466,19 @@ std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
   std::vector<TaskResult> results;
   std::size_t at = 0;
   for (const std::size_t task : tasks) {
-    TaskResult one = {.task = task, .result = {}};
+    TaskResult result = {.task = task, .result = {}};
     std::size_t length = 0;
     int head = 0;
     const std::string begin = at < text.size() ? text.substr(at, kLongestHead) : "";
-    if (std::sscanf(begin.c_str(), "%zu %lf %lf%n", &length, &one.result.cpu_s, &one.result.wall_s,
-                    &head) != 3) {
+    if (std::sscanf(begin.c_str(), "%zu %lf %lf%n", &length, &result.result.cpu_s,
+                    &result.result.wall_s, &head) != 3) {
       return {};
     }
     at += static_cast<std::size_t>(head) + 1;
     if (at > text.size() || length > text.size() - at) return {};
-    one.result.text = text.substr(at, length);
+    result.result.text = text.substr(at, length);
     at += length;
-    results.push_back(std::move(one));
+    results.push_back(std::move(result));
   }
   return at == text.size() ? results : std::vector<TaskResult>();
 }

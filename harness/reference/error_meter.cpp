@@ -45,10 +45,10 @@ void ErrorMeter::Write(Record& record) const {
   // time shift is undefined if nearly everything is at rest
   constexpr double kMoves = 0.01;
   double late = 0.0, shape = 0.0;
-  for (const Distance& one : distances_) {
-    const bool moves = one.speed > kMoves * largest.speed;
-    if (moves) late = std::max(late, std::abs(one.late));
-    shape = std::max(shape, moves ? one.shape : one.position);
+  for (const Distance& distance : distances_) {
+    const bool moves = distance.speed > kMoves * largest.speed;
+    if (moves) late = std::max(late, std::abs(distance.late));
+    shape = std::max(shape, moves ? distance.shape : distance.position);
   }
   if (times_[at_.back()] == reference_.times.back()) {
     record.Set("error_position_end", error.back());

@@ -330,20 +330,20 @@ struct Known {
 };
 
 Known ReadOne(const fs::path& file) {
-  Known one{file, ReadFile(file), {}};
-  std::string line = one.text;
+  Known known{file, ReadFile(file), {}};
+  std::string line = known.text;
   while (line.ends_with('\n')) line.pop_back();
   try {
-    one.record = FromJsonLine(line);
+    known.record = FromJsonLine(line);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
   }
-  const std::string id = one.record.Text("reference");
+  const std::string id = known.record.Text("reference");
   if (id.empty() || id != file.stem().string()) {
     throw std::runtime_error(fmt::format("{}: found reference \"{}\", expected \"{}\"",
                                          file.string(), id, file.stem().string()));
   }
-  return one;
+  return known;
 }
 
 /// Returns the record as a line, without keys that may differ between computations.
@@ -366,15 +366,15 @@ double CertifiedTo(const Record& record) {
   return largest;
 }
 
-bool IsFiner(const Record& one, const Record& other) {
-  const double until = one.Number("reference_valid_until"),
+bool IsFiner(const Record& record, const Record& other) {
+  const double until = record.Number("reference_valid_until"),
                others = other.Number("reference_valid_until");
-  return until != others ? until > others : CertifiedTo(one) < CertifiedTo(other);
+  return until != others ? until > others : CertifiedTo(record) < CertifiedTo(other);
 }
 
-std::string Shown(const Known& one) {
-  return fmt::format("{} (until {} s, to {:.1e} m)", one.file.string(),
-                     one.record.Text("reference_valid_until"), CertifiedTo(one.record));
+std::string Shown(const Known& known) {
+  return fmt::format("{} (until {} s, to {:.1e} m)", known.file.string(),
+                     known.record.Text("reference_valid_until"), CertifiedTo(known.record));
 }
 
 }  // namespace

@@ -73,9 +73,9 @@ Record CommonContent(const Experiment& experiment) {
   return content;
 }
 
-Record ProblemContent(const Experiment& experiment, const Case& one) {
+Record ProblemContent(const Experiment& experiment, const Case& entry) {
   Record content = CommonContent(experiment);
-  content.Set("document", experiment.problems[one.problem].mechanism.canonical);
+  content.Set("document", experiment.problems[entry.problem].mechanism.canonical);
   return content;
 }
 
@@ -87,17 +87,17 @@ void SetCaseId(Record* keys, const std::string& content) {
   keys->Set("config_hash", content.substr(0, kDigits));
 }
 
-std::string AccuracyContent(const Experiment& experiment, const Case& one) {
-  Record content = ProblemContent(experiment, one);
-  content.Set("ensemble", std::int64_t{one.ensemble});
-  content.Set("seed", static_cast<std::int64_t>(one.seed));
-  content.Set("perturb", one.perturb);
-  for (const DrawnCoordinate& drawn : one.between) {
+std::string AccuracyContent(const Experiment& experiment, const Case& entry) {
+  Record content = ProblemContent(experiment, entry);
+  content.Set("ensemble", std::int64_t{entry.ensemble});
+  content.Set("seed", static_cast<std::int64_t>(entry.seed));
+  content.Set("perturb", entry.perturb);
+  for (const DrawnCoordinate& drawn : entry.between) {
     content.Set("between." + drawn.joint, std::vector<double>{drawn.from, drawn.to});
   }
-  content.Set("branch_bound", one.branch_bound);
+  content.Set("branch_bound", entry.branch_bound);
   content.Set("series_points", std::int64_t{experiment.series_points});
-  if (const auto& series = experiment.problems[one.problem].series) {
+  if (const auto& series = experiment.problems[entry.problem].series) {
     content.Set("reference_series", series->canonical);
   }
   if (experiment.reference) {
@@ -110,13 +110,13 @@ std::string AccuracyContent(const Experiment& experiment, const Case& one) {
   return CaseId(content);
 }
 
-Case Identified(const Experiment& experiment, Case one) {
-  SetCaseId(&one.keys, AccuracyContent(experiment, one));
-  return one;
+Case Identified(const Experiment& experiment, Case entry) {
+  SetCaseId(&entry.keys, AccuracyContent(experiment, entry));
+  return entry;
 }
 
-std::string ProblemTimingContent(const Experiment& experiment, const Case& one) {
-  Record content = ProblemContent(experiment, one);
+std::string ProblemTimingContent(const Experiment& experiment, const Case& entry) {
+  Record content = ProblemContent(experiment, entry);
   content.Set("repeats", std::int64_t{experiment.timing.repeats});
   return CaseId(content);
 }
@@ -127,8 +127,9 @@ std::string FamilyTimingContent(const Experiment& experiment) {
   return CaseId(content);
 }
 
-std::string LadderContent(const Experiment& experiment, const Case& one, const std::string& rungs) {
-  Record content = ProblemContent(experiment, one);
+std::string LadderContent(const Experiment& experiment, const Case& entry,
+                          const std::string& rungs) {
+  Record content = ProblemContent(experiment, entry);
   content.Set("rungs", rungs);
   return CaseId(content);
 }

@@ -40,18 +40,19 @@ std::string ToString(const CompileOptions& options);
 void SetCaseId(Record* keys, const std::string& content);
 
 /// The accuracy case with its id.
-Case Identified(const Experiment& experiment, Case one);
+Case Identified(const Experiment& experiment, Case entry);
 
 /// Returns the content of an accuracy case.
-std::string AccuracyContent(const Experiment& experiment, const Case& one);
+std::string AccuracyContent(const Experiment& experiment, const Case& entry);
 
 /// Returns the content of timings of a problem, or of a family member, which its keys fully define.
-std::string ProblemTimingContent(const Experiment& experiment, const Case& one);
+std::string ProblemTimingContent(const Experiment& experiment, const Case& entry);
 std::string FamilyTimingContent(const Experiment& experiment);
 
 /// Returns the content of all levels of a precision study. `rungs` names them all: the verdict on
 /// one depends on the others.
-std::string LadderContent(const Experiment& experiment, const Case& one, const std::string& rungs);
+std::string LadderContent(const Experiment& experiment, const Case& entry,
+                          const std::string& rungs);
 
 /// "id" of a record: its case and this very program.
 std::string RunId(const Record& record);

@@ -141,10 +141,10 @@ bool IsHeld(const MechanismDescription& description, int joint) {
   return std::ranges::find(description.initial.held, joint) != description.initial.held.end();
 }
 
-MechanismDescription Drawn(MechanismDescription description, const Case& one, int member) {
-  std::seed_seq sequence{one.seed, static_cast<std::uint64_t>(member)};
+MechanismDescription Drawn(MechanismDescription description, const Case& entry, int member) {
+  std::seed_seq sequence{entry.seed, static_cast<std::uint64_t>(member)};
   std::mt19937_64 generator(sequence);
-  for (const DrawnCoordinate& drawn : one.between) {
+  for (const DrawnCoordinate& drawn : entry.between) {
     // 53 random bits: the same number with every standard library
     const double unit = static_cast<double>(generator() >> 11) * 0x1p-53;
     for (JointValues& values : description.initial.coordinates) {
@@ -218,11 +218,11 @@ std::string StartText(const MechanismDescription& description) {
 
 }  // namespace
 
-MechanismDescription MemberStart(const MechanismDescription& description, const Case& one,
+MechanismDescription MemberStart(const MechanismDescription& description, const Case& entry,
                                  int member) {
-  const MechanismDescription target = one.between.empty()
-                                          ? Perturb(description, one.perturb, one.seed, member)
-                                          : Drawn(description, one, member);
+  const MechanismDescription target = entry.between.empty()
+                                          ? Perturb(description, entry.perturb, entry.seed, member)
+                                          : Drawn(description, entry, member);
   double way = 0.0;
   for (std::size_t j = 0; j < description.initial.coordinates.size(); ++j) {
     const JointValues& from = description.initial.coordinates[j];

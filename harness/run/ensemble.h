@@ -42,7 +42,7 @@ Run MergeParts(std::span<const Run> parts);
 /// Shorter paths take one step, with the description's own guesses. If a step cannot be closed, the
 /// member has the drawn coordinates and those guesses; its run ends as inconsistent-start if they
 /// fail.
-MechanismDescription MemberStart(const MechanismDescription& description, const Case& one,
+MechanismDescription MemberStart(const MechanismDescription& description, const Case& entry,
                                  int member);
 
 /// Statistics of the members, without the unperturbed run.

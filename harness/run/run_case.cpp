@@ -73,9 +73,9 @@ namespace {
 
 /// Runs the members of a case's ensemble and hands them over in their order, with their starts.
 template <class Keep>
-void ForEachMember(const Experiment& experiment, const Case& one, int threads, const Keep& keep) {
+void ForEachMember(const Experiment& experiment, const Case& entry, int threads, const Keep& keep) {
   constexpr int kHeld = 1024;  // at most, of which runs wait to be handed over
-  const int members = one.ensemble > 1 ? one.ensemble : 0;
+  const int members = entry.ensemble > 1 ? entry.ensemble : 0;
   struct Member {
     MechanismDescription start;
     Run run;
@@ -86,8 +86,8 @@ void ForEachMember(const Experiment& experiment, const Case& one, int threads, c
     const auto run_member = [&](int i, SideBySide& beside) {
       Member& member = held[static_cast<std::size_t>(i)];
       member.start =
-          MemberStart(experiment.problems[one.problem].mechanism.description, one, first + i);
-      member.run = RunOnce(experiment, one, member.start, &beside);
+          MemberStart(experiment.problems[entry.problem].mechanism.description, entry, first + i);
+      member.run = RunOnce(experiment, entry, member.start, &beside);
     };
     RunSideBySide(static_cast<int>(held.size()), threads, run_member);
     for (int i = 0; i < static_cast<int>(held.size()); ++i) {
@@ -102,12 +102,12 @@ void ForEachMember(const Experiment& experiment, const Case& one, int threads, c
 }
 
 /// Returns the reference for the case's errors, and writes its certified error to the record.
-ErrorReference WriteCertificateOf(const ExperimentProblem& problem, const Case& one,
+ErrorReference WriteCertificateOf(const ExperimentProblem& problem, const Case& entry,
                                   const Reference* reference, Record& record) {
   ErrorReference held;
   if (problem.series) {
-    WriteCertificate(problem.mechanism.description, *problem.series, one.horizon, record);
-    if (problem.series->NumWithin(one.horizon) > 0) held.series = &*problem.series;
+    WriteCertificate(problem.mechanism.description, *problem.series, entry.horizon, record);
+    if (problem.series->NumWithin(entry.horizon) > 0) held.series = &*problem.series;
   } else if (reference != nullptr) {
     WriteCertificate(*reference, record);
     if (reference->NumTrusted() > 0) held.reference = reference;
@@ -119,11 +119,11 @@ bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Out
 
 /// The largest difference of final poses from a run at a tenth of the tolerance; infinite where
 /// that run does not finish.
-void WriteRefinement(const Experiment& experiment, Case one, Record& record) {
-  one.rtol /= 10.0;
-  one.atol /= 10.0;
+void WriteRefinement(const Experiment& experiment, Case entry, Record& record) {
+  entry.rtol /= 10.0;
+  entry.atol /= 10.0;
   const Run finer =
-      RunOnce(experiment, one, experiment.problems[one.problem].mechanism.description, nullptr);
+      RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description, nullptr);
   record.Set("refinement_difference", HasFinished(finer.record)
                                           ? DifferenceOf(record, finer.record).largest
                                           : std::numeric_limits<double>::infinity());
@@ -131,48 +131,48 @@ void WriteRefinement(const Experiment& experiment, Case one, Record& record) {
 
 }  // namespace
 
-IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times) {
+IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times) {
   IntegratorOptions options;
-  options.profile = one.integrator;
-  options.fixed_step = one.step;
-  const bool is_fixed = one.step > 0.0;
-  options.rtol = is_fixed ? kToleranceOfFixedSteps : one.rtol;
-  options.atol = is_fixed ? kToleranceOfFixedSteps : one.atol;
-  options.step_limit = one.limits.steps;
-  options.time_limit_s = one.limits.cpu_s;
+  options.profile = entry.integrator;
+  options.fixed_step = entry.step;
+  const bool is_fixed = entry.step > 0.0;
+  options.rtol = is_fixed ? kToleranceOfFixedSteps : entry.rtol;
+  options.atol = is_fixed ? kToleranceOfFixedSteps : entry.atol;
+  options.step_limit = entry.limits.steps;
+  options.time_limit_s = entry.limits.cpu_s;
   options.stop_times = stop_times;
   return options;
 }
 
-Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference,
+Record RunCase(const Experiment& experiment, const Case& entry, const Reference* reference,
                const std::filesystem::path& trajectory, int threads) {
-  const ExperimentProblem& problem = experiment.problems[one.problem];
-  Record record = one.keys;
+  const ExperimentProblem& problem = experiment.problems[entry.problem];
+  Record record = entry.keys;
   record.Set("problem_id", Fnv1a(problem.mechanism.canonical));
   const double link = LinkLength(problem.mechanism.description);
   record.Set("link_length", link);
   record.Set("position_goal",
              4 * std::numeric_limits<double>::epsilon() * link *
                  static_cast<double>(problem.mechanism.description.bodies.size() - 1));
-  const ErrorReference held = WriteCertificateOf(problem, one, reference, record);
+  const ErrorReference held = WriteCertificateOf(problem, entry, reference, record);
   std::optional<TrajectoryTask> task;
   if (experiment.output && !trajectory.empty()) {
     task.emplace(*experiment.output, trajectory,
-                 fmt::format("{} {} {} {}", one.mechanism, ToString(one.method), one.integrator,
-                             SettingOf(one)));
+                 fmt::format("{} {} {} {}", entry.mechanism, ToString(entry.method),
+                             entry.integrator, SettingOf(entry)));
   }
-  Run nominal = RunOnce(experiment, one, problem.mechanism.description, nullptr, held,
+  Run nominal = RunOnce(experiment, entry, problem.mechanism.description, nullptr, held,
                         task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
-  if (experiment.refine && one.rtol > 0.0 && !IsPeer(record) && HasFinished(record)) {
-    WriteRefinement(experiment, one, record);
+  if (experiment.refine && entry.rtol > 0.0 && !IsPeer(record) && HasFinished(record)) {
+    WriteRefinement(experiment, entry, record);
   }
 
   std::vector<DriftSeries> runs;
-  EnsembleTally tally(nominal, one.branch_bound);
+  EnsembleTally tally(nominal, entry.branch_bound);
   int failed = 0;
-  ForEachMember(experiment, one, threads, [&](Run run, const MechanismDescription& start) {
+  ForEachMember(experiment, entry, threads, [&](Run run, const MechanismDescription& start) {
     tally.Add(run, start);
     if (!HasFinished(run.record)) {
       ++failed;
@@ -180,19 +180,19 @@ Record RunCase(const Experiment& experiment, const Case& one, const Reference* r
       runs.push_back(std::move(run.drift));
     }
   });
-  if (one.ensemble <= 1) runs.push_back(nominal.drift);
+  if (entry.ensemble <= 1) runs.push_back(nominal.drift);
   std::erase_if(runs, [](const DriftSeries& run) { return run.t.empty(); });
   if (!runs.empty()) {
     const double length = problem.mechanism.observe.length;
     GrowthOptions options;
     // the bound for round-off holds for some ten lengths of path; paths grow with the horizon
-    options.round_off *= std::max(1.0, one.horizon / 10.0);
-    WriteGrowth(AnalyseGrowth(runs, one.horizon, length, options), failed, record);
+    options.round_off *= std::max(1.0, entry.horizon / 10.0);
+    WriteGrowth(AnalyseGrowth(runs, entry.horizon, length, options), failed, record);
   }
-  WriteExponent("energy_growth_exponent", nominal.energy, one.horizon, nominal.kinetic, record);
-  WriteExponent("correction_growth_exponent", nominal.correction, one.horizon,
+  WriteExponent("energy_growth_exponent", nominal.energy, entry.horizon, nominal.kinetic, record);
+  WriteExponent("correction_growth_exponent", nominal.correction, entry.horizon,
                 problem.mechanism.observe.length, record);
-  if (one.ensemble > 1) tally.Write(record);
+  if (entry.ensemble > 1) tally.Write(record);
   const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
   record.Set("series.drift_t", envelope.t);
   record.Set("series.drift", envelope.value);
@@ -214,21 +214,21 @@ class Runner {
  public:
   /// Runs part `part` of `user`, simplified to `problem`. A member of an ensemble has other runs
   /// `beside` it and fewer observers.
-  Runner(const Experiment& experiment, const Case& one, const MechanismDescription& user,
+  Runner(const Experiment& experiment, const Case& entry, const MechanismDescription& user,
          const SimplifiedProblem& problem, int part, SideBySide* beside, const ErrorReference& held,
          const TrajectoryTask* trajectory)
-      : case_(one),
+      : case_(entry),
         user_(user),
         compiled_(problem.compiled),
         part_(part),
         problem_(problem.observe),
         description_(problem.compiled.parts[static_cast<std::size_t>(part)].description),
-        mechanism_(description_, one.method.coordinates),
+        mechanism_(description_, entry.method.coordinates),
         stops_(mechanism_.stop_times()),
         beside_(beside) {
     const Measured measured{user_, compiled_};
     if (held.series != nullptr) {
-      errors_ = std::make_unique<SeriesMeter>(measured, part, *held.series, one.horizon);
+      errors_ = std::make_unique<SeriesMeter>(measured, part, *held.series, entry.horizon);
     } else if (held.reference != nullptr) {
       errors_ = std::make_unique<ErrorMeter>(measured, part, *held.reference);
     }
@@ -432,14 +432,15 @@ class Runner {
 
 }  // namespace
 
-Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            SideBySide* beside, const ErrorReference& held, const TrajectoryTask* trajectory) {
-  const ObservedQuantities& observe = experiment.problems[one.problem].mechanism.observe;
+Run RunOnce(const Experiment& experiment, const Case& entry,
+            const MechanismDescription& description, SideBySide* beside, const ErrorReference& held,
+            const TrajectoryTask* trajectory) {
+  const ObservedQuantities& observe = experiment.problems[entry.problem].mechanism.observe;
   const SimplifiedProblem problem = SimplifyProblem(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(problem.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, one, description, problem, part, beside, held, trajectory)
+      return Runner<Space>(experiment, entry, description, problem, part, beside, held, trajectory)
           .Execute();
     };
     const auto& own = problem.compiled.parts[static_cast<std::size_t>(part)].description;

@@ -88,7 +88,7 @@ void GiveExecution(const Method& method, const MechanismDescription& description
 }
 
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.
-IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_times);
+IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times);
 
 /// Runs the case and, if requested, its ensemble of perturbed starts. The record holds the keys,
 /// the outcome and all measured values of the unperturbed run. Growth is analysed over the ensemble
@@ -104,8 +104,9 @@ IntegratorOptions OptionsOf(const Case& one, const std::vector<double>& stop_tim
 /// change their bits.
 ///
 /// Numerical failures are stored in the record; only misuse throws.
-Record RunCase(const Experiment& experiment, const Case& one, const Reference* reference = nullptr,
-               const std::filesystem::path& trajectory = {}, int threads = 1);
+Record RunCase(const Experiment& experiment, const Case& entry,
+               const Reference* reference = nullptr, const std::filesystem::path& trajectory = {},
+               int threads = 1);
 
 // One motion of a case: start, integration, observers, and their records.
 
@@ -118,8 +119,8 @@ struct ErrorReference {
 /// `description` is the case's or the start of an ensemble member. Members have other runs `beside`
 /// them and fewer observers; `beside` is null for the case itself. Parts connected through ground
 /// alone run one after another.
-Run RunOnce(const Experiment& experiment, const Case& one, const MechanismDescription& description,
-            SideBySide* beside, const ErrorReference& held = {},
-            const TrajectoryTask* trajectory = nullptr);
+Run RunOnce(const Experiment& experiment, const Case& entry,
+            const MechanismDescription& description, SideBySide* beside,
+            const ErrorReference& held = {}, const TrajectoryTask* trajectory = nullptr);
 
 }  // namespace loopbench::harness

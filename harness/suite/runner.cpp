@@ -89,8 +89,8 @@ double Progress::SecondsToGo() const {
   }
   const double factor = foreseen_s_ > 0.0 ? taken_s_ / foreseen_s_ : 1.0;
   double left = factor * waiting_s_;
-  for (const Running& one : running_) {
-    left += std::max(0.0, factor * pieces_[one.piece].estimate_s - SecondsSince(one.begin));
+  for (const Running& running : running_) {
+    left += std::max(0.0, factor * pieces_[running.piece].estimate_s - SecondsSince(running.begin));
   }
   return left / std::min<double>(jobs_, static_cast<double>(pieces_.size() - done_));
 }
@@ -115,7 +115,7 @@ void Progress::Draw() {
 namespace {
 
 /// Returns the expected cost: expensive cases run first, so that none runs alone at the end.
-double CostOf(const Case& one) { return one.ensemble * ExpectedSteps(one); }
+double CostOf(const Case& entry) { return entry.ensemble * ExpectedSteps(entry); }
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
 
@@ -125,48 +125,50 @@ ProcessLimits LimitsOfRuns(const Limits& limits, double runs) {
   return {.cpu_s = kPatience * runs * limits.cpu_s + kGrace_s, .memory_mb = limits.memory_mb};
 }
 
-Piece AccuracyPiece(const Experiment& experiment, const Case& one,
+Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
                     const std::filesystem::path& store) {
-  const int runs = one.ensemble > 1 ? one.ensemble + 1 : 1;
+  const int runs = entry.ensemble > 1 ? entry.ensemble + 1 : 1;
   std::filesystem::path trajectory;
-  if (experiment.output) trajectory = TrajectoryPath(store, RunId(one.keys));
-  const auto work = [&experiment, one, store, trajectory](int threads) {
-    const std::optional<Reference> reference = FindReference(experiment, one, store);
+  if (experiment.output) trajectory = TrajectoryPath(store, RunId(entry.keys));
+  const auto work = [&experiment, entry, store, trajectory](int threads) {
+    const std::optional<Reference> reference = FindReference(experiment, entry, store);
     Record record =
-        RunCase(experiment, one, reference ? &*reference : nullptr, trajectory, threads);
+        RunCase(experiment, entry, reference ? &*reference : nullptr, trajectory, threads);
     if (reference && !reference->snapshots.empty()) {
-      record.Set("reference_file", ReferenceOf(experiment, one, store).id);
+      record.Set("reference_file", ReferenceOf(experiment, entry, store).id);
     }
     return std::vector<Record>{std::move(record)};
   };
-  ProcessLimits limits = LimitsOfRuns(one.limits, runs * one.method.threads);
-  return {.owed = {one.keys},
-          .work = work,
-          .limits = limits,
-          .label = fmt::format("{} {} {}", one.mechanism, ToString(one.method), SettingOf(one)),
-          .cost = CostOf(one),
-          .trajectory = trajectory};
+  ProcessLimits limits = LimitsOfRuns(entry.limits, runs * entry.method.threads);
+  return {
+      .owed = {entry.keys},
+      .work = work,
+      .limits = limits,
+      .label = fmt::format("{} {} {}", entry.mechanism, ToString(entry.method), SettingOf(entry)),
+      .cost = CostOf(entry),
+      .trajectory = trajectory};
 }
 
-Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one) {
+Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& reference) {
   Limits limits = experiment.limits;
   if (experiment.reference) limits.cpu_s = experiment.reference->cpu_s;
   constexpr double kWitnesses = 3.0;
-  return {.owed = {one.keys},
-          .work = [&experiment, one](int) { return std::vector<Record>{MakeOne(experiment, one)}; },
+  return {.owed = {reference.keys},
+          .work = [&experiment,
+                   reference](int) { return std::vector<Record>{MakeOne(experiment, reference)}; },
           .limits = LimitsOfRuns(limits, kWitnesses),
-          .label = fmt::format("{} {} s", one.keys.Text("mechanism"), one.horizon),
-          .cost = one.horizon,
-          .product = one.file};
+          .label = fmt::format("{} {} s", reference.keys.Text("mechanism"), reference.horizon),
+          .cost = reference.horizon,
+          .product = reference.file};
 }
 
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   Piece piece;
-  for (const Case& one : group.cases) piece.owed.push_back(one.keys);
+  for (const Case& entry : group.cases) piece.owed.push_back(entry.keys);
   // the first method is timed twice (noise.h)
   const int methods = static_cast<int>(group.cases.size()) + 1;
   int threads = 1;
-  for (const Case& one : group.cases) threads = std::max(threads, one.method.threads);
+  for (const Case& entry : group.cases) threads = std::max(threads, entry.method.threads);
   const int runs = methods * (experiment.timing.repeats + 1) * threads;
   // right-hand sides have no limit; a minute per method is ample
   constexpr double kDerivatives_s = 60.0;
@@ -310,7 +312,7 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
       }
     }
     store_.Append(records);
-    for (const TaskResult& one : ended) progress.Done(one.task);
+    for (const TaskResult& result : ended) progress.Done(result.task);
   };
   const auto started = [&](std::size_t i) { progress.Start(i); };
   const auto waited = [&] { progress.Look(); };

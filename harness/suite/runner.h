@@ -80,9 +80,9 @@ struct Piece {
 /// Pieces of an experiment, which must outlive them.
 /// @param one    case with its id
 /// @param store  the store file; references lie in its folder
-Piece AccuracyPiece(const Experiment& experiment, const Case& one,
+Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
                     const std::filesystem::path& store);
-Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& one);
+Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& reference);
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group);
 Piece LadderPiece(const Experiment& experiment, const LadderGroup& group);
 

@@ -74,13 +74,14 @@ class Group {
     KeepMechanisms(experiments_, store_.file());
     std::vector<Piece> references;
     for (std::size_t e = 0; e < experiments_.size(); ++e) {
-      for (const Case& one : SelectCases(experiments_[e], options_.filter)) {
+      for (const Case& entry : SelectCases(experiments_[e], options_.filter)) {
         Piece piece =
-            AccuracyPiece(experiments_[e], Identified(experiments_[e], one), store_.file());
-        const bool is_taken = Add(e, std::move(piece),
-                                  [e, one](Estimate& estimate) { return estimate.OfCase(e, one); });
-        if (!is_taken || !HasReference(experiments_[e], one)) continue;
-        const ReferenceCase reference = ReferenceOf(experiments_[e], one, store_.file());
+            AccuracyPiece(experiments_[e], Identified(experiments_[e], entry), store_.file());
+        const bool is_taken = Add(e, std::move(piece), [e, entry](Estimate& estimate) {
+          return estimate.OfCase(e, entry);
+        });
+        if (!is_taken || !HasReference(experiments_[e], entry)) continue;
+        const ReferenceCase reference = ReferenceOf(experiments_[e], entry, store_.file());
         references.push_back(ReferencePiece(experiments_[e], reference));
         references.back().experiment = group_.numbers[e];
         references.back().seconds = [e, reference](Estimate& estimate) {
@@ -160,7 +161,7 @@ class Group {
 
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
   std::vector<Case> cases = Expand(experiment);
-  std::erase_if(cases, [&](const Case& one) { return !Matches(one.keys, filter); });
+  std::erase_if(cases, [&](const Case& entry) { return !Matches(entry.keys, filter); });
   if (cases.empty()) {
     throw ConfigError(
         fmt::format("{}: no case matches {}", experiment.path.string(), ToText(filter)));

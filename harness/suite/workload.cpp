@@ -50,8 +50,8 @@ std::string KeysWithoutParameters(const Experiment& experiment) {
   bare.parameters = Record();
   bare.exclusions.clear();
   std::string text;
-  for (const Case& one : Expand(bare))
-    text += fmt::format("{} {}\n", CaseId(one.keys), one.ensemble);
+  for (const Case& entry : Expand(bare))
+    text += fmt::format("{} {}\n", CaseId(entry.keys), entry.ensemble);
   return text;
 }
 
@@ -66,33 +66,34 @@ SplitSelection Split(const Selection& selection, const std::vector<Case>& cases,
                      const std::vector<std::pair<std::string, std::size_t>>& axes) {
   SplitSelection split;
   Selection others;
-  for (const Condition& one : selection) (IsOn(one, axes) ? split.on_axes : others).push_back(one);
-  for (const Case& one : cases) split.cases.push_back(Matches(one.keys, others));
+  for (const Condition& condition : selection)
+    (IsOn(condition, axes) ? split.on_axes : others).push_back(condition);
+  for (const Case& entry : cases) split.cases.push_back(Matches(entry.keys, others));
   return split;
 }
 
 }  // namespace
 
-std::size_t RunsOf(const Case& one) {
-  return one.ensemble > 1 ? static_cast<std::size_t>(one.ensemble) + 1 : 1;
+std::size_t RunsOf(const Case& entry) {
+  return entry.ensemble > 1 ? static_cast<std::size_t>(entry.ensemble) + 1 : 1;
 }
 
-void AddTo(std::vector<CaseLine>* lines, const Case& one, std::size_t times) {
-  const std::string method = ToString(one.method);
+void AddTo(std::vector<CaseLine>* lines, const Case& entry, std::size_t times) {
+  const std::string method = ToString(entry.method);
   auto line = std::ranges::find_if(*lines, [&](const CaseLine& known) {
-    return known.mechanism == one.mechanism && known.method == method;
+    return known.mechanism == entry.mechanism && known.method == method;
   });
-  if (line == lines->end()) line = lines->insert(line, {one.mechanism, method, 0, 0});
+  if (line == lines->end()) line = lines->insert(line, {entry.mechanism, method, 0, 0});
   line->cases += times;
-  line->runs += times * RunsOf(one);
+  line->runs += times * RunsOf(entry);
 }
 
 void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter) {
   if (filter.empty()) return;
   std::vector<std::string> known;
   for (const Experiment& experiment : experiments) {
-    for (const Case& one : Expand(experiment)) {
-      for (const auto& [key, value] : one.keys.items()) {
+    for (const Case& entry : Expand(experiment)) {
+      for (const auto& [key, value] : entry.keys.items()) {
         if (std::ranges::find(known, key) == known.end()) known.push_back(key);
       }
     }
@@ -111,26 +112,26 @@ void RequireKeys(const std::vector<Experiment>& experiments, const Selection& fi
 
 bool Passes(const Experiment& experiment, const Selection& filter) {
   return std::ranges::any_of(Expand(experiment),
-                             [&](const Case& one) { return Matches(one.keys, filter); });
+                             [&](const Case& entry) { return Matches(entry.keys, filter); });
 }
 
 LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
     : source_(std::move(source)), filter_(files.filter), threads_(files.threads) {
-  for (const Condition& one : filter_) {
-    if (IsOn(one, source_.axes())) on_axes_.push_back(one);
+  for (const Condition& condition : filter_) {
+    if (IsOn(condition, source_.axes())) on_axes_.push_back(condition);
   }
   const std::vector<std::size_t> sample = source_.EachValue(kEachValue);
   const Experiment first = source_.Read(0);
   const std::string keys = KeysWithoutParameters(first);
   std::size_t bodies = 1, cases = 1;
   for (const std::size_t combination : sample) {
-    const Experiment one = source_.Read(combination);
+    const Experiment experiment = source_.Read(combination);
     std::size_t all = 0;
-    cases = std::max(cases, Expand(one).size());
-    for (const ExperimentProblem& problem : one.problems)
+    cases = std::max(cases, Expand(experiment).size());
+    for (const ExperimentProblem& problem : experiment.problems)
       all += problem.mechanism.description.bodies.size();
     bodies = std::max(bodies, all);
-    are_alike_ = are_alike_ && KeysWithoutParameters(one) == keys;
+    are_alike_ = are_alike_ && KeysWithoutParameters(experiment) == keys;
   }
   if (count() > kMaxCases / cases) {
     throw ConfigError(
@@ -144,8 +145,9 @@ LongSweep::LongSweep(ExperimentSource source, const ExperimentFiles& files)
   source_.CheckExclusions(sample);
   const double step = static_cast<double>(count() - 1) / (kSome - 1);
   for (std::size_t k = 0; k < kSome; ++k) {
-    for (Experiment& one : ReadOne(static_cast<std::size_t>(step * static_cast<double>(k) + 0.5))) {
-      some_.push_back(std::move(one));
+    for (Experiment& experiment :
+         ReadOne(static_cast<std::size_t>(step * static_cast<double>(k) + 0.5))) {
+      some_.push_back(std::move(experiment));
     }
   }
   // a filter may select combinations between the samples
@@ -162,11 +164,11 @@ bool LongSweep::ParametersPass(std::size_t combination) const {
 
 std::vector<Experiment> LongSweep::ReadOne(std::size_t combination) {
   if (!ParametersPass(combination)) return {};
-  Experiment one = source_.Read(combination);
-  if (threads_ > 0) UseThreads(threads_, one);
-  if (!Passes(one, filter_)) return {};
+  Experiment experiment = source_.Read(combination);
+  if (threads_ > 0) UseThreads(threads_, experiment);
+  if (!Passes(experiment, filter_)) return {};
   std::vector<Experiment> passing;
-  passing.push_back(std::move(one));
+  passing.push_back(std::move(experiment));
   return passing;
 }
 
@@ -177,8 +179,8 @@ std::vector<Experiment> LongSweep::Read(std::size_t from, std::size_t to, const 
   for (std::size_t i = from; i < to; ++i) {
     const std::size_t combination = i * parts + static_cast<std::size_t>(shard.index - 1);
     if (combination >= count()) break;
-    for (Experiment& one : ReadOne(combination)) {
-      experiments.push_back(std::move(one));
+    for (Experiment& experiment : ReadOne(combination)) {
+      experiments.push_back(std::move(experiment));
       if (numbers != nullptr) numbers->push_back(static_cast<std::int64_t>(combination));
     }
   }
@@ -230,8 +232,8 @@ std::vector<CaseLine> LongSweep::CountCases() {
   }
   std::vector<CaseLine> lines;
   for (std::size_t i = 0; i < count(); ++i) {
-    for (const Experiment& one : ReadOne(i)) {
-      for (const Case& passing : SelectCases(one, filter_)) AddTo(&lines, passing);
+    for (const Experiment& experiment : ReadOne(i)) {
+      for (const Case& passing : SelectCases(experiment, filter_)) AddTo(&lines, passing);
     }
   }
   return lines;
@@ -241,8 +243,9 @@ namespace {
 /// Returns a text that identifies the sweep, from its source and its first and last combinations.
 std::string ContentOf(const LongSweep& sweep) {
   std::string text = sweep.source().Text();
-  for (const Experiment* one : {&sweep.some().front(), &sweep.some().back()}) {
-    for (const Case& each : Expand(*one)) text += Identified(*one, each).keys.Text("case_id");
+  for (const Experiment* experiment : {&sweep.some().front(), &sweep.some().back()}) {
+    for (const Case& each : Expand(*experiment))
+      text += Identified(*experiment, each).keys.Text("case_id");
   }
   return Fnv1a(text);
 }
@@ -254,7 +257,8 @@ std::vector<Experiment> ReadWhole(ExperimentSource source, const ExperimentFiles
     for (Experiment& experiment : experiments) UseThreads(files.threads, experiment);
   }
   RequireKeys(experiments, files.filter);
-  std::erase_if(experiments, [&](const Experiment& one) { return !Passes(one, files.filter); });
+  std::erase_if(experiments,
+                [&](const Experiment& experiment) { return !Passes(experiment, files.filter); });
   if (experiments.empty()) {
     throw ConfigError(
         fmt::format("{}: no case matches {}", source.path().string(), ToText(files.filter)));
@@ -271,8 +275,8 @@ Workload::Workload(const ExperimentFiles& files, const Shard& shard) : shard_(sh
   for (const auto& path : files.paths) {
     ExperimentSource source(path, files.settings);
     if (source.count() <= kLongSweep) {
-      for (Experiment& one : ReadWhole(std::move(source), files)) {
-        whole_.experiments.push_back(std::move(one));
+      for (Experiment& experiment : ReadWhole(std::move(source), files)) {
+        whole_.experiments.push_back(std::move(experiment));
         whole_.numbers.push_back(number++);
       }
       if (!first_) first_ = whole_.experiments.front();
@@ -329,11 +333,12 @@ Overview MakeOverview(const std::filesystem::path& path, const ExperimentFiles& 
   overview.combinations = overview.experiments.size();
   for (const auto& [name, value] : overview.experiments.front().parameters.items()) {
     std::set<std::string> values;
-    for (const Experiment& one : overview.experiments) values.insert(one.parameters.Text(name));
+    for (const Experiment& experiment : overview.experiments)
+      values.insert(experiment.parameters.Text(name));
     overview.axes.emplace_back(name, values.size());
   }
-  for (const Experiment& one : overview.experiments) {
-    for (const Case& each : SelectCases(one, files.filter)) AddTo(&overview.lines, each);
+  for (const Experiment& experiment : overview.experiments) {
+    for (const Case& each : SelectCases(experiment, files.filter)) AddTo(&overview.lines, each);
   }
   return overview;
 }

@@ -52,10 +52,10 @@ struct CaseLine {
 };
 
 /// Returns the number of runs of a case.
-std::size_t RunsOf(const Case& one);
+std::size_t RunsOf(const Case& entry);
 
 /// Adds a case `times` times to its line; lines are in the order of their first case.
-void AddTo(std::vector<CaseLine>* lines, const Case& one, std::size_t times = 1);
+void AddTo(std::vector<CaseLine>* lines, const Case& entry, std::size_t times = 1);
 
 /// Throws ConfigError for a condition on a key that no case has, since it would match nothing.
 void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter);

@@ -49,16 +49,16 @@ template <class Space>
 class SubjectIn final : public Subject {
  public:
   /// `description` must outlive the subject.
-  SubjectIn(const MechanismDescription& description, const Case& one, bool simulate)
-      : case_(one),
+  SubjectIn(const MechanismDescription& description, const Case& entry, bool simulate)
+      : case_(entry),
         simulate_(simulate),
         description_(description),
-        mechanism_(description, one.method.coordinates),
+        mechanism_(description, entry.method.coordinates),
         start_(Assemble<Space>(description, mechanism_)) {
     result_.outcome = start_.outcome;
     result_.message = start_.message;
     if (start_.outcome != Outcome::kFinished) return;
-    peer_ = TryPeer(one.method.formulation, description, &result_);
+    peer_ = TryPeer(entry.method.formulation, description, &result_);
   }
 
   void Prepare() override {
@@ -213,12 +213,12 @@ class SubjectIn final : public Subject {
   IntegratorResult result_;
 };
 
-std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, const Case& one,
+std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, const Case& entry,
                                      bool simulate) {
   if (description.space == SpaceKind::kPlanar) {
-    return std::make_unique<SubjectIn<Planar>>(description, one, simulate);
+    return std::make_unique<SubjectIn<Planar>>(description, entry, simulate);
   }
-  return std::make_unique<SubjectIn<Spatial>>(description, one, simulate);
+  return std::make_unique<SubjectIn<Spatial>>(description, entry, simulate);
 }
 
 /// Calibration values of the kept rounds, and the number of discarded rounds.
@@ -284,8 +284,8 @@ std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup
                                  int batches) {
   const MechanismDescription description = group.describe();
   std::vector<std::unique_ptr<Subject>> subjects;
-  for (const Case& one : group.cases) {
-    subjects.push_back(MakeSubject(description, one, group.simulate));
+  for (const Case& entry : group.cases) {
+    subjects.push_back(MakeSubject(description, entry, group.simulate));
   }
   // the A/A pair is first and last: maximum distance between two methods
   subjects.push_back(MakeSubject(description, group.cases.front(), group.simulate));
@@ -331,19 +331,19 @@ void SetTimingId(const std::string& content, Record* keys) {
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Selection& filter) {
   std::vector<TimingGroup> groups;
   // cases are ordered by problem and, within it, by horizon
-  for (const Case& one : ExpandTiming(experiment)) {
-    if (!Matches(one.keys, filter)) continue;
-    const bool is_next = groups.empty() || groups.back().cases.back().problem != one.problem ||
-                         groups.back().cases.back().horizon != one.horizon;
+  for (const Case& entry : ExpandTiming(experiment)) {
+    if (!Matches(entry.keys, filter)) continue;
+    const bool is_next = groups.empty() || groups.back().cases.back().problem != entry.problem ||
+                         groups.back().cases.back().horizon != entry.horizon;
     if (is_next) {
       groups.push_back(
-          {one.mechanism,
-           [&experiment, problem = one.problem] { return OneSystem(experiment, problem); },
+          {entry.mechanism,
+           [&experiment, problem = entry.problem] { return OneSystem(experiment, problem); },
            {},
            true});
     }
-    groups.back().cases.push_back(one);
-    SetTimingId(ProblemTimingContent(experiment, one), &groups.back().cases.back().keys);
+    groups.back().cases.push_back(entry);
+    SetTimingId(ProblemTimingContent(experiment, entry), &groups.back().cases.back().keys);
   }
   if (experiment.timing.repeats == 0) return groups;
   for (const TimingFamily& family : experiment.timing.families) {
@@ -353,17 +353,17 @@ std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Select
                         {},
                         false};
       for (const Method& method : family.methods) {
-        Case one;
-        one.mechanism = group.name;
-        one.method = method;
-        one.keys = CaseKeys(experiment, one);
+        Case entry;
+        entry.mechanism = group.name;
+        entry.method = method;
+        entry.keys = CaseKeys(experiment, entry);
         // a right-hand side has no tolerance and no horizon
         for (const char* key : {"integrator", "rtol", "atol", "horizon"}) {
-          one.keys.Set(key, Value());
+          entry.keys.Set(key, Value());
         }
-        if (!Matches(one.keys, filter)) continue;
-        SetTimingId(FamilyTimingContent(experiment), &one.keys);
-        group.cases.push_back(one);
+        if (!Matches(entry.keys, filter)) continue;
+        SetTimingId(FamilyTimingContent(experiment), &entry.keys);
+        group.cases.push_back(entry);
       }
       if (!group.cases.empty()) groups.push_back(std::move(group));
     }

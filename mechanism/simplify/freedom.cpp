@@ -206,7 +206,7 @@ MechanismDescription WithoutMotions(MechanismDescription description) {
     if (joint.motions.empty()) continue;
     for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
       std::erase_if(*list,
-                    [&](const JointValues& one) { return one.joint == static_cast<int>(j); });
+                    [&](const JointValues& values) { return values.joint == static_cast<int>(j); });
     }
     if (count == 1) {
       const double value = TimeFunction(joint.motions[0].value).At(0.0).value;

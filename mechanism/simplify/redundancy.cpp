@@ -146,22 +146,22 @@ Redundancy FindRedundancy(const MechanismDescription& description) {
 
 std::string NameOfDirection(const MechanismDescription& description, const Released& released,
                             int direction) {
-  const JointDescription& one = description.joints[released.joint];
+  const JointDescription& joint = description.joints[released.joint];
   const auto name = [&](const auto& kind, int rotations) -> std::string {
     const int component = kind.axes[kind.num_u + direction];
     const bool moment = component < rotations;
-    const JointTraits& traits = TraitsOf(one.type);
+    const JointTraits& traits = TraitsOf(joint.type);
     if (const std::string_view own = moment ? traits.moment : traits.force; !own.empty()) {
       return std::string(own);
     }
-    const std::string frame = " of its frame on " + description.bodies[one.from.body].name;
+    const std::string frame = " of its frame on " + description.bodies[joint.from.body].name;
     const char axis =
         moment ? (rotations == 1 ? 'z' : "xyz"[component]) : "xyz"[component - rotations];
     return std::string(moment ? "the moment about " : "the force along ") + axis + frame;
   };
   return description.space == SpaceKind::kPlanar
-             ? name(KindOf<Planar, double>(one.type), Planar::kRot)
-             : name(KindOf<Spatial, double>(one.type), Spatial::kRot);
+             ? name(KindOf<Planar, double>(joint.type), Planar::kRot)
+             : name(KindOf<Spatial, double>(joint.type), Spatial::kRot);
 }
 
 MechanismDescription Release(const MechanismDescription& description,

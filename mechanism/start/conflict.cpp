@@ -56,9 +56,8 @@ class Conflict {
           *std::ranges::find(found_, index, &OfJoint::joint));
     }
     double largest = 0.0;
-    for (const OfJoint& motion : found_) largest = std::max(largest, motion.scaled);
-    std::erase_if(found_,
-                  [&](const OfJoint& motion) { return motion.scaled < kSmallest * largest; });
+    for (const OfJoint& one : found_) largest = std::max(largest, one.scaled);
+    std::erase_if(found_, [&](const OfJoint& one) { return one.scaled < kSmallest * largest; });
     std::ranges::stable_sort(found_, [](const OfJoint& a, const OfJoint& b) {
       return a.rod != b.rod ? a.rod : a.scaled > b.scaled;
     });
@@ -85,13 +84,13 @@ class Conflict {
 
   std::string Sentence() const {
     std::vector<std::string> names, residuals;
-    for (const OfJoint& motion : found_) {
+    for (const OfJoint& one : found_) {
       const JointDescription& joint =
-          description_.joints[mechanism_.joints()[motion.joint].description];
-      std::string name = (motion.rod ? "rod \"" : "joint \"") + joint.name + '"';
-      if (motion.rod) name += " (length " + Short(joint.parameter) + " m)";
+          description_.joints[mechanism_.joints()[one.joint].description];
+      std::string name = (one.rod ? "rod \"" : "joint \"") + joint.name + '"';
+      if (one.rod) name += " (length " + Short(joint.parameter) + " m)";
       names.push_back(name);
-      residuals.push_back(Short(motion.value) + (motion.length ? " m" : " rad") +
+      residuals.push_back(Short(one.value) + (one.length ? " m" : " rad") +
                           (unmet_.speeds ? "/s" : ""));
     }
     const bool one = names.size() == 1;
@@ -115,8 +114,8 @@ class Conflict {
   /// Lists the fixed and prescribed joints of the loops, which may need a change.
   std::string Given() const {
     std::set<int> joints;  // of the description, in its order
-    for (const OfJoint& motion : found_) {
-      const Joint<Space, double>& joint = mechanism_.joints()[motion.joint];
+    for (const OfJoint& one : found_) {
+      const Joint<Space, double>& joint = mechanism_.joints()[one.joint];
       joints.insert(joint.description);
       const std::set<int> to = PathToGround(joint.to), from = PathToGround(joint.from);
       for (const auto& [path, other] : {std::pair{&to, &from}, std::pair{&from, &to}}) {

@@ -56,7 +56,7 @@ void Odca<Space, S>::MakeShortCut([[maybe_unused]] const FormulationOptions& opt
     if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
     short_cut_ = std::move(path);
   } else {
-    short_cut_ = pins::AssemblySweep::Make(mechanism_, MakePlan(mechanism_));
+    short_cut_ = pins::AssemblySweep::Make(mechanism_, plan_);
   }
 }
 

@@ -5,7 +5,6 @@
 #include "mechanism/algebra/instantiate.h"
 #include "odca/arm_sweep.h"
 #include "odca/assembly_sweep.h"
-#include "odca/path_lane.h"
 #include "odca/path_sweep.h"
 
 namespace loopbench::odca {

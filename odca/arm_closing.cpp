@@ -1,7 +1,7 @@
-#include "odca/arm_closing.h"
-
 #include <algorithm>
 #include <utility>
+
+#include "odca/arm_links.h"
 
 namespace loopbench::odca::arms {
 

@@ -10,7 +10,7 @@
 //   starts     along each arm: where its pieces begin, and the few bodies that are left over
 //   up         the bodies of a piece are joined one after another, pieces of a group side by side;
 //              then the pieces of an arm and the bodies left over, one after another
-//   closings   two arms by their cut joint (arm_closing.h)
+//   closings   two arms by their cut joint (arm_closing.cpp)
 //   down       the same the other way round
 //
 // Threads share groups. Results depend on the mechanism alone, never on the number of threads.
@@ -23,7 +23,6 @@
 
 #include "mechanism/algebra/worker_pool.h"
 #include "mechanism/formulation/constraint_solver.h"
-#include "odca/arm_closing.h"
 #include "odca/arm_links.h"
 #include "odca/pack_kinds.h"
 #include "odca/short_cut.h"

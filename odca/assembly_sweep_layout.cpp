@@ -246,6 +246,20 @@ bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
 }
 
 bool AssemblySweep::Layout::AddNodes() {
+  for (int n = 0; n < plan.num_leaves(); ++n) {
+    const PlanSide& hold = plan.leaves()[n].hold;
+    if (hold.joint < 0 || HoldsBody(mechanism.joints()[hold.joint])) continue;
+    const Handle leaf{.body = n + 1};
+    const NodeJoint closed{
+        .index = hold.joint, .from = hold.at_Q ? -1 : 0, .to = hold.at_Q ? 0 : -1};
+    PlanNode node;
+    node.children[0] = n;
+    node.handles = std::span(&leaf, 1);
+    node.joints = std::span(&closed, 1);
+    Assembly all;
+    if (!AddNode(node, all)) return false;
+    assemblies[n] = std::move(all);
+  }
   for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
     if (!AddNode(plan.nodes()[n - plan.num_leaves()], assemblies[n])) return false;
   }

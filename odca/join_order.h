@@ -8,8 +8,8 @@
 // the smallest boundary. A chain becomes a balanced tree, arms are finished before their hub takes
 // them, and pairs whose boundary would grow along a hub come last.
 //
-// If pairing makes large joins, two other rules are tried. *Front* (front.h) adds body after body
-// to one assembly; it suits bodies between several hubs. *Dissection* (dissection.h) cuts from
+// If pairing makes large joins, two other rules are tried. *Front* adds body after body
+// to one assembly; it suits bodies between several hubs. *Dissection* cuts from
 // above; a k x k grid is cut by O(k) bodies at the top and halves in area below, hence O(k^3)
 // multiply-adds = O(n^1.5) (George 1973; Lipton, Rose and Tarjan 1979). The best rule orders its
 // parts in turn.

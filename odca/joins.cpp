@@ -14,6 +14,22 @@ namespace {
 template <class Space>
 constexpr int kApply = Space::kRot* Space::kRot + Space::kLin;
 
+/// The block of two sides in C Z C^T and its transpose, from the products of their rows.
+template <class S, class Rows, class Others, class Dot>
+[[gnu::always_inline]] inline void FillBlock(Rows rows, Others others, const Dot& dot, S* block,
+                                             S* mirror) {
+  const int count = rows, other_count = others;
+  const bool is_diagonal = block == mirror;
+  Repeat(rows, [&](int i) LOOPBENCH_INLINED {
+    Repeat(others, [&](int j) LOOPBENCH_INLINED {
+      if (is_diagonal && j > i) return;
+      const S zeta = dot(i, j);
+      block[i + count * j] = zeta;
+      mirror[j + other_count * i] = zeta;
+    });
+  });
+}
+
 }  // namespace
 
 template <class Space, class S>
@@ -83,11 +99,7 @@ std::span<const typename Joins<Space, S>::FreeDirection> Joins<Space, S>::FreeDi
 }
 
 template <class Space, class S>
-Acceleration<Space, S> Joins<Space, S>::Response(int n, const Wrench<Space, S>& F) const {
-  const Body& body = bodies_[n];
-  if (plan_.leaves()[n].hold.joint < 0) {
-    return {body.rotational_inverse * F.angular, F.linear * body.per_mass};
-  }
+Acceleration<Space, S> Joins<Space, S>::HeldResponse(int n, const Wrench<Space, S>& F) const {
   auto A = Acceleration<Space, S>::Zero();
   for (const FreeDirection& free : FreeDirections(n)) A += free.g * free.g.dot(F);
   return A;
@@ -148,13 +160,13 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
     for (int child : node.children) {
       if (child >= 0 && child < plan_.num_leaves()) FillLeaf(kinematics, masses, child);
     }
-    const bool ok = WithRows<Space>(node, [&](auto rows) {
-      FormResponse(node, place, rows);
+    const bool ok = WithSizes<Space>(node, [&](auto rows, auto width) {
+      FormResponse(node, place, rows, width);
       if (!(node.closes_loop ? FactorLoop(node, place, pass) : FactorFloating(place, rows))) {
         return false;
       }
-      ApplyToKept(node, place, rows);
-      Eliminate(node, place, rows);
+      ApplyToKept(node, place, rows, width);
+      Eliminate(node, place, rows, width);
       return true;
     });
     if (!ok) return false;
@@ -167,16 +179,15 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
 /// is Newton's third law (51-52). Rows of one joint after those of another make the block-diagonal
 /// D (69).
 template <class Space, class S>
+template <class Rows>
 void Joins<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses masses,
-                               const PlanSide& side) {
+                               const PlanSide& side, Rows rows) {
   const JointState<Space, S>& state = kinematics.joints()[side.joint];
   const Linear<Space, S> r =
       side.at_Q ? kinematics.ArmQ(side.joint, masses) : kinematics.ArmP(side.joint, masses);
   Wrench<Space, S>* c = &c_[c_offset_[side.joint] + (side.at_Q ? side.rows : 0)];
-  for (int i = 0; i < side.rows; ++i) {
-    c[i] = ShiftForce<Space, S>(state.D(i), r);
-    if (!side.at_Q) c[i] = -c[i];
-  }
+  const S sign = side.at_Q ? S(1) : S(-1);
+  Repeat(rows, [&](int i) { c[i] = ShiftForce<Space, S>(state.D(i), r) * sign; });
 }
 
 /// The directions h that its joint to Ground leaves to a body, at the centre of mass, as g = T h
@@ -239,45 +250,50 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   S* Z = &Z_[places_[n].z];
   int first = 0;
   for (const PlanSide& side : leaf.sides) {
-    FillRows(kinematics, masses, side);
-    const int offset = c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
+    const int offset = Offset(side);
     const Wrench<Space, S>* c = &c_[offset];
-    Acceleration<Space, S>* Mc = &Mc_[offset];
-    for (int i = 0; i < side.rows; ++i) {
-      if (!is_held) {
-        Mc[i] = {body.rotational_inverse * c[i].angular, c[i].linear * body.per_mass};
-      } else if (leaf.is_body) {
-        Mc[i] = Response(n, c[i]);
-      } else {  // its components along G suffice
-        for (int k = 0; k < terms; ++k) Mc[i][k] = free[k].g.dot(c[i]);
+    Acceleration<Space, S>* Zc = &Mc_[offset];
+    WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
+      FillRows(kinematics, masses, side, rows);
+      operations_ += rows * (is_held ? terms * Space::kDim : kApply<Space>);
+      if (leaf.is_body) {
+        if (is_held) operations_ += rows * terms * Space::kDim;
+        return;
       }
-    }
-    operations_ += side.rows * (is_held ? terms * Space::kDim : kApply<Space>);
-    if (leaf.is_body) {
-      if (is_held) operations_ += side.rows * terms * Space::kDim;
-      continue;
-    }
-    int before = 0;
-    for (const PlanSide& other : leaf.sides.first(&side - leaf.sides.data() + 1)) {
-      const Acceleration<Space, S>* Mc_other =
-          &Mc_[c_offset_[other.joint] + (other.at_Q ? other.rows : 0)];
-      for (int i = 0; i < side.rows; ++i) {
-        const int last = before == first ? i + 1 : other.rows;
-        for (int j = 0; j < last; ++j) {
-          S zeta = S(0);  // (1-4, 45-46)
-          if (is_held) {
-            for (int k = 0; k < terms; ++k) zeta += Mc[i][k] * Mc_other[j][k];
-          } else {
-            zeta = c[i].dot(Mc_other[j]);
-          }
-          Z[first + i + leaf.width * (before + j)] = zeta;
-          Z[before + j + leaf.width * (first + i)] = zeta;
+      Repeat(rows, [&](int i) LOOPBENCH_INLINED {
+        if (!is_held) {
+          Zc[i] = {body.rotational_inverse * c[i].angular, c[i].linear * body.per_mass};
+        } else {  // its components along G suffice
+          for (int k = 0; k < terms; ++k) Zc[i][k] = free[k].g.dot(c[i]);
         }
-        operations_ += last * terms;
+      });
+      int before = 0;
+      for (const PlanSide& other : leaf.sides.first(&side - leaf.sides.data() + 1)) {
+        const Acceleration<Space, S>* Zc_other = &Mc_[Offset(other)];
+        S* block = Z + leaf.width * before + other.rows * first;
+        S* mirror = Z + leaf.width * first + rows * before;
+        const auto fill = [&](auto others) LOOPBENCH_INLINED {
+          if (!is_held) {
+            const auto dot = [&](int i, int j) { return c[i].dot(Zc_other[j]); };  // (1-4, 45-46)
+            return FillBlock(rows, others, dot, block, mirror);
+          }
+          const auto dot = [&](int i, int j) {
+            S sum = Zc[i][0] * Zc_other[j][0];
+            for (int k = 1; k < terms; ++k) sum += Zc[i][k] * Zc_other[j][k];
+            return sum;
+          };
+          FillBlock(rows, others, dot, block, mirror);
+        };
+        if (kIsKnown<decltype(rows)> && other.rows == rows) {
+          fill(rows);
+        } else {
+          fill(other.rows);
+        }
+        operations_ += terms * (first == before ? rows * (rows + 1) / 2 : rows * other.rows);
+        before += other.rows;
       }
-      before += other.rows;
-    }
-    first += side.rows;
+      first += rows;
+    });
   }
   if (!leaf.is_body) return;
   Block<Space, S> block = Block<Space, S>::Zero();
@@ -286,9 +302,43 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   } else {
     block = DiagonalBlock<Space, S>(body.rotational_inverse, body.per_mass);
   }
+  LOOPBENCH_UNROLL
   for (int j = 0; j < Space::kDim; ++j) {
+    LOOPBENCH_UNROLL
     for (int i = 0; i < Space::kDim; ++i) Z[i + Space::kDim * j] = block(i, j);
   }
+}
+
+/// Y = C Z of one side of a joint, at one handle of the same child (67).
+template <class Space, class S>
+template <class Rows, class Width, class Numbers>
+[[gnu::always_inline]] inline void Joins<Space, S>::RespondAt(
+    const PlanNode& node, const Handle& side, const Handle& handle, const Wrench<Space, S>* c,
+    Rows count, Width known, Numbers width, bool adds, S* Y) const {
+  const int child = node.children[side.child], b_end = width;
+  S sum[Space::kDim * Space::kDim];
+  const S* Z = &Z_[places_[child].z + places_[child].size * side.place];
+  if (!IsBody<Space>(side, known)) {
+    Z += count * handle.place;
+    Repeat(Product(count, width), [&](int k) { sum[k] = Z[k]; });
+  } else if (IsLeaf(child)) {
+    Repeat(count, [&](int i) LOOPBENCH_INLINED {
+      const Acceleration<Space, S> Mc = Response(child, c[i]);
+      LOOPBENCH_UNROLL
+      for (int b = 0; b < Space::kDim; ++b) sum[b + Space::kDim * i] = Mc[b];
+    });
+  } else {
+    Z += Space::kDim * handle.place;
+    Repeat(count, [&](int i) LOOPBENCH_INLINED {
+      Repeat(width, [&](int b) { sum[b + b_end * i] = c[i][0] * Z[b]; });
+      LOOPBENCH_UNROLL
+      for (int k = 1; k < Space::kDim; ++k) {
+        Repeat(width, [&](int b) { sum[b + b_end * i] += c[i][k] * Z[b + b_end * k]; });
+      }
+    });
+  }
+  if (adds) Repeat(Product(count, width), [&](int k) { sum[k] += Y[k]; });
+  Repeat(Product(count, width), [&](int k) { Y[k] = sum[k]; });
 }
 
 /// Y = C Z on every handle, and X = Y C^T, both triangles. At a handle with the rows of a joint,
@@ -297,81 +347,51 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
 /// closing of base and terminal joint (42), with the block rows (40) and (41). In a coupled loop it
 /// has the block rows (61) and (63); the paper writes X for its inverse (66).
 template <class Space, class S>
-template <class Rows>
-void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Rows rows) {
+template <class Rows, class Width>
+void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Rows rows,
+                                   Width known) {
   const int n = rows;
-  const auto each_side = [&](const NodeJoint& joint, const auto& call) {
-    if (joint.from >= 0) call(node.handles[joint.from], c_offset_[joint.index]);
-    if (joint.to >= 0) call(node.handles[joint.to], c_offset_[joint.index] + joint.rows);
-  };
-  std::fill_n(&Y_[place.y], n * node.numbers, S(0));
+  S* X = &X_[place.x];
   int first = 0;
   for (const NodeJoint& joint : node.joints) {
-    const int count = RowsOf(joint, rows);
-    each_side(joint, [&](const Handle& side, int offset) {
-      const int child = node.children[side.child];
-      const int size = places_[child].size;
-      const bool is_leaf = child < plan_.num_leaves();
-      const S* Z = &Z_[places_[child].z + size * side.place];
+    const auto count = RowsOf<Space>(joint, rows, known);
+    const auto each_side = [&](const auto& call) LOOPBENCH_INLINED {
+      if (joint.from >= 0) call(node.handles[joint.from], c_P(joint), false);
+      if (joint.to >= 0) call(node.handles[joint.to], c_Q(joint), joint.from >= 0);
+    };
+    each_side([&](const Handle& side, const Wrench<Space, S>* c, bool is_second) LOOPBENCH_INLINED {
+      const bool self_joins = is_second && node.handles[joint.from].child == side.child;
       for (const Handle& handle : node.handles) {
         if (handle.child != side.child) continue;
-        WithWidth<Space>(handle, [&](auto known) {
-          const int width = known;
+        WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
           S* Y = &Y_[place.y + handle.number * n + first * width];
-          for (int i = 0; i < count; ++i, Y += width) {  // (67)
-            S sum[Space::kDim];
-            LOOPBENCH_UNROLL
-            for (int b = 0; b < width; ++b) sum[b] = Y[b];
-            if (!side.is_body()) {
-              const S* Z_i = Z + size * i + handle.place;
-              LOOPBENCH_UNROLL
-              for (int b = 0; b < width; ++b) sum[b] += Z_i[b];
-            } else if (is_leaf) {
-              LOOPBENCH_UNROLL
-              for (int b = 0; b < width; ++b) sum[b] += Mc_[offset + i][b];
-            } else {
-              LOOPBENCH_UNROLL
-              for (int k = 0; k < Space::kDim; ++k) {
-                const S c_k = c_[offset + i][k];
-                const S* Z_k = Z + size * k + handle.place;
-                LOOPBENCH_UNROLL
-                for (int b = 0; b < width; ++b) sum[b] += c_k * Z_k[b];
-              }
-            }
-            LOOPBENCH_UNROLL
-            for (int b = 0; b < width; ++b) Y[b] = sum[b];
-          }
+          RespondAt(node, side, handle, c, count, known, width, self_joins, Y);
         });
       }
-      if (side.is_body() && !is_leaf) operations_ += count * Space::kDim * size;
     });
-    first += count;
-  }
-  S* X = &X_[place.x];
-  std::fill_n(X, n * n, S(0));
-  first = 0;
-  for (const NodeJoint& joint : node.joints) {
-    const int count = RowsOf(joint, rows);
-    each_side(joint, [&](const Handle& side, int offset) {
+    each_side([&](const Handle& side, const Wrench<Space, S>* c, bool adds) LOOPBENCH_INLINED {
       const S* Y = &Y_[place.y + side.number * n];
-      for (int i = 0; i < count; ++i) {  // (16, 42, 66)
+      Repeat(count, [&](int i) LOOPBENCH_INLINED {  // (16, 42, 66)
         S* X_i = X + first + i;
-        if (!side.is_body()) {
-          for (int l = 0; l <= first + i; ++l) X_i[l * n] += Y[l * count + i];
-        } else {
-          const Wrench<Space, S>& c = c_[offset + i];
-          for (int l = 0; l <= first + i; ++l) {
-            S sum = X_i[l * n];
+        for (int l = 0; l <= first + i; ++l) {
+          S sum = adds ? X_i[l * n] : S(0);
+          if (!IsBody<Space>(side, known)) {
+            sum += Y[l * count + i];
+          } else {
             LOOPBENCH_UNROLL
-            for (int k = 0; k < Space::kDim; ++k) sum += c[k] * Y[l * Space::kDim + k];
-            X_i[l * n] = sum;
+            for (int k = 0; k < Space::kDim; ++k) sum += c[i][k] * Y[l * Space::kDim + k];
           }
+          X_i[l * n] = sum;
         }
-      }
-      if (side.is_body()) operations_ += Space::kDim * (count * first + count * (count + 1) / 2);
+      });
+      if (!IsBody<Space>(side, known)) return;
+      const int child = node.children[side.child];
+      operations_ += count * Space::kDim * (IsLeaf(child) ? 0 : places_[child].size) +
+                     Space::kDim * (count * first + count * (count + 1) / 2);
     });
     first += count;
   }
+  if (!node.closes_loop) return;
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < j; ++i) X[i + j * n] = X[j + i * n];
   }
@@ -459,8 +479,9 @@ void Joins<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>&
 
 /// V = T Y in Y's place, for the handles that stay: the X Y of (64) is -T^T V.
 template <class Space, class S>
-template <class Rows>
-void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows rows) {
+template <class Rows, class Width>
+void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows rows,
+                                  Width known) {
   const int n = rows;
   for (int e : node.kept) {
     const Handle& handle = node.handles[e];
@@ -474,21 +495,15 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
       block = columns;
     } else {
       const S* L = &X_[place.x];
-      WithWidth<Space>(handle, [&](auto known) {
-        const int width = known;
-        for (int i = 0; i < rows; ++i) {
+      WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
+        Repeat(rows, [&](int i) LOOPBENCH_INLINED {
           S V[Space::kDim];
-          LOOPBENCH_UNROLL
-          for (int b = 0; b < width; ++b) V[b] = Y[i * width + b];
+          Repeat(width, [&](int b) { V[b] = Y[i * width + b]; });
           for (int k = 0; k < i; ++k) {
-            const S L_ik = L[i + k * rows];
-            LOOPBENCH_UNROLL
-            for (int b = 0; b < width; ++b) V[b] -= Y[k * width + b] * L_ik;
+            Repeat(width, [&](int b) { V[b] -= Y[k * width + b] * L[i + k * n]; });
           }
-          const S inverse = L[i + i * rows];
-          LOOPBENCH_UNROLL
-          for (int b = 0; b < width; ++b) Y[i * width + b] = V[b] * inverse;
-        }
+          Repeat(width, [&](int b) { Y[i * width + b] = V[b] * L[i + i * n]; });
+        });
       });
     }
     operations_ += static_cast<long>(n) * (n + 1) / 2 * handle.width;
@@ -499,46 +514,55 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
 /// child are Upsilon_11 (26) and Upsilon_22 (27), those across, with Z = 0 between the children,
 /// Upsilon_12 (28); where body 2 alone stays of a coupled loop, the block is zeta^asm (71).
 template <class Space, class S>
-template <class Rows>
-void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows rows) {
-  const int n = rows;
+template <class Rows, class Width>
+void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows rows, Width known) {
+  const int n = rows, size = place.size;
+  const S* Y = &Y_[place.y];
+  S* to = &Z_[place.z];
   int column = 0;
   for (int f : node.kept) {
     const Handle& at_f = node.handles[f];
     const Place& child = places_[node.children[at_f.child]];
-    const S* V_f = &Y_[place.y + at_f.number * n];
-    int row = 0;
-    for (int e : node.kept) {
-      if (e > f) break;
-      const Handle& at_e = node.handles[e];
-      const bool within = at_e.child == at_f.child;
-      const S* V_e = &Y_[place.y + at_e.number * n];
-      const S* Z = &Z_[child.z] + (within ? child.size * at_f.place + at_e.place : 0);
-      WithWidth<Space>(at_e, [&](auto known) {
-        const int width = known;
-        for (int b = 0; b < at_f.width; ++b) {
-          S z[Space::kDim];
-          LOOPBENCH_UNROLL
-          for (int a = 0; a < width; ++a) z[a] = within ? Z[a + child.size * b] : S(0);
-          for (int i = 0; i < rows; ++i) {
-            const S V_b = V_f[b + i * at_f.width];
-            LOOPBENCH_UNROLL
-            for (int a = 0; a < width; ++a) z[a] -= V_e[a + i * width] * V_b;  // (26-28, 71)
+    WithWidth<Space>(at_f, known, [&](auto width_f) LOOPBENCH_INLINED {
+      const S* Z = &Z_[child.z + child.size * at_f.place];
+      const S* V_f = Y + at_f.number * n;
+      int row = 0;
+      for (int e : node.kept) {
+        if (e > f) break;
+        const Handle& at_e = node.handles[e];
+        WithWidth<Space>(at_e, known, [&](auto width_e) LOOPBENCH_INLINED {
+          const auto numbers = Product(width_e, width_f);
+          const int a_end = width_e, b_end = width_f;
+          const S* V_e = Y + at_e.number * n;
+          S z[Space::kDim * Space::kDim];
+          if (at_e.child == at_f.child) {
+            Repeat(numbers, [&](int k) { z[k] = Z[width_f * at_e.place + k]; });
+          } else {
+            Repeat(numbers, [&](int k) { z[k] = S(0); });
           }
-          S* to = &Z_[place.z + row + place.size * (column + b)];
-          LOOPBENCH_UNROLL
-          for (int a = 0; a < width; ++a) to[a] = z[a];
-          if (e == f) continue;
-          S* mirror = &Z_[place.z + column + b + place.size * row];
-          LOOPBENCH_UNROLL
-          for (int a = 0; a < width; ++a) mirror[place.size * a] = z[a];
-        }
-      });
-      row += at_e.width;
-    }
-    column += at_f.width;
+          for (int i = 0; i < n; ++i) {
+            Repeat(width_f, [&](int b) LOOPBENCH_INLINED {
+              const S V_b = V_f[b + b_end * i];
+              Repeat(width_e, [&](int a) {
+                z[a + a_end * b] -= V_e[a + a_end * i] * V_b;  // (26-28, 71)
+              });
+            });
+          }
+          S* block = to + size * column + b_end * row;
+          Repeat(numbers, [&](int k) { block[k] = z[k]; });
+          if (e != f) {
+            S* mirror = to + size * row + a_end * column;
+            Repeat(width_e, [&](int a) LOOPBENCH_INLINED {
+              Repeat(width_f, [&](int b) { mirror[b + b_end * a] = z[a + a_end * b]; });
+            });
+          }
+          row += a_end;
+        });
+      }
+      column += width_f;
+    });
   }
-  operations_ += static_cast<long>(n) * (place.size * (place.size + 1) / 2);
+  operations_ += static_cast<long>(n) * (size * (size + 1) / 2);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Joins<Space, S>;

@@ -46,24 +46,67 @@
 
 namespace loopbench::odca {
 
-/// Calls `call` with the rows of a node, as a constant for one joint that leaves one direction
-/// free, or three in space.
-template <class Space, class Call>
-[[gnu::always_inline]] inline auto WithRows(const PlanNode& node, const Call& call) {
-  return node.joints.size() == 1 ? WithSize<Space::kDim - 1, 3>(node.rows, call) : call(node.rows);
-}
-/// Returns the rows of a joint of a node, given the rows of the node.
-template <class Rows>
-int RowsOf(const NodeJoint& joint, Rows) {
-  constexpr int kRows = kKnownSize<Rows>;
-  return kRows > 0 ? kRows : joint.rows;
-}
+/// Behind the parameters of a lambda: its captures must not go through memory.
+#define LOOPBENCH_INLINED __attribute__((always_inline))
 
-/// Calls `call` with the numbers of a handle, as a constant for a body and for joints that leave
-/// few directions free.
+template <class Size>
+inline constexpr bool kIsKnown = kKnownSize<Size> != 0;
+
+/// Calls `call` with the rows of a node and the numbers of each of its handles, as constants for
+/// one joint that leaves one direction free, or three in space, and for boundaries of bodies alone
+/// or of rows of such joints alone.
 template <class Space, class Call>
-[[gnu::always_inline]] inline auto WithWidth(const Handle& handle, const Call& call) {
-  return WithSize<Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
+[[gnu::always_inline]] inline auto WithSizes(const PlanNode& node, const Call& call) {
+  return WithSize<Space::kDim, Space::kDim - 1>(node.width, [&](auto width) {
+    return node.joints.size() == 1 ? WithSize<Space::kDim - 1, 3>(
+                                         node.rows, [&](auto rows) { return call(rows, width); })
+                                   : call(node.rows, width);
+  });
+}
+/// Returns the rows of a joint of a node, given those sizes.
+template <class Space, class Rows, class Width>
+auto RowsOf(const NodeJoint& joint, Rows rows, Width) {
+  if constexpr (kIsKnown<Rows>) {
+    return rows;
+  } else if constexpr (kKnownSize<Width> == Space::kDim - 1) {
+    return Width();
+  } else {
+    return joint.rows;
+  }
+}
+/// Returns true if a handle is a body, given the numbers of each handle of its node.
+template <class Space, class Width>
+bool IsBody(const Handle& handle, Width) {
+  return kIsKnown<Width> ? kKnownSize<Width> == Space::kDim : handle.is_body();
+}
+/// Calls `call` with the numbers of a handle, given those of each handle of its node.
+template <class Space, class Width, class Call>
+[[gnu::always_inline]] inline auto WithWidth(const Handle& handle, Width width, const Call& call) {
+  if constexpr (kIsKnown<Width>) {
+    return call(width);
+  } else {
+    return WithSize<Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
+  }
+}
+/// Calls `call` with 0 .. size-1, unrolled if the size is a constant.
+template <class Size, class Call>
+[[gnu::always_inline]] inline void Repeat(Size size, const Call& call) {
+  const int n = size;
+  if constexpr (kIsKnown<Size>) {
+    LOOPBENCH_UNROLL
+    for (int i = 0; i < n; ++i) call(i);
+  } else {
+    for (int i = 0; i < n; ++i) call(i);
+  }
+}
+/// Returns the numbers of a block, a constant if those of both of its sides are.
+template <class Rows, class Columns>
+auto Product(Rows rows, Columns columns) {
+  if constexpr (kIsKnown<Rows> && kIsKnown<Columns>) {
+    return std::integral_constant<int, Rows::value * Columns::value>();
+  } else {
+    return rows * columns;
+  }
 }
 
 template <class Space, class S>
@@ -76,7 +119,10 @@ class Joins {
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
 
   /// Acceleration of leaf n by a wrench.
-  Acceleration<Space, S> Response(int n, const Wrench<Space, S>& F) const;
+  Acceleration<Space, S> Response(int n, const Wrench<Space, S>& F) const {
+    if (plan_.leaves()[n].hold.joint >= 0) return HeldResponse(n, F);
+    return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
+  }
   /// Acceleration of a leaf that is held, from the wrench on its body and c0 of its hold.
   Acceleration<Space, S> Held(int n, const Wrench<Space, S>& F,
                               const Components<Space, S>& c0) const;
@@ -131,7 +177,9 @@ class Joins {
  private:
   /// Storage of a node's numbers.
   struct Place {
-    int z = 0;      ///< first number of Z, `size` x `size`, both triangles
+    /// First number of Z, `size` x `size`, both triangles, in blocks of handles: that of e and f
+    /// at size * f.place + f.width * e.place, by columns.
+    int z = 0;
     int size = 0;   ///< of the boundary
     int y = 0;      ///< first number of Y: of each handle before the join, row after row
     int x = 0;      ///< first number of X
@@ -149,23 +197,34 @@ class Joins {
     Acceleration<Space, S> g;
     Wrench<Space, S> Mg;
   };
+  bool IsLeaf(int n) const { return n < plan_.num_leaves(); }
   enum class Pass { kPhysical, kGeometric, kRegularized };
 
+  Acceleration<Space, S> HeldResponse(int n, const Wrench<Space, S>& F) const;
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
   void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n);
   void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n);
-  void FillRows(const Kinematics<Space, S>& kinematics, Masses masses, const PlanSide& side);
-  std::span<const FreeDirection> FreeDirections(int n) const;
   template <class Rows>
-  void FormResponse(const PlanNode& node, const Place& place, Rows rows);
+  void FillRows(const Kinematics<Space, S>& kinematics, Masses masses, const PlanSide& side,
+                Rows rows);
+  int Offset(const PlanSide& side) const {
+    return c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
+  }
+  std::span<const FreeDirection> FreeDirections(int n) const;
+  template <class Rows, class Width>
+  void FormResponse(const PlanNode& node, const Place& place, Rows rows, Width width);
   template <class Rows>
   bool FactorFloating(const Place& place, Rows rows);
   JointMatrix<S> FreeResponseAt(const PlanNode& node, const NodeJoint& joint) const;
   bool FactorLoop(const PlanNode& node, const Place& place, Pass pass);
-  template <class Rows>
-  void ApplyToKept(const PlanNode& node, const Place& place, Rows rows);
-  template <class Rows>
-  void Eliminate(const PlanNode& node, const Place& place, Rows rows);
+  template <class Rows, class Width>
+  void ApplyToKept(const PlanNode& node, const Place& place, Rows rows, Width width);
+  template <class Rows, class Width, class Numbers>
+  void RespondAt(const PlanNode& node, const Handle& side, const Handle& handle,
+                 const Wrench<Space, S>* c, Rows count, Width known, Numbers width, bool adds,
+                 S* Y) const;
+  template <class Rows, class Width>
+  void Eliminate(const PlanNode& node, const Place& place, Rows rows, Width width);
   void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);
 
   const Mechanism<Space, S>& mechanism_;

@@ -5,7 +5,6 @@
 #include "mechanism/algebra/instantiate.h"
 #include "odca/arm_sweep.h"
 #include "odca/assembly_sweep.h"
-#include "odca/path_lane.h"
 #include "odca/path_sweep.h"
 
 namespace loopbench::odca {
@@ -56,7 +55,7 @@ void Odca<Space, S>::MakeShortCut([[maybe_unused]] const FormulationOptions& opt
     if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
     short_cut_ = std::move(path);
   } else {
-    short_cut_ = pins::AssemblySweep::Make(mechanism_, MakePlan(mechanism_));
+    short_cut_ = pins::AssemblySweep::Make(mechanism_, plan_);
   }
 }
 

@@ -1,10 +1,10 @@
-#include "odca/path_lane.h"
-
 #include <algorithm>
 #include <array>
 #include <functional>
 #include <utility>
 #include <vector>
+
+#include "odca/path_sweep.h"
 
 namespace loopbench::odca::pins {
 

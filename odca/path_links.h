@@ -1,13 +1,27 @@
-// A path's bodies (paths.h) as the links of two_handle.h.
+// Paths of a mechanism, and their bodies as the links of two_handle.h. Each body has a joint to the
+// previous and to the next one; any may have one to Ground. Chains, ladders and arms are paths.
 #pragma once
 
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "mechanism/model/mechanism.h"
-#include "odca/paths.h"
+#include "odca/plan.h"
 #include "odca/two_handle.h"
 
 namespace loopbench::odca::pins {
+
+struct PathBody {
+  int body = 0;
+  int before = -1;  ///< joint to the body before it, -1 for the first
+  int ground = -1;  ///< joint to Ground, -1 without
+};
+using Path = std::vector<PathBody>;
+
+/// Returns all bodies on paths, or none if bodies do not form paths: a body has joints to three
+/// others, two to the same or two to Ground, or a ring is closed without an end.
+std::vector<Path> FindPaths(int num_bodies, std::span<const PlanJoint> joints);
 
 struct PathLinks {
   Path path;  ///< in one direction or the other

@@ -1,5 +1,5 @@
-// O-DCA for planar mechanisms whose bodies form paths (paths.h) of pins under gravity: computes
-// rates directly from joint coordinates and speeds, in the kernels of two_handle.h.
+// O-DCA for planar mechanisms whose bodies form paths (path_links.h) of pins under gravity:
+// computes rates directly from joint coordinates and speeds, in the kernels of two_handle.h.
 //
 //   angles and speeds of bodies   along the spanning tree (tree_angles.h)
 //   violations of cut joints      along each path
@@ -29,6 +29,7 @@
 
 #include "mechanism/algebra/worker_pool.h"
 #include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/formulation/side_by_side.h"
 #include "odca/pack_kinds.h"
 #include "odca/path_links.h"
 #include "odca/pin_projection.h"
@@ -179,5 +180,29 @@ class PathSweepOf final
 };
 
 using PathSweep = PathSweepOf<double>;
+
+/// Fast path of batched runs: their pending right-hand sides are evaluated at once, a lane each.
+/// The bits of a run do not depend on the other runs.
+class PathLane {
+ public:
+  /// Reserves a lane for the mechanism of `own` until destruction; `beside` must outlive it.
+  /// Returns null if `own` fills the lanes alone.
+  static std::unique_ptr<PathLane> Take(SideBySide& beside, const PathSweep& own);
+  ~PathLane();
+  PathLane(const PathLane&) = delete;
+  PathLane& operator=(const PathLane&) = delete;
+
+  /// Evaluates like PathSweep::Evaluate(), once all runs have met.
+  bool Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
+                std::span<double> qdot, std::span<double> udot);
+
+ private:
+  class All;
+  PathLane(SideBySide& beside, All& all, int lane) : beside_(beside), all_(all), lane_(lane) {}
+
+  SideBySide& beside_;
+  All& all_;
+  int lane_;
+};
 
 }  // namespace loopbench::odca::pins

@@ -372,7 +372,7 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
     is_body = CheapestBases(num_bodies, joints, holds, drafts, options.dim);
   }
   AddLeaves(joints, holds, is_body, options.dim);
-  AddNodes(joints, drafts);
+  AddNodes(joints, drafts, options.dim);
 }
 
 void Plan::AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
@@ -410,7 +410,7 @@ void Plan::AddLeaves(std::span<const PlanJoint> joints, std::span<const int> hol
 }
 
 /// Writes the lists of all nodes, with the handles of bodies or of their open joints.
-void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts) {
+void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts, int dim) {
   std::vector<std::vector<Handle>> boundary(leaves_.size() + drafts.size());
   for (int n = 0; n < num_leaves_; ++n) {
     const Leaf& leaf = leaves_[n];
@@ -445,6 +445,11 @@ void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> dr
       boundary[node.children[child]] = {};
     }
     const std::span handles = std::span(handles_).subspan(first);
+    const int width = handles[0].width;
+    const auto alike = [&](const Handle& handle) {
+      return handle.width == width && handle.is_body() == (width == dim);
+    };
+    if (std::ranges::all_of(handles, alike)) node.width = width;
     for (int j : draft.joints) {
       row_of[j] = num_rows_;
       const auto handle_at = [&](int body) {

@@ -112,8 +112,9 @@ struct PlanNode {
   int rows = 0;                ///< size of X
   /// X may lose rank: both sides reach Ground, several joints, self-join.
   bool closes_loop = false;
-  int numbers = 0;                    ///< of the children's boundaries
-  int kept_numbers = 0;               ///< of the boundary afterwards
+  int numbers = 0;       ///< of the children's boundaries
+  int kept_numbers = 0;  ///< of the boundary afterwards
+  int width = 0;  ///< of every handle, if all are bodies or all have as many rows, fewer; else 0
   std::span<const Handle> handles;    ///< boundary of the children before the join, child 0 first
   std::span<const int> kept;          ///< indices into handles: the boundary afterwards, in order
   std::span<const NodeJoint> joints;  ///< closed here
@@ -149,7 +150,7 @@ class Plan {
   Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start);
   void AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
                  const std::vector<bool>& is_body, int dim);
-  void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts);
+  void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts, int dim);
 
   int num_leaves_;
   int num_rows_ = 0, num_slots_ = 0;

@@ -61,17 +61,20 @@ void Sweep<Space, S>::Correct(std::span<const Acceleration<Space, S>> b,
     }
     for (const PlanSide& side : leaf.sides) {
       const Wrench<Space, S>* c = joins_.c(side.joint, side.at_Q, side.rows);
-      for (int i = 0; i < side.rows; ++i) *slot++ = c[i].dot(start_[n]);
+      WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
+        Repeat(rows, [&](int i) { slot[i] = c[i].dot(start_[n]); });
+        slot += rows;
+      });
       operations_ += Space::kDim * side.rows;
     }
   }
   for (int n = leaves; n < plan_.num_nodes(); ++n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
-    WithRows<Space>(node, [&](auto rows) { Up(node, n, rows, c0); });
+    WithSizes<Space>(node, [&](auto rows, auto width) { Up(node, n, rows, width, c0); });
   }
   for (int n = plan_.num_nodes() - 1; n >= leaves; --n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
-    WithRows<Space>(node, [&](auto rows) { Down(node, n, rows); });
+    WithSizes<Space>(node, [&](auto rows, auto width) { Down(node, n, rows, width); });
   }
   for (int n = 0; n < leaves; ++n) {
     const PlanSide& hold = plan_.leaves()[n].hold;
@@ -111,19 +114,19 @@ void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
 /// Upsilon_i3 (29-30) and zeta^asm_i3 (72). The zero that c0 + c_P^T A_P + c_Q^T A_Q must be is
 /// (37-38) at joints to Ground and (57-58) in a coupled loop.
 template <class Space, class S>
-template <class Rows>
-void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows,
+template <class Rows, class Width>
+void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
                          std::span<const Components<Space, S>> c0) {
   S* s = &s_[node.joints.front().row];
   int row = 0;
   for (const NodeJoint& joint : node.joints) {
-    const int count = RowsOf(joint, rows);
+    const int count = RowsOf<Space>(joint, rows, known);
     for (int i = 0; i < count; ++i) s[row + i] = c0[joint.index][i];  // (15, 42, 68)
     for (const bool at_Q : {false, true}) {
       const int h = at_Q ? joint.to : joint.from;
       if (h < 0) continue;
       const S* b = &b_[node.handles[h].slot];
-      if (!node.handles[h].is_body()) {
+      if (!IsBody<Space>(node.handles[h], known)) {
         for (int i = 0; i < count; ++i) s[row + i] += b[i];
         continue;
       }
@@ -143,11 +146,9 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows,
     const Handle& handle = node.handles[e];
     const S* V = joins_.V(node, n, handle);
     S* b = &b_[handle.slot];
-    WithWidth<Space>(handle, [&](auto known) {
-      const int width = known;
+    WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
       for (int i = 0; i < rows; ++i) {
-        LOOPBENCH_UNROLL
-        for (int a = 0; a < width; ++a) b[a] -= V[i * width + a] * s[i];  // (29-30, 72)
+        Repeat(width, [&](int a) { b[a] -= V[i * width + a] * s[i]; });  // (29-30, 72)
       }
     });
   }
@@ -159,8 +160,8 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows,
 /// force F^ext of (47-48) plus c phi, the D phi of (13, 18, 39, 59, 65) moved from Mo to the centre
 /// of mass.
 template <class Space, class S>
-template <class Rows>
-void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows) {
+template <class Rows, class Width>
+void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows, Width known) {
   const int first = node.joints.front().row;
   S* phi = &F_[first];
   for (int i = 0; i < rows; ++i) phi[i] = -s_[first + i];
@@ -168,19 +169,17 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows) {
     const Handle& handle = node.handles[e];
     const S* V = joins_.V(node, n, handle);
     const S* F = &F_[handle.force];
-    WithWidth<Space>(handle, [&](auto known) {
-      const int width = known;
+    WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
       for (int i = 0; i < rows; ++i) {
         S sum = phi[i];
-        LOOPBENCH_UNROLL
-        for (int a = 0; a < width; ++a) sum -= V[i * width + a] * F[a];
+        Repeat(width, [&](int a) { sum -= V[i * width + a] * F[a]; });
         phi[i] = sum;
       }
     });
   }
   joins_.ApplyTransposed(node, n, rows, phi);  // (17, 42, 64)
   for (const NodeJoint& joint : node.joints) {
-    const int count = RowsOf(joint, rows);
+    const int count = RowsOf<Space>(joint, rows, known);
     for (int i = 0; i < count; ++i) phi_[joint.index][i] += phi[i];
     for (const bool at_Q : {false, true}) {
       const int h = at_Q ? joint.to : joint.from;

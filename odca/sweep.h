@@ -50,10 +50,11 @@ class Sweep {
 
  private:
   /// Passes one node upwards, and downwards.
-  template <class Rows>
-  void Up(const PlanNode& node, int n, Rows rows, std::span<const Components<Space, S>> c0);
-  template <class Rows>
-  void Down(const PlanNode& node, int n, Rows rows);
+  template <class Rows, class Width>
+  void Up(const PlanNode& node, int n, Rows rows, Width width,
+          std::span<const Components<Space, S>> c0);
+  template <class Rows, class Width>
+  void Down(const PlanNode& node, int n, Rows rows, Width width);
   /// Runs up and down; adds to A and phi_. Without `b` the bodies' free accelerations are zero.
   void Correct(std::span<const Acceleration<Space, S>> b,
                std::span<const Wrench<Space, S>> wrenches, std::span<const Components<Space, S>> c0,

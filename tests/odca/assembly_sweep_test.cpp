@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <utility>
 
 #include "mechanism/description/library.h"
 #include "tests/contract/allocations.h"
@@ -49,7 +50,9 @@ void Hold(const Model& mechanism, const PlanOptions& options, const Numbers& q, 
 
 TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
   for (const Grounding grounding : {Grounding::kEager, Grounding::kAtRoot}) {
-    for (const Closing closing : {Closing::kTogether, Closing::kOneByOne}) {
+    for (const auto& [closing, basis] : {std::pair(Closing::kTogether, BoundaryBasis::kBodies),
+                                         std::pair(Closing::kTogether, BoundaryBasis::kCheapest),
+                                         std::pair(Closing::kOneByOne, BoundaryBasis::kBodies)}) {
       Tally tally;
       int made = 0;
       for (int n = 1; n <= 40; ++n) {
@@ -57,7 +60,7 @@ TEST(AssemblySweep, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
           const MechanismDescription drawn =
               RandomBranches(n, 100 * seed + n, seed % 2 == 0 ? n : 0);
           const Model mechanism(drawn, Coordinates::kJoint);
-          const PlanOptions options = {.grounding = grounding, .closing = closing};
+          const PlanOptions options = {.grounding = grounding, .closing = closing, .basis = basis};
           if (Make(mechanism, options) == nullptr) continue;
           ++made;
           Random random(seed);

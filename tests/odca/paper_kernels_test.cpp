@@ -47,14 +47,15 @@ TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
     MechanismDescription chain = ChainOf(std::vector(n + 1, JointType::kRevolute), b);
     chain.forces.clear();
     const Scene<Planar> scene(chain, seed);
-    const auto links = pins::MeasurePath(scene.mechanism(),
-                                         FindPaths(n + 1, PlanJoints(scene.mechanism())).front())
-                           .value();
+    const auto links =
+        pins::MeasurePath(scene.mechanism(),
+                          pins::FindPaths(n + 1, PlanJoints(scene.mechanism())).front())
+            .value();
     pins::TwoHandle<double> all;
     TwoHandles printed;
     double rcond = 1.0;
     for (int k = 1; k < n; ++k) {
-      const PathBody& at = links.path[k];
+      const pins::PathBody& at = links.path[k];
       const pins::Link<double>& link = links.links[k];
       ASSERT_GT(link.mobility, 0.0) << "not pinned by a joint of the tree";
       const double angle = scene.kinematics().poses()[at.body].angle + links.axes[k];

@@ -1,11 +1,10 @@
 // Paths side by side against each of them alone: the same bits, whoever is in the other lanes.
-#include "odca/path_lane.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "mechanism/description/library.h"
+#include "odca/path_sweep.h"
 #include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 

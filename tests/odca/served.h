@@ -147,7 +147,8 @@ struct OverAssemblies {
   static constexpr auto kName = "Assemblies";
   static auto Make(const Mechanism<Planar, double>& mechanism, int /*threads*/ = 1,
                    int /*group*/ = 0) {
-    return pins::AssemblySweep::Make(mechanism, MakePlan(mechanism));
+    const PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
+    return pins::AssemblySweep::Make(mechanism, MakePlan(mechanism, options));
   }
   static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
   static constexpr int kOneFreedom = 3;

@@ -46,7 +46,7 @@ constexpr Budget kBudgets[] = {
     {"odca",                    { 6990,  47,   5},  3900},
     {"lagrange",                {  377,   4,   4},   350},
     {"reduction",               { 1610,  12,   4},  1350},
-    {"harness/text",            { 1570,  12,   0},   900},
+    {"harness/text",            { 1543,  12,   0},   900},
     {"harness/json",            { 2100,   9,   1},  1300},
     {"harness/record",          { 1520,  10,   3},  1200},
     {"harness/store",           { 1670,   8,   3},  1300},

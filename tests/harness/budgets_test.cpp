@@ -64,14 +64,14 @@ constexpr Budget kBudgets[] = {
     {"harness/suite",           { 2320,  10,  16},  1500},
     {"harness/cluster",         {  496,   2,   5},   420},
     {"harness/advise",          {  657,   2,   8},   650},
-    {"harness/tables",          { 2100,  10,   5},  1500},
-    {"harness/judge",           { 3690,  17,   6},  2700},
+    {"harness/tables",          { 2001,  10,   5},  1500},
+    {"harness/judge",           { 3668,  17,   6},  2700},
     {"harness/figures",         { 3040,  12,   7},  1900},
     {"harness/view",            { 2491,  10,   8},  2050},
     {"harness/exchange",        { 6890,  29,  10},  5000},
     {"harness/report",          { 1100,   4,  10},  1100},
     {"harness/history",         { 1970,  10,   7},  1500},
-    {"harness/cli",             { 8302,  32,  29},  3600},
+    {"harness/cli",             { 8075,  25,  29},  3600},
     {"peers",                   {  709,  12,   5},   650},
     {"",                        {86922, 510, 238}, 62000}
 };

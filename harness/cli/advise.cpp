@@ -66,47 +66,32 @@ std::string WhatIsAsked(const AdviseCommand& command) {
              : fmt::format("an error of at most {} m", command.error);
 }
 
-Record RowOf(const Trial& trial, const Trial& best, double horizon) {
-  Record row;
-  row.Set("formulation", trial.choice.method.formulation);
-  row.Set("enforcement", std::string(ToString(trial.choice.method.enforcement)));
-  row.Set("coordinates", std::string(ToString(trial.choice.method.coordinates)));
-  row.Set("integrator", trial.choice.integrator);
-  if (trial.choice.step > 0.0) {
-    row.Set("step", trial.choice.step);
-  } else {
-    row.Set("rtol", trial.choice.rtol);
-  }
-  row.Set("outcome", std::string(ToString(trial.outcome)));
-  row.Set("warnings", trial.warnings);
-  if (std::isfinite(trial.error)) row.Set("error_position_max", trial.error);
-  row.Set("wall_s", trial.wall_s);
-  row.Set("ratio", trial.wall_s / best.wall_s);
-  row.Set("realtime_factor", horizon / trial.wall_s);
-  row.Set("rhs_evaluations", trial.rhs_evaluations);
-  return row;
-}
-
-Table TableOf(const std::vector<Trial>& trials, const Trial& best, double horizon) {
+Table TableOf(const std::vector<Trial>& trials, const Trial& best) {
   Table table;
+  table.columns = {{"formulation", "formulation"},
+                   {"enforcement", "enforcement"},
+                   {"coordinates", "coords"},
+                   {"integrator", "integrator"},
+                   {"rtol", "rtol", Format::kScientific},
+                   {"step", "step [s]", Format::kScientific},
+                   {"outcome", "outcome"},
+                   {"error_position_max", "error [m]", Format::kScientific},
+                   {"wall_s", "wall [s]", Format::kSeconds},
+                   {"ratio", "ratio", Format::kExponent}};
   bool adaptive = false, fixed = false;
   for (const Trial& trial : trials) {
-    (trial.choice.step > 0.0 ? fixed : adaptive) = true;
+    const auto& [method, integrator, rtol, step] = trial.choice;
+    (step > 0.0 ? fixed : adaptive) = true;
+    Record& row = AddRow({method.formulation, method.enforcement, method.coordinates, integrator,
+                          step > 0.0 ? Value() : Value(rtol), step > 0.0 ? Value(step) : Value(),
+                          trial.outcome, std::isfinite(trial.error) ? Value(trial.error) : Value(),
+                          trial.wall_s, trial.wall_s / best.wall_s},
+                         &table);
+    row.Set("warnings", trial.warnings);  // marks the outcome
   }
-  table.columns = {{"formulation", "formulation", Format::kText},
-                   {"enforcement", "enforcement", Format::kText},
-                   {"coordinates", "coords", Format::kText},
-                   {"integrator", "integrator", Format::kText}};
-  if (adaptive) table.columns.push_back({"rtol", "rtol", Format::kScientific});
-  if (fixed) table.columns.push_back({"step", "step [s]", Format::kScientific});
-  for (const TableColumn& column :
-       {TableColumn{"outcome", "outcome", Format::kText},
-        TableColumn{"error_position_max", "error [m]", Format::kScientific},
-        TableColumn{"wall_s", "wall [s]", Format::kSeconds},
-        TableColumn{"ratio", "ratio", Format::kExponent}}) {
-    table.columns.push_back(column);
-  }
-  for (const Trial& trial : trials) table.rows.push_back(RowOf(trial, best, horizon));
+  std::erase_if(table.columns, [&](const TableColumn& column) {
+    return (column.key == "rtol" && !adaptive) || (column.key == "step" && !fixed);
+  });
   return table;
 }
 
@@ -221,7 +206,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
     Print("Generated code: no formulation could be generated and finished\n");
   }
   Print("\nFinalists, timed in turn\n\n");
-  PrintText(ToScreen(TableOf(advice.finalists, best, horizon)));
+  PrintText(ToScreen(TableOf(advice.finalists, best)));
   std::vector<Trial> finished;
   std::vector<std::string> cut_off;
   for (const Trial& trial : advice.looked_at) {
@@ -234,7 +219,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
     }
   }
   Print("\nThe best of each integrator and level (pilot runs)\n\n");
-  PrintText(ToScreen(TableOf(finished, best, horizon)));
+  PrintText(ToScreen(TableOf(finished, best)));
   if (!cut_off.empty()) {
     Print("\nfailed, or stopped because slower than the best: {}\n",
           fmt::format("{}", fmt::join(cut_off, ", ")));
@@ -388,7 +373,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
     PrintAdvice(command, advice, certain.reference, certain.horizon);
     if (command.simplify) PrintModels(command, file, certain, best.wall_s);
   } else {
-    Table table = TableOf(advice.finalists, best, certain.horizon);
+    Table table = TableOf(advice.finalists, best);
     table.notes = {WhatWasTried(advice)};
     if (!shorter.empty()) table.notes.push_back(shorter);
     PrintText(Render(table, command.format));
@@ -410,43 +395,36 @@ int GiveAdvice(const AdviseCommand& command) {
                         [&] { return AdviseInChild(command, file); });
 }
 
-constexpr double kUsualError = 1e-6;
-
 }  // namespace
 
 void AddAdvise(Commands& commands) {
   auto& command = commands.Keep<AdviseCommand>();
-  CLI::App* app = commands.Add("advise", "Recommend the cheapest method that meets an error bound",
-                               [&](const Typed&) {
-                                 if (command.error == 0.0 && command.budget == 0.0)
-                                   command.error = kUsualError;
-                                 return GiveAdvice(command);
-                               });
-  app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
-  CLI::Option* error =
-      app->add_option("--max-error", command.error, "Largest error of points [m] (default: 1e-6)")
-          ->check(NumberFrom(1e-13, 1e9));
-  app->add_option("--budget", command.budget,
-                  "Wall-time budget per simulated second; find the most accurate method")
-      ->check(NumberFrom(1e-9, 1e6))
-      ->excludes(error);
-  app->add_option("--horizon", command.horizon, "Simulated time [s]")
-      ->check(NumberFrom(1e-9, 1e9))
-      ->capture_default_str();
-  app->add_option("--points", command.points,
-                  "Points that define the error: BODY.POINT or BODY (default: all)");
-  app->add_flag("--simplify", command.simplify,
-                "Also try simpler models, with their errors and times (loopbench simplify)")
-      ->excludes("--budget");
-  app->add_flag("--generated", command.generated,
-                "Also time generated code of all formulations with the advice's settings");
-  app->add_flag("--exhaustive", command.exhaustive,
-                "Try all combinations of formulation, level, integrator and tolerance");
-  app->add_option("-o,--out", command.out, "Experiment file that reproduces the recommendation");
-  AddChoice(app, "--format", &command.format, "Output format",
-            {"text", "csv", "markdown", "json", "latex"});
-  AddLimits(app, &command.limits);
-  AddWide(app);
+  commands.Add(
+      "advise", "Recommend the cheapest method that meets an error bound",
+      [&](const Typed&) {
+        constexpr double kUsualError = 1e-6;
+        if (command.error == 0.0 && command.budget == 0.0) command.error = kUsualError;
+        return GiveAdvice(command);
+      },
+      {MechanismArgument(&command.mechanism),
+       {"--max-error", "Largest error of points [m] (default: 1e-6)", &command.error,
+        From(1e-13, 1e9)},
+       {"--budget", "Wall-time budget per simulated second; find the most accurate method",
+        &command.budget, From(1e-9, 1e6), Excludes({"--max-error"})},
+       {"--horizon", "Simulated time [s]", &command.horizon, From(1e-9, 1e9)},
+       {"--points", "Points that define the error: BODY.POINT or BODY (default: all)",
+        &command.points},
+       {"--simplify", "Also try simpler models, with their errors and times (loopbench simplify)",
+        &command.simplify, Excludes({"--budget"})},
+       {"--generated", "Also time generated code of all formulations with the advice's settings",
+        &command.generated},
+       {"--exhaustive", "Try all combinations of formulation, level, integrator and tolerance",
+        &command.exhaustive},
+       {"-o,--out", "Experiment file that reproduces the recommendation", &command.out},
+       TableFormatOption(&command.format),
+       CpuOption(&command.limits),
+       MemoryOption(&command.limits),
+       WideOption()});
 }
 
 }  // namespace loopbench::harness

@@ -18,7 +18,6 @@
 #include "harness/suite/reference_cases.h"
 #include "harness/suite/workload.h"
 #include "harness/text/files.h"
-#include "harness/text/numeric_option.h"
 #include "harness/text/run_program.h"
 #include "harness/text/terminal.h"
 
@@ -262,24 +261,19 @@ int Baseline(const BaselineCommand& command, const std::string& typed) {
 
 void AddBaseline(Commands& commands) {
   auto& command = commands.Keep<BaselineCommand>();
-  CLI::App* app = commands.Add("baseline", "Keep and check a baseline of drift and counts",
-                               [&](const Typed& typed) { return Baseline(command, typed.line); });
-  app->add_option("action", command.action, "Action")
-      ->required()
-      ->check(CLI::IsMember({"check", "renew", "selftest"}));
-  app->add_option("--experiments", command.experiments, "Experiment files (JSON)")
-      ->required()
-      ->check(CLI::ExistingFile);
-  app->add_option("--dir", command.dir, "Folder of the baseline, to be committed")->required();
-  app->add_option("--counts", command.counts,
-                  "Benchmarks (JSON) for instruction counts by valgrind")
-      ->check(CLI::ExistingFile);
-  app->add_option("--count-program", command.counter,
-                  "Path of loopbench_count (default: beside this program, or in PATH)");
-  app->add_option("-j,--jobs", command.jobs, "Cases to run in parallel")
-      ->check(NumberFrom(1, 1024))
-      ->capture_default_str();
-  app->add_option("--keep-output", command.keep, "New folder for the measurements (default: none)");
+  commands.Add(
+      "baseline", "Keep and check a baseline of drift and counts",
+      [&](const Typed& typed) { return Baseline(command, typed.line); },
+      {{"action", "Action", &command.action, kRequired, OneOf({"check", "renew", "selftest"})},
+       {"--experiments", "Experiment files (JSON)", &command.experiments, kRequired, kExists,
+        kTakesAll},
+       {"--dir", "Folder of the baseline, to be committed", &command.dir, kRequired},
+       {"--counts", "Benchmarks (JSON) for instruction counts by valgrind", &command.counts,
+        kExists},
+       {"--count-program", "Path of loopbench_count (default: beside this program, or in PATH)",
+        &command.counter},
+       {"-j,--jobs", "Cases to run in parallel", &command.jobs, From(1, 1024)},
+       {"--keep-output", "New folder for the measurements (default: none)", &command.keep}});
 }
 
 }  // namespace loopbench::harness

@@ -20,7 +20,6 @@
 #include "harness/suite/workload.h"
 #include "harness/tables/fit.h"
 #include "harness/text/files.h"
-#include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
@@ -29,9 +28,11 @@ namespace {
 struct SubmitCommand {
   ClusterRun run;
   std::filesystem::path folder;
-  bool again = false;    ///< only parts of an existing folder that are neither done nor queued
-  bool queue = true;     ///< false: write the folder only, for another engine
-  bool dry_run = false;  ///< print the scripts, write nothing
+  bool again = false;     ///< only parts of an existing folder that are neither done nor queued
+  bool no_queue = false;  ///< write the folder only, for another engine
+  bool dry_run = false;   ///< print the scripts, write nothing
+  bool no_timing = false;
+  std::string time, partition;  ///< further options of sbatch
 };
 
 std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path& folder) {
@@ -79,7 +80,7 @@ int SubmitAgain(const SubmitCommand& command) {
   ClusterRun run = ReadClusterRun(command.folder);
   std::vector<int> parts = PartsNotDone(run, command.folder);
   if (!command.dry_run) WriteScripts(run, command.folder);
-  if (!command.queue) {
+  if (command.no_queue) {
     if (parts.empty()) {
       Print("{}: every part is done\n", command.folder.string());
     } else {
@@ -148,7 +149,7 @@ Table StatusTable(const ClusterRun& run, const std::vector<PartProgress>& parts)
     const auto number = [](double value) {
       return std::isfinite(value) ? Value(static_cast<std::int64_t>(value)) : Value();
     };
-    AddRow({name, state, number(cases), Count(finished), Count(other), number(left)}, &table);
+    AddRow({name, state, number(cases), finished, other, number(left)}, &table);
   };
   for (const PartProgress& part : parts) {
     add(std::to_string(part.part), part.state, part.cases, part.done, part.failed);
@@ -236,7 +237,7 @@ int Submit(SubmitCommand command) {
   }
   WriteScripts(run, folder);
   Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
-  if (command.queue) {
+  if (!command.no_queue) {
     Queue(parts, folder, &run);
   } else {
     PrintHowToRun(folder);
@@ -305,84 +306,67 @@ int Collect(const std::filesystem::path& folder) {
 }
 
 /// Rejects further options: the folder contains all options of the first submission.
-void RequireNothingElse(const CLI::App& submit) {
+void RequireNothingElse(const std::vector<std::string>& given) {
   const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
-  for (const CLI::Option* option : submit.get_options()) {
-    if (option->count() == 0 || may_stand.contains(option->get_name())) continue;
-    throw ConfigError(fmt::format("--resubmit: found {} beside it, expected none: the folder knows",
-                                  option->get_name()));
+  for (const std::string& option : given) {
+    if (may_stand.contains(option)) continue;
+    throw ConfigError(
+        fmt::format("--resubmit: found {} beside it, expected none: the folder knows", option));
   }
 }
 
-struct TypedSubmit {
-  SubmitCommand submit;
-  std::string time, partition;
-  bool no_timing = false, no_queue = false;
-};
-
-int SubmitAsTyped(const CLI::App& app, TypedSubmit* typed) {
-  SubmitCommand& submit = typed->submit;
+int SubmitAsTyped(SubmitCommand submit, const Typed& typed) {
   ClusterRun& run = submit.run;
   if (submit.again != run.experiments.empty()) {
     throw ConfigError(
         submit.again ? "--resubmit: found experiments beside it, expected none: the folder knows"
                      : "submit: found no experiment, expected at least one, or --resubmit");
   }
-  if (submit.again) RequireNothingElse(app);
-  if (!typed->time.empty()) run.batch_options.push_back("--time=" + typed->time);
-  if (!typed->partition.empty()) run.batch_options.push_back("--partition=" + typed->partition);
+  if (submit.again) RequireNothingElse(typed.given);
+  if (!submit.time.empty()) run.batch_options.push_back("--time=" + submit.time);
+  if (!submit.partition.empty()) run.batch_options.push_back("--partition=" + submit.partition);
   for (const std::string& option : run.batch_options) {
     if (option.starts_with("--")) continue;
     throw ConfigError("--sbatch: found '" + option + "', expected an option that begins with --");
   }
-  run.timing = !typed->no_timing;
-  submit.queue = !typed->no_queue;
+  run.timing = !submit.no_timing;
   return Submit(submit);
 }
 
 }  // namespace
 
 void AddCluster(Commands& commands) {
-  auto& typed = commands.Keep<TypedSubmit>();
-  CLI::App*& app = commands.Keep<CLI::App*>();
-  app = commands.Add("submit", "Run experiments in parts on a cluster (Slurm)",
-                     [&](const Typed&) { return SubmitAsTyped(*app, &typed); });
-  ClusterRun& run = typed.submit.run;
-  app->add_option("experiment", run.experiments, "Experiment files (JSON)")
-      ->check(CLI::ExistingFile);
-  app->add_option("-o,--out", typed.submit.folder,
-                  "New folder on a file system that all machines share")
-      ->required();
-  app->add_option("--tasks", run.parts, "Number of parts, one array task each")
-      ->check(NumberFrom(1, kMaxParts));
-  app->add_option("-j,--jobs", run.jobs, "Cases in parallel per part, and processors of its task")
-      ->check(NumberFrom(1, kMaxJobs))
-      ->capture_default_str();
-  app->add_option("--time", typed.time, "Time limit of a part, in the format of sbatch");
-  app->add_option("--partition", typed.partition, "Slurm partition");
-  app->add_option("--sbatch", run.batch_options,
-                  "Further option of sbatch: --sbatch=--account=mine (repeatable)");
-  app->add_option("--filter", run.conditions,
-                  "Only cases with key=value[,value] (or !=, <, <=, >, >=)");
-  app->add_option("--set", run.settings, "Set a field before reading: /json/pointer=value");
-  app->add_flag("--no-timing", typed.no_timing,
-                "Skip timings: parts on one machine disturb each other");
-  app->add_flag("--isolate", run.isolate, "Run each case in its own process");
-  app->add_flag("--resubmit", typed.submit.again, "Submit only incomplete parts of this folder");
-  app->add_flag("--no-queue", typed.no_queue, "Write the folder without submitting");
-  app->add_flag("--dry-run", typed.submit.dry_run, "Print the scripts without writing");
-
+  auto& submit = commands.Keep<SubmitCommand>();
+  ClusterRun& run = submit.run;
+  commands.Add(
+      "submit", "Run experiments in parts on a cluster (Slurm)",
+      [&](const Typed& typed) { return SubmitAsTyped(submit, typed); },
+      {{"experiment", "Experiment files (JSON)", &run.experiments, kExists},
+       {"-o,--out", "New folder on a file system that all machines share", &submit.folder,
+        kRequired},
+       {"--tasks", "Number of parts, one array task each", &run.parts, From(1, kMaxParts),
+        ShowsDefault(false)},
+       {"-j,--jobs", "Cases in parallel per part, and processors of its task", &run.jobs,
+        From(1, kMaxJobs)},
+       {"--time", "Time limit of a part, in the format of sbatch", &submit.time},
+       {"--partition", "Slurm partition", &submit.partition},
+       {"--sbatch", "Further option of sbatch: --sbatch=--account=mine (repeatable)",
+        &run.batch_options},
+       {"--filter", "Only cases with key=value[,value] (or !=, <, <=, >, >=)", &run.conditions},
+       {"--set", "Set a field before reading: /json/pointer=value", &run.settings},
+       {"--no-timing", "Skip timings: parts on one machine disturb each other", &submit.no_timing},
+       {"--isolate", "Run each case in its own process", &run.isolate},
+       {"--resubmit", "Submit only incomplete parts of this folder", &submit.again},
+       {"--no-queue", "Write the folder without submitting", &submit.no_queue},
+       {"--dry-run", "Print the scripts without writing", &submit.dry_run}});
   auto& folder = commands.Keep<std::filesystem::path>();
   auto& json = commands.Keep<bool>();
-  CLI::App* status = commands.Add("status", "Show the progress of a submitted run",
-                                  [&](const Typed&) { return PrintStatus(folder, json); });
-  status->add_option("folder", folder, "Folder created by submit")->required();
-  AddJson(status, &json);
-  AddWide(status);
-
-  CLI::App* collect = commands.Add("collect", "Merge the parts of a submitted run",
-                                   [&](const Typed&) { return Collect(folder); });
-  collect->add_option("folder", folder, "Folder created by submit")->required();
+  const Option argument = {"folder", "Folder created by submit", &folder, kRequired};
+  commands.Add("status", "Show the progress of a submitted run",
+               [&](const Typed&) { return PrintStatus(folder, json); },
+               {argument, JsonOption(&json), WideOption()});
+  commands.Add("collect", "Merge the parts of a submitted run",
+               [&](const Typed&) { return Collect(folder); }, {argument});
 }
 
 }  // namespace loopbench::harness

@@ -1,43 +1,109 @@
-// Subcommands of the program, and options that several of them share.
+// Subcommands of the program as rows: names, sentences, options, functions.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
 #include "harness/isolation/processes.h"
 #include "harness/record/select.h"
-#include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"
+
+namespace CLI {
+class App;
+}
 
 namespace loopbench::harness {
 
 /// Command line of a call.
 struct Typed {
-  std::string line;   ///< for provenance (CommandLine)
-  std::string again;  ///< in shell syntax (ShellLine)
+  std::string line;                ///< for provenance (CommandLine)
+  std::string again;               ///< in shell syntax (ShellLine)
+  std::vector<std::string> given;  ///< names of the options in it, such as "--out"
 };
 
-/// Returns the section of a command in docs/reference/commands.md as plain text.
-std::string HelpSection(const std::string& command);
+/// Place of an option's value. A place for bool is a flag. Conditions and settings are read after
+/// all options, so that their mistakes are mistakes of the command and not of its syntax.
+using OptionPlace =
+    std::variant<bool*, int*, double*, std::string*, std::optional<std::string>*,
+                 std::filesystem::path*, std::vector<std::string>*, std::vector<int>*,
+                 std::vector<double>*, std::vector<std::filesystem::path>*, Selection*,
+                 std::vector<Setting>*, void (*)()>;
 
-/// Returns the layout of --help: a metavariable and the default of each option.
-std::shared_ptr<CLI::FormatterBase> HelpLayout();
+/// Rules for the value of an option.
+struct OptionRules {
+  bool required = false;
+  std::vector<std::string> words = {};  ///< accepted words; empty: any
+  double from = 0.0, to = 0.0;          ///< accepted numbers, if to > from
+  bool splits = false;                  ///< a list "a,b" is several values
+  bool exists = false;                  ///< the value is an existing file
+  bool takes_all = false;               ///< takes all words up to the next option
+  int most = 0;                         ///< number of an argument's values; 0: by its place
+  std::string needs = "";               ///< option without which this one has no meaning
+  std::vector<std::string> excludes = {};
+  /// Default in --help; otherwise it is there unless empty or zero.
+  std::optional<bool> shows_default = std::nullopt;
+};
 
-/// The subcommands of the program. The object owns option values: `app` parses into them.
+inline constexpr auto kRequired = [](OptionRules& rules) { rules.required = true; };
+inline constexpr auto kSplits = [](OptionRules& rules) { rules.splits = true; };
+inline constexpr auto kExists = [](OptionRules& rules) { rules.exists = true; };
+inline constexpr auto kTakesAll = [](OptionRules& rules) { rules.takes_all = true; };
+inline auto OneOf(const std::vector<std::string>& words) {
+  return [words](OptionRules& rules) { rules.words = words; };
+}
+inline auto From(double from, double to) {
+  return [from, to](OptionRules& rules) { rules.from = from, rules.to = to; };
+}
+inline auto Most(int most) {
+  return [most](OptionRules& rules) { rules.most = most; };
+}
+inline auto Needs(const char* option) {
+  return [option](OptionRules& rules) { rules.needs = option; };
+}
+inline auto Excludes(const std::vector<std::string>& options) {
+  return [options](OptionRules& rules) { rules.excludes = options; };
+}
+inline auto ShowsDefault(bool shows) {
+  return [shows](OptionRules& rules) { rules.shows_default = shows; };
+}
+
+/// Option or argument of a command, and its line in --help, manual pages and completion.
+struct Option {
+  template <class... Rules>
+  Option(std::string option_names, std::string text, OptionPlace value, const Rules&... set_rules)
+      : names(std::move(option_names)), sentence(std::move(text)), place(value) {
+    (set_rules(rules), ...);
+  }
+
+  std::string names;  ///< "-o,--out", or the name of an argument
+  std::string sentence;
+  OptionPlace place;
+  OptionRules rules;
+};
+
+/// Runs a parsed command and returns its exit code.
+using CommandFunction = std::function<int(const Typed&)>;
+
+struct Command {
+  std::string heading;  ///< in `loopbench --help`
+  std::string name;     ///< "history add" is a command of "history", which has no function
+  std::string sentence;
+  CommandFunction run;
+  std::vector<Option> options;
+  std::string notes;  ///< in --help, before the command's section of docs/reference/commands.md
+};
+
+/// The subcommands of the program, and the values of their options.
 class Commands {
  public:
-  /// Runs a parsed subcommand and returns its exit code.
-  using Runner = std::function<int(const Typed&)>;
-
-  explicit Commands(CLI::App* app) : app_(app) {}
-
-  CLI::App* app() const { return app_; }
-
+  /// Keeps a value in which options are parsed.
   template <class T>
   T& Keep(T value = {}) {
     const auto kept = std::make_shared<T>(std::move(value));
@@ -45,23 +111,23 @@ class Commands {
     return *kept;
   }
 
-  CLI::App* Add(const std::string& name, const std::string& sentence, Runner run) {
-    runners_.emplace_back(app_->add_subcommand(name, sentence), std::move(run));
-    return runners_.back().first->footer(HelpSection(name));
+  void Add(std::string name, std::string sentence, CommandFunction run = nullptr,
+           std::vector<Option> options = {}, std::string notes = "") {
+    rows_.push_back({heading, std::move(name), std::move(sentence), std::move(run),
+                     std::move(options), std::move(notes)});
   }
 
-  /// Runs the parsed subcommand and returns its exit code, 0 if there is none.
-  int Run(const Typed& typed) const {
-    for (const auto& [app, run] : runners_) {
-      if (*app) return run(typed);
-    }
-    return 0;
-  }
+  /// Parses the command line and runs its command. Prints help, or a mistake. Returns the exit
+  /// code.
+  int Run(int argc, char** argv, const std::string& footer);
+
+  std::string heading;  ///< of the commands that are added next, in `loopbench --help`
 
  private:
-  CLI::App* app_;
+  void AddShell(const CLI::App& app);
+
+  std::vector<Command> rows_;
   std::vector<std::shared_ptr<void>> kept_;
-  std::vector<std::pair<CLI::App*, Runner>> runners_;
 };
 
 // Each function adds one subcommand or several related ones.
@@ -76,13 +142,10 @@ void AddSchema(Commands& commands);
 void AddMigrate(Commands& commands);
 void AddAdvise(Commands& commands);
 void AddView(Commands& commands);
-void AddTable(Commands& commands);
-void AddPlot(Commands& commands);
+void AddResults(Commands& commands);
+void AddVerdicts(Commands& commands);
 void AddTradeoff(Commands& commands);
 void AddTrajectory(Commands& commands);
-void AddVerdict(Commands& commands);
-void AddMap(Commands& commands);
-void AddReport(Commands& commands);
 void AddImport(Commands& commands);
 void AddConvert(Commands& commands);
 void AddGenerate(Commands& commands);
@@ -91,76 +154,67 @@ void AddComparison(Commands& commands);
 void AddBaseline(Commands& commands);
 void AddCluster(Commands& commands);
 void AddHistory(Commands& commands);
-void AddShell(Commands& commands);
-
-/// Returns the message of a failed parse: unknown words with spelling suggestions, or `error`.
-std::string ParseFailure(const CLI::App& app, const CLI::Error& error);
 
 /// Returns the message, with the remedy if an unknown key in it is an old name.
 std::string WithMigrationHint(std::string message);
 
-inline Selection ParseSelection(const std::vector<std::string>& conditions) {
-  Selection selection;
-  for (const std::string& text : conditions) selection.push_back(ParseCondition(text));
-  return selection;
+inline Option WideOption() {
+  return {"--wide", "Show all columns; do not fit tables to the terminal", &ShowWide};
 }
 
-inline std::vector<Setting> ParseSettings(const std::vector<std::string>& texts) {
-  std::vector<Setting> settings;
-  for (const std::string& text : texts) settings.push_back(ParseSetting(text));
-  return settings;
+// Limits of the work on a mechanism file. Experiments contain their own ("limits").
+inline Option CpuOption(ProcessLimits* limits) {
+  return {"--cpu-limit", "CPU time limit per mechanism file [s]", &limits->cpu_s, From(0.001, 1e9)};
+}
+inline Option MemoryOption(ProcessLimits* limits) {
+  return {"--memory-limit", "Memory limit per mechanism file [MiB]", &limits->memory_mb,
+          From(1.0, 1e9)};
 }
 
-/// Adds --wide, for commands that print tables.
-inline void AddWide(CLI::App* app) {
-  app->add_flag_callback("--wide", ShowWide, "Show all columns; do not fit tables to the terminal");
+inline Option FormatOption(std::string* format, std::vector<std::string> words,
+                           const std::string& sentence = "Output format") {
+  return {"--format", sentence, format, OneOf(std::move(words))};
+}
+inline Option TableFormatOption(std::string* format) {
+  return FormatOption(format, {"text", "csv", "markdown", "json", "latex"});
 }
 
-/// Adds limits of the work on a mechanism file; experiments contain their own ("limits").
-inline void AddLimits(CLI::App* app, ProcessLimits* limits) {
-  app->add_option("--cpu-limit", limits->cpu_s, "CPU time limit per mechanism file [s]")
-      ->check(NumberFrom(0.001, 1e9))
-      ->capture_default_str();
-  app->add_option("--memory-limit", limits->memory_mb, "Memory limit per mechanism file [MiB]")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
+inline Option OutOption(std::filesystem::path* out) {
+  return {"-o,--out", "Output file (default: the terminal)", out};
 }
 
-/// Adds an option whose value, with its default, is one of `words`.
-inline void AddChoice(CLI::App* app, const std::string& name, std::string* word,
-                      const std::string& text, const std::vector<std::string>& words) {
-  app->add_option(name, *word, text)->check(CLI::IsMember(words))->capture_default_str();
+inline Option JsonOption(bool* json) {
+  return {"--json", "One JSON document instead (docs/using.md has its keys)", json};
 }
 
-inline CLI::Option* AddJson(CLI::App* app, bool* json) {
-  return app->add_flag("--json", *json, "One JSON document instead (docs/using.md has its keys)");
+inline Option WhereOption(Selection* where) {
+  return {"--where", "Only these records: key=value[,value] (or !=, <, <=, >, >=)", where};
 }
 
-inline void AddFilter(CLI::App* app, std::vector<std::string>* conditions) {
-  app->add_option("--filter", *conditions,
-                  "Only these cases: key=value[,value] (or !=, <, <=, >, >=)");
+inline Option FilterOption(Selection* filter) {
+  return {"--filter", "Only these cases: key=value[,value] (or !=, <, <=, >, >=)", filter};
 }
 
-inline void AddWhere(CLI::App* app, std::vector<std::string>* conditions) {
-  app->add_option("--where", *conditions,
-                  "Only these records: key=value[,value] (or !=, <, <=, >, >=)");
+inline Option SetOption(std::vector<Setting>* settings) {
+  return {"--set", "Change a field of the file: /json/pointer=value", settings};
 }
 
-/// Repeatable option with one value each: a second word would be a file name.
-inline void AddSettings(CLI::App* app, std::vector<std::string>* settings) {
-  app->add_option("--set", *settings, "Change a field of the file: /json/pointer=value");
+inline Option SizeOption(std::string* size) {
+  return {"--size", "Width of figures: 85 mm or 178 mm, letters of 8 pt", size,
+          OneOf({"one-column", "two-column"})};
 }
 
-inline void AddSize(CLI::App* app, std::string* size) {
-  AddChoice(app, "--size", size, "Width of figures: 85 mm or 178 mm, letters of 8 pt",
-            {"one-column", "two-column"});
+inline Option GateOption(std::string* gate) {
+  return {"--fail-on", "Exit with status 1 if a shown accuracy run has warnings or did not finish",
+          gate, OneOf({"warnings"})};
 }
 
-inline CLI::Option* AddGate(CLI::App* app, std::string* gate) {
-  return app
-      ->add_option("--fail-on", *gate,
-                   "Exit with status 1 if a shown accuracy run has warnings or did not finish")
-      ->check(CLI::IsMember({"warnings"}));
+inline Option StoreArgument(std::filesystem::path* store) {
+  return {"store", "Folder of a run, or a .jsonl file", store, kRequired};
+}
+
+inline Option MechanismArgument(std::filesystem::path* mechanism) {
+  return {"mechanism", "Mechanism file (JSON)", mechanism, kRequired};
 }
 
 }  // namespace loopbench::harness

@@ -24,6 +24,8 @@
 #include "harness/suite/suite.h"
 #include "harness/tables/table.h"
 #include "harness/tables/table_view.h"
+#include "harness/text/terminal.h"
+#include "mechanism/simplify/structure.h"
 
 namespace loopbench::harness {
 
@@ -79,6 +81,9 @@ struct TableCommand {
   std::filesystem::path out;    ///< file; standard output if empty
   std::string gate;             ///< "warnings" or "": checks the rows shown
 };
+
+/// Writes `text` to `out` and says so; prints it if `out` is empty.
+void Deliver(const std::string& text, const std::filesystem::path& out);
 
 void AppendProvenance(Table& table, const std::string& typed);
 
@@ -147,5 +152,67 @@ int PrintComparison(const CompareCommand& command, const std::string& typed);
 /// `name` to its description. Throws ConfigError if there is none.
 std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
                                     bool only_times, std::string* name);
+
+// Keys that files of each kind may contain, as JSON Schema and as tables.
+
+/// Names of the kinds, as in the files configs/schema/KIND.schema.json.
+std::vector<std::string> SchemaKinds();
+
+/// Returns the JSON Schema (draft 07) of a kind: the contents of its file in configs/schema/.
+std::string SchemaOfKind(const std::string& kind);
+
+/// Returns Markdown tables of the keys of files of these kinds: the contents of docs/fields.md.
+std::string TablesOfKinds(const std::vector<std::string>& kinds);
+
+// Output of explain, simplify and view: tables that fit the terminal.
+
+/// Amount and width of the output of explain.
+struct ExplainView {
+  bool all = false;  ///< all rows; else the first rows of long tables and the number of others
+  /// Width of the terminal [cells]; 0: unlimited; nullopt: there is no terminal.
+  std::optional<std::size_t> width = {};
+  /// Document that gets the sections under their keys (--json) instead of the terminal.
+  JsonObject* document = nullptr;
+};
+
+/// Returns the view of standard output.
+ExplainView ViewOfOutput(bool all);
+
+/// Prints a sentence for people, unless there is a document.
+template <typename... Values>
+void Say(const ExplainView& view, fmt::format_string<internal::PrintedAs<Values>...> format,
+         const Values&... values) {
+  if (view.document == nullptr) Print<Values...>(format, values...);
+}
+
+/// Prints a title and an indented table, as wide as the terminal. Without a terminal, breaks the
+/// last column into lines that end at 100 characters. In a document, stores all rows under `key`,
+/// if it has one.
+void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
+                  const char* key = "");
+
+/// Formats a number with six digits; -0 is 0.
+std::string ShortNumber(double value);
+/// Formats a vector as "1 0.5 -2".
+template <class Vector>
+std::string Spaced(const Vector& vector) {
+  std::string text;
+  for (Eigen::Index i = 0; i < vector.size(); ++i) {
+    text += (i == 0 ? "" : " ") + ShortNumber(vector[i]);
+  }
+  return text;
+}
+
+/// Prints the model, the start and the structure of a mechanism. Returns 2, after all other output,
+/// if the start cannot be assembled.
+int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view);
+
+/// Prints the contents of a file: gravity, bodies, joints, their frames, forces.
+void PrintModel(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view);
+
+/// Prints the assembled start: coordinates and speeds of all joints, energy.
+void PrintStart(const MechanismDescription& description, const Structure& structure,
+                const ExplainView& view);
 
 }  // namespace loopbench::harness

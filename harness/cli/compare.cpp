@@ -23,7 +23,6 @@
 #include "harness/tables/columns.h"
 #include "harness/tables/fit.h"
 #include "harness/text/files.h"
-#include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
@@ -49,15 +48,6 @@ std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
   return records;
 }
 
-void Deliver(const std::string& text, const std::filesystem::path& out) {
-  if (out.empty()) {
-    PrintText(text);
-  } else {
-    WriteFileAtomically(out, text);
-    Print("wrote {}\n", out.string());
-  }
-}
-
 /// One row per group of measures: number of compared values with each judgement.
 Table SummaryTable(const ComparisonReport& comparison) {
   Table table;
@@ -69,15 +59,14 @@ Table SummaryTable(const ComparisonReport& comparison) {
                    {"different", "different", Format::kInteger},
                    {"not_measured", "not measured", Format::kInteger}};
   for (const std::string& group : GroupNames()) {
-    std::vector<Value> row = {group};
-    int all = 0;
-    for (const Judgement judgement : {Judgement::kSame, Judgement::kBetter, Judgement::kWorse,
-                                      Judgement::kDifferent, Judgement::kNotMeasured}) {
-      const int count = comparison.Count(judgement, group);
-      row.emplace_back(std::int64_t{count});
-      all += count;
-    }
-    if (all > 0) AddRow(row, &table);
+    const auto is_in_group = [&group](const Finding& finding) {
+      return GroupOf(finding.measure.rule) == group;
+    };
+    if (std::ranges::none_of(comparison.findings, is_in_group)) continue;
+    const auto count = [&](Judgement judgement) { return comparison.Count(judgement, group); };
+    AddRow({group, count(Judgement::kSame), count(Judgement::kBetter), count(Judgement::kWorse),
+            count(Judgement::kDifferent), count(Judgement::kNotMeasured)},
+           &table);
   }
   return table;
 }
@@ -109,7 +98,7 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
     for (const Finding& finding : comparison.findings) {
       if (finding.judgement != judgement) continue;
       const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
-      AddRow({std::string(ToString(judgement)), finding.one,
+      AddRow({judgement, finding.one,
               unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit), finding.base,
               finding.fresh, std::isfinite(finding.ratio) ? Value(finding.ratio) : Value(),
               finding.why},
@@ -396,67 +385,56 @@ void TakeFiles(const std::vector<std::filesystem::path>& files, CompareCommand* 
 void AddCompare(Commands& commands) {
   auto& command = commands.Keep<CompareCommand>();
   auto& files = commands.Keep<std::vector<std::filesystem::path>>();
-  auto& conditions = commands.Keep<std::vector<std::string>>();
-  CLI::App* app = commands.Add("compare", "Compare results with a baseline and report regressions",
-                               [&](const Typed& typed) {
-                                 command.where = ParseSelection(conditions);
-                                 TakeFiles(files, &command);
-                                 return PrintComparison(command, typed.line);
-                               });
-  app->add_option("base", files, kMeasurements + "; omit BASE with --history or --branch")
-      ->required()
-      ->expected(1, 2)
-      ->option_text("BASE NEW");
-  CLI::Option* history = app->add_option("--history", command.history,
-                                         "Take the last good state of this history as BASE");
-  app->add_option("--branch", command.branch, "Last good state of a history on this git branch")
-      ->excludes(history);
-  app->add_option("--markdown", command.markdown,
-                  "Write a summary for a pull request to this file too");
-  app->add_option("--junit", command.junit, "Write JUnit XML for a CI server to this file too");
-  app->add_option("--only", command.options.only, "Only this group (repeatable)")
-      ->check(CLI::IsMember(GroupNames()));
-  app->add_option("--where", conditions,
-                  "Only records of both with key=value[,value] (or !=, <, <=, >, >=)");
-  app->add_option("--match", command.options.match,
-                  "KEY[,KEY]: cases meet by these keys, whatever else they were run with "
-                  "(default: all keys, and equal mechanisms and limits)")
-      ->delimiter(',');
-  app->add_flag("--allow-missing", command.options.subset, "NEW may lack cases of BASE");
-  app->add_flag("--added", command.options.added,
-                "NEW may have cases that BASE lacks (always with a history)");
-  app->add_option("--error-ratio", command.options.error_ratio, "Allowed on the same build")
-      ->check(NumberFrom(1.0, 1e9))
-      ->capture_default_str();
-  AddChoice(app, "--format", &command.format, "Output format (csv: all measures)",
-            {"text", "csv", "markdown"});
-  AddWide(app);
-  AddJson(app, &command.json);
+  CompareOptions& options = command.options;
+  commands.Add(
+      "compare", "Compare results with a baseline and report regressions",
+      [&](const Typed& typed) {
+        TakeFiles(files, &command);
+        return PrintComparison(command, typed.line);
+      },
+      {{"base", kMeasurements + "; omit BASE with --history or --branch", &files, kRequired,
+        Most(2)},
+       {"--history", "Take the last good state of this history as BASE", &command.history},
+       {"--branch", "Last good state of a history on this git branch", &command.branch,
+        Excludes({"--history"})},
+       {"--markdown", "Write a summary for a pull request to this file too", &command.markdown},
+       {"--junit", "Write JUnit XML for a CI server to this file too", &command.junit},
+       {"--only", "Only this group (repeatable)", &options.only, OneOf(GroupNames())},
+       {"--where", "Only records of both with key=value[,value] (or !=, <, <=, >, >=)",
+        &command.where},
+       {"--match",
+        "KEY[,KEY]: cases meet by these keys, whatever else they were run with (default: all "
+        "keys, and equal mechanisms and limits)",
+        &options.match, kSplits},
+       {"--allow-missing", "NEW may lack cases of BASE", &options.subset},
+       {"--added", "NEW may have cases that BASE lacks (always with a history)", &options.added},
+       {"--error-ratio", "Allowed on the same build", &options.error_ratio, From(1.0, 1e9)},
+       FormatOption(&command.format, {"text", "csv", "markdown"},
+                    "Output format (csv: all measures)"),
+       WideOption(),
+       JsonOption(&command.json)});
 }
 
 void AddFit(Commands& commands) {
   auto& command = commands.Keep<FitCommand>();
-  CLI::App* app = commands.Add("fit-scaling",
-                               "Fit scaling exponents of right-hand sides against mechanism size",
-                               [&](const Typed& typed) { return PrintFits(command, typed.line); });
-  app->add_option("file", command.file,
-                  "JSON of Google Benchmark, or a result store with timings of families")
-      ->required();
-  app->add_option("--min-size", command.from, "Leave out sizes below [bodies]")
-      ->check(NumberFrom(0.0, 1e9));
-  AddChoice(app, "--format", &command.format, "Output format", {"text", "csv", "markdown"});
-  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
-  AddWide(app);
+  commands.Add("fit-scaling", "Fit scaling exponents of right-hand sides against mechanism size",
+               [&](const Typed& typed) { return PrintFits(command, typed.line); },
+               {{"file", "JSON of Google Benchmark, or a result store with timings of families",
+                 &command.file, kRequired},
+                {"--min-size", "Leave out sizes below [bodies]", &command.from, From(0.0, 1e9)},
+                FormatOption(&command.format, {"text", "csv", "markdown"}),
+                OutOption(&command.out),
+                WideOption()});
 }
 
 void AddExport(Commands& commands) {
   auto& command = commands.Keep<ExportCommand>();
-  CLI::App* app = commands.Add("export-metrics", "Write measurements for a benchmark tracker",
-                               [&](const Typed&) { return ExportMeasurements(command); });
-  app->add_option("file", command.file, kMeasurements)->required();
-  AddChoice(app, "--format", &command.format, "Output format: github-action-benchmark or Bencher",
-            {"customSmallerIsBetter", "bmf"});
-  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
+  commands.Add("export-metrics", "Write measurements for a benchmark tracker",
+               [&](const Typed&) { return ExportMeasurements(command); },
+               {{"file", kMeasurements, &command.file, kRequired},
+                FormatOption(&command.format, {"customSmallerIsBetter", "bmf"},
+                             "Output format: github-action-benchmark or Bencher"),
+                OutOption(&command.out)});
 }
 
 }  // namespace

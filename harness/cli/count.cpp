@@ -310,14 +310,9 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
     return code;
   }
   AppendProvenance(table, typed);
-  if (text.empty()) text = RenderKept(table, command.format);
-  if (command.out.empty()) {
-    PrintText(text);
-  } else {
-    WriteFileAtomically(command.out, text);
-    Print("wrote {}\n", command.out.string());
-    for (const std::string& sentence : crossovers) Print("{}\n", sentence);
-  }
+  Deliver(text.empty() ? RenderKept(table, command.format) : text, command.out);
+  if (command.out.empty()) return code;
+  for (const std::string& sentence : crossovers) Print("{}\n", sentence);
   return code;
 }
 
@@ -325,36 +320,28 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
 
 void AddCount(Commands& commands) {
   auto& command = commands.Keep<CountCommand>();
-  CLI::App* app =
-      commands.Add("count", "Count the operations of right-hand sides exactly",
-                   [&](const Typed& typed) { return CountOperations(command, typed.line); });
-  app->add_option("mechanisms", command.mechanisms, "Mechanism files (JSON)");
-  CLI::Option* family =
-      app->add_option("--family", command.family,
-                      "Family of mechanisms of any size; also prints how counts grow with size, "
-                      "and which method is cheapest at which size")
-          ->check(CLI::IsMember(NamesOfSizedFamilies()));
-  app->add_option("--sizes", command.sizes, "Sizes of the family's members: a,b")
-      ->delimiter(',')
-      ->needs(family);
-  app->add_option("--formulation", command.formulations, "Formulations (default: all): a,b")
-      ->delimiter(',')
-      ->check(CLI::IsMember(FormulationNamesWithoutPeers()));
-  app->add_option("--enforcement", command.levels, "Levels (default: all that are recorded): a,b")
-      ->delimiter(',')
-      ->check(CLI::IsMember(LevelNames()));
-  app->add_option("--coordinates", command.coordinates, "Coordinate sets (default: both): a,b")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"joint", "absolute"}));
-  app->add_option("--solver", command.solvers, "Solvers: a,b")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"plain", "rank-revealing"}))
-      ->capture_default_str();
-  AddChoice(app, "--format", &command.format, "Output format",
-            {"text", "csv", "markdown", "json", "latex", "jsonl"});
-  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
-  AddWide(app);
-  AddLimits(app, &command.limits);
+  commands.Add(
+      "count", "Count the operations of right-hand sides exactly",
+      [&](const Typed& typed) { return CountOperations(command, typed.line); },
+      {{"mechanisms", "Mechanism files (JSON)", &command.mechanisms},
+       {"--family",
+        "Family of mechanisms of any size; also prints how counts grow with size, and which "
+        "method is cheapest at which size",
+        &command.family, OneOf(NamesOfSizedFamilies())},
+       {"--sizes", "Sizes of the family's members: a,b", &command.sizes, kSplits,
+        Needs("--family")},
+       {"--formulation", "Formulations (default: all): a,b", &command.formulations,
+        OneOf(FormulationNamesWithoutPeers()), kSplits},
+       {"--enforcement", "Levels (default: all that are recorded): a,b", &command.levels,
+        OneOf(LevelNames()), kSplits},
+       {"--coordinates", "Coordinate sets (default: both): a,b", &command.coordinates,
+        OneOf({"joint", "absolute"}), kSplits},
+       {"--solver", "Solvers: a,b", &command.solvers, OneOf({"plain", "rank-revealing"}), kSplits},
+       FormatOption(&command.format, {"text", "csv", "markdown", "json", "latex", "jsonl"}),
+       OutOption(&command.out),
+       WideOption(),
+       CpuOption(&command.limits),
+       MemoryOption(&command.limits)});
 }
 
 }  // namespace loopbench::harness

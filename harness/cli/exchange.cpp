@@ -1,25 +1,120 @@
-// import and convert: mechanisms from and for other programs.
+// view, import, export-mechanism, generate: mechanisms as pictures, and for other programs.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
+#include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/exchange/export_c.h"
 #include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/import.h"
+#include "harness/integrator/arkode.h"
 #include "harness/isolation/processes.h"
+#include "harness/record/provenance.h"
 #include "harness/record/record.h"
+#include "harness/run/case_identity.h"
 #include "harness/text/files.h"
-#include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"
+#include "harness/view/html.h"
+#include "harness/view/picture.h"
+#include "harness/view/svg.h"
+#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
+namespace {
+
+struct ViewCommand {
+  std::filesystem::path mechanism;
+  std::string format;         ///< html, svg or text; "" for the ending of `out`, else html
+  std::filesystem::path out;  ///< "": NAME.html or NAME.svg in this folder; text: the terminal
+  SvgOptions svg;
+  bool all = false;  ///< every row of long tables
+  ProcessLimits limits = kFileLimits;
+};
+
+std::string FormatOf(const ViewCommand& command) {
+  if (!command.format.empty()) return command.format;
+  const std::string ending = command.out.extension().string();
+  if (ending == ".svg") return "svg";
+  return ending == ".txt" ? "text" : "html";
+}
+
+void PrintPicture(const Picture& picture, const ExplainView& view) {
+  Print("{} ({})\n", picture.name, picture.file);
+  if (!picture.freedom.empty()) Print("  degrees of freedom: {}\n", picture.freedom);
+  for (const Table& table : ToTables(picture)) {
+    Table untitled = table;
+    untitled.title.clear();
+    PrintSection(table.title, untitled, view);
+  }
+  if (!picture.notes.empty()) Print("\nWhat a run leaves out, and what is not shown\n");
+  for (const std::string& note : picture.notes) Print("  {}\n", note);
+}
+
+int ViewHere(const ViewCommand& command, const std::string& format, const ExplainView& view) {
+  const Picture picture =
+      MakePicture(ReadMechanism(command.mechanism).description, command.mechanism.string());
+  if (format == "text" && command.out.empty()) {
+    PrintPicture(picture, view);
+  } else {
+    std::filesystem::path out = command.out;
+    if (out.empty()) out = FileName(command.mechanism.stem().string()) + "." + format;
+    std::string text;
+    if (format == "text") {
+      for (const Table& table : ToTables(picture)) text += ToText(table) + "\n";
+    } else {
+      text = format == "svg" ? ToSvg(picture, command.svg) : ToHtml(picture);
+    }
+    WriteFileAtomically(out, text);
+    Print("wrote {}: {} bodies, {} joints, {} motions, {} kB\n", out.string(), picture.bodies - 1,
+          picture.joints, picture.motions.size(), (text.size() + 999) / 1000);
+  }
+  if (picture.assembled) return 0;
+  PrintError("not assembled: {}\n", picture.message);
+  return 2;
+}
+
+/// Returns 0, or 2 if the start cannot be assembled: the picture then shows the mechanism of the
+/// file with its open loops.
+int View(const ViewCommand& command) {
+  const std::string format = FormatOf(command);
+  if (format == "html" && command.svg.view != ViewNames().front()) {
+    throw ConfigError("--view is for svg: a page is turned by hand");
+  }
+  const ExplainView view = ViewOfOutput(command.all);
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return ViewHere(command, format, view); });
+}
+
+}  // namespace
+
+void AddView(Commands& commands) {
+  auto& command = commands.Keep<ViewCommand>();
+  commands.Add(
+      "view", "Draw a mechanism: interactive HTML, SVG or text",
+      [&](const Typed&) { return View(command); },
+      {MechanismArgument(&command.mechanism),
+       FormatOption(&command.format, {"html", "svg", "text"},
+                    "Output format (default: by the ending of --out, else html)"),
+       {"-o,--out", "Output file (default: NAME.html or NAME.svg here; text goes to the terminal)",
+        &command.out},
+       {"--view", "Viewing direction of a spatial mechanism (SVG)", &command.svg.view,
+        OneOf(ViewNames())},
+       {"--no-annotations", "SVG of the mechanism alone, without text and unassembled start",
+        &command.svg.plain},
+       {"--all", "Print all rows of long tables (text)", &command.all},
+       CpuOption(&command.limits),
+       MemoryOption(&command.limits)});
+}
+
 namespace {
 
 struct ImportCommand {
@@ -68,6 +163,7 @@ JsonObject Document(const Imported& imported, const ImportCommand& command,
   return document;
 }
 
+/// Writes the mechanism and prints the parts of the file that it lacks.
 int ImportHere(const ImportCommand& command) {
   const std::filesystem::path out = OutOf(command);
   const Imported imported = ImportMechanism(command.file, command.options);
@@ -88,12 +184,6 @@ int ImportHere(const ImportCommand& command) {
         out.string(), ToString(description.space), description.bodies.size() - 1,
         description.joints.size(), description.forces.size(), imported.notes.size(), changed);
   return 0;
-}
-
-/// Writes the mechanism and prints the parts of the file that it lacks. The work is done in a child
-/// process under the limits.
-int Import(const ImportCommand& command) {
-  return PrintFromChild(command.file.string(), command.limits, [&] { return ImportHere(command); });
 }
 
 /// Parses three numbers: "0,0,-1.62".
@@ -118,30 +208,28 @@ Eigen::Vector3d ParseGravity(const std::string& text) {
 void AddImport(Commands& commands) {
   auto& command = commands.Keep<ImportCommand>();
   auto& gravity = commands.Keep<std::string>();
-  CLI::App* app =
-      commands.Add("import", "Read a mechanism of MuJoCo (MJCF), URDF or SDF", [&](const Typed&) {
-        if (!gravity.empty()) command.options.gravity = ParseGravity(gravity);
-        return Import(command);
-      });
   ImportOptions& options = command.options;
-  app->add_option("file", command.file, "Model file (XML)")->required();
-  app->add_option("-o,--out", command.out, "Mechanism file (default: NAME.json here)");
-  app->add_option("--input-format", options.format, "Expected input format")
-      ->check(CLI::IsMember(ImportFormats()));
-  app->add_option("--loops", options.sidecar,
-                  "Sidecar file (JSON): loops, joints, forces, initial, gravity, known_solution");
-  app->add_flag("--planar", options.planar,
-                "Import as a planar mechanism; an error if it is spatial");
-  app->add_flag("--floating", options.floats, "Free root link instead of a fixed one (URDF)");
-  app->add_flag("--keep-digits", options.keeps_digits,
-                "Keep rounded angles and directions (1.5708) as written");
-  app->add_option("--gravity", gravity, "Gravity x,y,z [m/s^2] instead of the file's");
-  app->add_flag("--json", command.json,
-                "One JSON document instead (docs/exchange.md has its keys)");
-  AddLimits(app, &command.limits);
+  commands.Add(
+      "import", "Read a mechanism of MuJoCo (MJCF), URDF or SDF",
+      [&](const Typed&) {
+        if (!gravity.empty()) command.options.gravity = ParseGravity(gravity);
+        return PrintFromChild(command.file.string(), command.limits,
+                              [&] { return ImportHere(command); });
+      },
+      {{"file", "Model file (XML)", &command.file, kRequired},
+       {"-o,--out", "Mechanism file (default: NAME.json here)", &command.out},
+       {"--input-format", "Expected input format", &options.format, OneOf(ImportFormats())},
+       {"--loops", "Sidecar file (JSON): loops, joints, forces, initial, gravity, known_solution",
+        &options.sidecar},
+       {"--planar", "Import as a planar mechanism; an error if it is spatial", &options.planar},
+       {"--floating", "Free root link instead of a fixed one (URDF)", &options.floats},
+       {"--keep-digits", "Keep rounded angles and directions (1.5708) as written",
+        &options.keeps_digits},
+       {"--gravity", "Gravity x,y,z [m/s^2] instead of the file's", &gravity},
+       {"--json", "One JSON document instead (docs/exchange.md has its keys)", &command.json},
+       CpuOption(&command.limits),
+       MemoryOption(&command.limits)});
 }
-
-// convert: writes a mechanism in the format of another program.
 
 namespace {
 
@@ -181,6 +269,8 @@ int Refuse(const ConvertCommand& command, const std::string& name,
   return 2;
 }
 
+/// Returns 0. If the format cannot represent parts of the mechanism, prints them, writes nothing
+/// and returns 2.
 int ConvertHere(const ConvertCommand& command) {
   const exchange::ExportFormat& format = FormatNamed(command.to);
   const MechanismDescription mechanism = ReadMechanism(command.mechanism).description;
@@ -209,13 +299,6 @@ int ConvertHere(const ConvertCommand& command) {
   return 0;
 }
 
-/// Returns 0. If the format cannot represent parts of the mechanism, prints them, writes nothing
-/// and returns 2.
-int Convert(const ConvertCommand& command) {
-  return PrintFromChild(command.mechanism.string(), command.limits,
-                        [&] { return ConvertHere(command); });
-}
-
 std::vector<std::string> ExportFormatNames() {
   std::vector<std::string> names;
   for (const exchange::ExportFormat& format : exchange::ExportFormats()) {
@@ -228,19 +311,202 @@ std::vector<std::string> ExportFormatNames() {
 
 void AddConvert(Commands& commands) {
   auto& command = commands.Keep<ConvertCommand>();
-  CLI::App* app = commands.Add("export-mechanism", "Write a mechanism for MuJoCo or Simbody",
-                               [&](const Typed&) { return Convert(command); });
-  app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
-  app->add_option("--to", command.to, "mjcf: MuJoCo model; simbody: C++17 program")
-      ->required()
-      ->check(CLI::IsMember(ExportFormatNames()));
-  app->add_option("-o,--out", command.out, "Output file (default: NAME.xml or NAME.cpp here)");
-  app->add_option("--step", command.options.time_step,
-                  "MuJoCo's step [s]; loop constraints are as stiff as it permits (mjcf)")
-      ->check(NumberFrom(1e-12, 1e3))
-      ->capture_default_str();
-  AddJson(app, &command.json);
-  AddLimits(app, &command.limits);
+  commands.Add("export-mechanism", "Write a mechanism for MuJoCo or Simbody",
+               [&](const Typed&) {
+                 return PrintFromChild(command.mechanism.string(), command.limits,
+                                       [&] { return ConvertHere(command); });
+               },
+               {MechanismArgument(&command.mechanism),
+                {"--to", "mjcf: MuJoCo model; simbody: C++17 program", &command.to, kRequired,
+                 OneOf(ExportFormatNames())},
+                {"-o,--out", "Output file (default: NAME.xml or NAME.cpp here)", &command.out},
+                {"--step", "MuJoCo's step [s]; loop constraints are as stiff as it permits (mjcf)",
+                 &command.options.time_step, From(1e-12, 1e3)},
+                JsonOption(&command.json),
+                CpuOption(&command.limits),
+                MemoryOption(&command.limits)});
+}
+
+namespace {
+
+struct GenerateCommand {
+  std::filesystem::path mechanism, out;
+  std::filesystem::path fmu;  ///< "": none
+  std::string formulation = "lagrange", level = "acceleration", coordinates = "joint";
+  std::string solver = "rank-revealing";
+  double horizon = 10.0;  ///< length of the motion whose branches are generated [s]
+  double step = 0.0;      ///< step of the example and of co-simulation [s]; 0: from the motion
+  bool json = false;
+  ProcessLimits limits = kFileLimits;
+};
+
+// integrator of the motion along which branches are recorded
+constexpr const char* kProfile = "ode45";
+constexpr double kTolerance = 1e-6;
+constexpr std::size_t kMinStates = 500, kMaxStates = 2000;
+
+struct Motion {
+  generate::RecordingStart start;
+  std::vector<exchange::MotionState> states = {};
+  Outcome outcome = Outcome::kFinished;
+  double t_reached = 0.0;
+  double step = 0.0;  ///< for fixed steps
+};
+
+/// Returns a quarter of the median step of `states`, at most 1 ms, rounded down to 1, 2, 5 x 10^n.
+double StepOf(const std::vector<exchange::MotionState>& states) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < states.size(); ++i) steps.push_back(states[i].t - states[i - 1].t);
+  if (steps.empty()) return 1e-3;
+  std::ranges::nth_element(steps, steps.begin() + std::ssize(steps) / 2);
+  const double step = std::min(1e-3, steps[steps.size() / 2] / 4.0);
+  const double decade = std::pow(10.0, std::floor(std::log10(step) + 1e-9));
+  return decade * (step >= 5.0 * decade ? 5.0 : step >= 2.0 * decade ? 2.0 : 1.0);
+}
+
+/// Returns accepted steps of the motion from the assembled start; the mode of the start is kept, as
+/// in generated code.
+template <class Space>
+Motion Move(const GenerateCommand& command, const generate::RecordingSubject& subject) {
+  const Mechanism<Space, double> mechanism(subject.description, subject.coordinates);
+  const Start<double> start = Assemble<Space>(subject.description, mechanism);
+  if (start.outcome != Outcome::kFinished) {
+    throw ConfigError(fmt::format("{}: {}: {}", command.mechanism.string(), ToString(start.outcome),
+                                  start.message));
+  }
+  const auto system = MakeFormulation<Space>(subject.formulation, mechanism, subject.options);
+  Motion motion{.start = {0.0, start.q, start.u}};
+  motion.outcome = system->Start(0.0, start.q, start.u);
+  std::vector<double> y(static_cast<std::size_t>(system->size()));
+  system->ToState(start.q, start.u, y);
+  IntegratorOptions options;
+  options.profile = kProfile;
+  options.stop_times = mechanism.stop_times();
+  options.max_step = command.horizon / kMinStates;
+  options.rtol = options.atol = kTolerance;
+  const auto note = [&](double t, std::span<double> state) {
+    motion.states.push_back({t, {state.begin(), state.end()}});
+    return StepAction::kContinue;
+  };
+  const IntegratorResult result = Integrate(*system, 0.0, command.horizon, y, options, note);
+  motion.outcome = result.outcome;
+  motion.t_reached = result.t_reached;
+  motion.step = command.step > 0.0 ? command.step : StepOf(motion.states);
+  const std::size_t every = motion.states.size() / kMaxStates + 1;
+  for (std::size_t i = 0; i * every < motion.states.size(); ++i) {
+    std::swap(motion.states[i], motion.states[i * every]);
+  }
+  motion.states.resize((motion.states.size() + every - 1) / every);
+  return motion;
+}
+
+int GenerateHere(const GenerateCommand& command) {
+  if (!command.fmu.empty()) RequireOutput(command.fmu);
+  const MechanismFile file = ReadMechanism(command.mechanism);
+  const SimplifiedProblem problem = SimplifyProblem(file.description, file.observe, {});
+  const MechanismDescription& description = problem.compiled.parts.front().description;
+  std::vector<std::string> lines;
+  std::istringstream version(VersionText());
+  for (std::string line; std::getline(version, line);) lines.push_back(line);
+  exchange::CodeRequest request{
+      .subject = {.description = description,
+                  .coordinates = *Parse<Coordinates>(command.coordinates),
+                  .formulation = command.formulation,
+                  .options = {.enforcement = *Parse<Enforcement>(command.level),
+                              .solver = *Parse<SolverKind>(command.solver)}},
+      .provenance = {lines.at(0) + ", " + lines.at(1),
+                     fmt::format("{}: formulation {}, level {}, {} coordinates, solver {}",
+                                 command.mechanism.filename().string(), command.formulation,
+                                 command.level, command.coordinates, command.solver)}};
+  const Motion motion = description.space == SpaceKind::kPlanar
+                            ? Move<Planar>(command, request.subject)
+                            : Move<Spatial>(command, request.subject);
+  request.start = motion.start;
+  request.motion = motion.states;
+  request.step = motion.step;
+  exchange::Code code;
+  std::string fmu;
+  try {
+    code = exchange::MakeCode(request);
+    if (!command.fmu.empty()) fmu = exchange::MakeFmu(code, file.description.name, motion.step);
+  } catch (const generate::NotCovered& why) {
+    throw ConfigError(command.mechanism.string() + ": cannot be generated: " + why.what());
+  }
+  for (const exchange::CodeFile& part : code.files) {
+    WriteFileAtomically(command.out / part.name, part.text);
+  }
+  if (!fmu.empty()) WriteFileAtomically(command.fmu, fmu);
+  std::vector<JsonObject> functions;
+  for (const exchange::CodeFunction& function : code.functions) {
+    functions.emplace_back()
+        .Add("name", function.name)
+        .Add("flops", function.operations)
+        .Add("branches", std::int64_t{function.branches})
+        .Add("states_missed", static_cast<std::int64_t>(function.missed));
+  }
+  if (command.json) {
+    JsonObject document;
+    document.Add("file", command.mechanism.string())
+        .Add("out", command.out.string())
+        .Add("identifier", code.identifier)
+        .Add("states", static_cast<std::int64_t>(code.state_names.size()))
+        .Add("t_reached", motion.t_reached)
+        .Add("functions", functions);
+    PrintText(document.Text() + "\n");
+    return 0;
+  }
+  Print("wrote {0}.h, {0}.c, {0}_example.c and CMakeLists.txt to {1}{2}\n", code.identifier,
+        command.out.string(), fmu.empty() ? "" : ", and " + command.fmu.string());
+  Print("{} states; weighted operations (branches): ", code.state_names.size());
+  bool is_first = true;
+  for (const exchange::CodeFunction& function : code.functions) {
+    Print("{}{} {} ({})", is_first ? "" : ", ", function.name, function.operations,
+          function.branches);
+    is_first = false;
+  }
+  Print("\n");
+  if (motion.outcome != Outcome::kFinished) {
+    Print(
+        "warning: the motion ended as {} at t = {:.6g} s of {:.6g} s; branches behind that are "
+        "missing\n",
+        ToString(motion.outcome), motion.t_reached, command.horizon);
+  }
+  for (const exchange::CodeFunction& function : code.functions) {
+    if (function.missed == 0) continue;
+    Print("warning: {}: {} branches do not serve {} of {} states of the motion\n", function.name,
+          function.branches, function.missed, motion.states.size());
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddGenerate(Commands& commands) {
+  auto& command = commands.Keep<GenerateCommand>();
+  commands.Add(
+      "generate", "Write a mechanism's equations of motion as C99 or FMU",
+      [&](const Typed&) {
+        return PrintFromChild(command.mechanism.string(), command.limits,
+                              [&] { return GenerateHere(command); });
+      },
+      {MechanismArgument(&command.mechanism),
+       {"-o,--out", "Folder of the C files", &command.out, kRequired},
+       {"--fmu", "File for an FMU (FMI 2.0) of the same code", &command.fmu},
+       {"--formulation", "Formulation", &command.formulation,
+        OneOf(FormulationNamesWithoutPeers())},
+       {"--enforcement", "Level of enforcement", &command.level,
+        OneOf({"acceleration", "velocity"})},
+       {"--coordinates", "Coordinate set", &command.coordinates, OneOf({"joint", "absolute"})},
+       {"--solver", "Solver", &command.solver, OneOf({"plain", "rank-revealing"})},
+       {"--horizon", "Duration of the motion whose branches are generated [s]", &command.horizon,
+        From(0.0, 1e6)},
+       {"--step",
+        "Step of the example and of co-simulation [s] (default: a quarter of the median step of "
+        "ode45 at 1e-6, at most 1e-3)",
+        &command.step, From(1e-9, 1e3)},
+       JsonOption(&command.json),
+       CpuOption(&command.limits),
+       MemoryOption(&command.limits)});
 }
 
 }  // namespace loopbench::harness

@@ -28,7 +28,7 @@ namespace {
 
 struct CheckCommand {
   ExperimentFiles files;
-  bool assembly = true;  ///< assemble the starts of mechanisms and problems
+  bool no_assembly = false;  ///< do not assemble the starts of mechanisms and problems
   ProcessLimits limits = kFileLimits;
   bool json = false;
 };
@@ -185,7 +185,7 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
     AddUnitWarnings(path, problem.mechanism.description, &checked);
   }
   for (const Experiment& experiment : experiments) CheckLadders(experiment);
-  if (command.assembly) AddStarts(path, CheckStarts(experiments), &checked);
+  if (!command.no_assembly) AddStarts(path, CheckStarts(experiments), &checked);
   const std::string& name = experiments.front().name;
   checked.sentence = fmt::format("experiment \"{}\", {} cases", name, overview.cases());
   if (overview.combinations > 1) {
@@ -194,7 +194,7 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
   if (overview.is_sample) {
     checked.sentence += fmt::format(
         "; each value of each axis was read, and the starts of {} combinations assembled",
-        command.assembly ? experiments.size() : 0);
+        command.no_assembly ? 0 : experiments.size());
   }
   checked.document.Add("kind", std::string("experiment"))
       .Add("name", name)
@@ -210,7 +210,7 @@ Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& co
   const MechanismFile file = ReadMechanism(path);
   Checked checked;
   AddUnitWarnings(path, file.description, &checked);
-  if (command.assembly) {
+  if (!command.no_assembly) {
     StartReport report = CheckStart(file.description, command.limits);
     for (std::string& warning : report.warnings) warning = file.description.name + ": " + warning;
     AddStarts(path, report, &checked);
@@ -313,37 +313,27 @@ int CheckFiles(const CheckCommand& command) {
 }  // namespace
 
 void AddList(Commands& commands) {
-  auto& settings = commands.Keep<std::vector<std::string>>();
-  auto& conditions = commands.Keep<std::vector<std::string>>();
   auto& files = commands.Keep<ExperimentFiles>();
   auto& json = commands.Keep<bool>();
-  CLI::App* app = commands.Add("list", "Show the cases of experiments", [&](const Typed&) {
-    files.filter = ParseSelection(conditions);
-    files.settings = ParseSettings(settings);
-    return List(files, json);
-  });
-  app->add_option("experiment", files.paths, "Experiment files (JSON)")->required();
-  AddFilter(app, &conditions);
-  AddSettings(app, &settings);
-  AddWide(app);
-  AddJson(app, &json);
+  commands.Add("list", "Show the cases of experiments",
+               [&](const Typed&) { return List(files, json); },
+               {{"experiment", "Experiment files (JSON)", &files.paths, kRequired},
+                FilterOption(&files.filter),
+                SetOption(&files.settings),
+                WideOption(),
+                JsonOption(&json)});
 }
 
 void AddCheck(Commands& commands) {
   auto& command = commands.Keep<CheckCommand>();
-  auto& settings = commands.Keep<std::vector<std::string>>();
-  auto& no_assembly = commands.Keep<bool>();
-  CLI::App* app = commands.Add(
-      "check", "Validate files and solve for consistent initial conditions", [&](const Typed&) {
-        command.files.settings = ParseSettings(settings);
-        command.assembly = !no_assembly;
-        return CheckFiles(command);
-      });
-  app->add_option("file", command.files.paths, "Files (JSON)")->required();
-  app->add_flag("--no-assembly", no_assembly, "Read files without assembling mechanisms");
-  AddLimits(app, &command.limits);
-  AddJson(app, &command.json);
-  AddSettings(app, &settings);
+  commands.Add("check", "Validate files and solve for consistent initial conditions",
+               [&](const Typed&) { return CheckFiles(command); },
+               {{"file", "Files (JSON)", &command.files.paths, kRequired},
+                {"--no-assembly", "Read files without assembling mechanisms", &command.no_assembly},
+                CpuOption(&command.limits),
+                MemoryOption(&command.limits),
+                JsonOption(&command.json),
+                SetOption(&command.files.settings)});
 }
 
 }  // namespace loopbench::harness

@@ -1,5 +1,4 @@
 // explain: problems, methods, runs and measures of an experiment.
-#include "harness/cli/explain.h"
 
 #include <fmt/format.h>
 
@@ -41,9 +40,8 @@ void ExplainProblems(const Experiment& experiment) {
                    {"file", "file"}};
   for (const ExperimentProblem& problem : experiment.problems) {
     const MechanismDescription& description = problem.mechanism.description;
-    AddRow({problem.name, std::string(ToString(description.space)),
-            Count(description.bodies.size() - 1), Count(description.joints.size()),
-            Numbers(problem.horizons), problem.path.string()},
+    AddRow({problem.name, description.space, description.bodies.size() - 1,
+            description.joints.size(), Numbers(problem.horizons), problem.path},
            &table);
   }
   PrintSection("Problems", table, ViewOfOutput(true));
@@ -57,13 +55,12 @@ void ExplainMethods(const Experiment& experiment) {
                    {"coordinates", "coordinates"},
                    {"solver", "solver"}};
   for (const Method& method : experiment.methods) {
-    std::vector<Value> row;
-    for (const std::string& word : CLI::detail::split(ToString(method), '/')) row.push_back(word);
-    if (row.size() > table.columns.size()) {  // a peer's name contains a slash
-      row.front() = std::get<std::string>(row[0]) + "/" + std::get<std::string>(row[1]);
-      row.erase(row.begin() + 1);
-    }
-    AddRow(row, &table);
+    // a peer's name contains a slash; the solver is followed by threads and execution
+    const std::string rest = ToString(method).substr(method.formulation.size() + 1);
+    const std::size_t first = rest.find('/'), second = rest.find('/', first + 1);
+    AddRow({method.formulation, rest.substr(0, first), rest.substr(first + 1, second - first - 1),
+            rest.substr(second + 1)},
+           &table);
   }
   PrintSection("Methods", table, ViewOfOutput(true));
   const auto define = [&](std::string_view word, std::string_view sentence, auto is) {
@@ -312,8 +309,6 @@ int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimi
 
 }  // namespace
 
-// Tables of explain on the terminal.
-
 namespace {
 
 constexpr std::size_t kMaxRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
@@ -395,26 +390,21 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
 }
 
 void AddExplain(Commands& commands) {
-  auto& settings = commands.Keep<std::vector<std::string>>();
-  auto& conditions = commands.Keep<std::vector<std::string>>();
   auto& files = commands.Keep<ExperimentFiles>();
   auto& limits = commands.Keep(kFileLimits);
   auto& all = commands.Keep<bool>();
   auto& json = commands.Keep<bool>();
-  CLI::App* app = commands.Add(
-      "explain", "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)",
-      [&](const Typed&) {
-        files.filter = ParseSelection(conditions);
-        files.settings = ParseSettings(settings);
-        return Explain(files, all, json, limits);
-      });
-  app->add_option("file", files.paths, "Experiment or mechanism files (JSON)")->required();
-  AddFilter(app, &conditions);
-  AddLimits(app, &limits);
-  AddSettings(app, &settings);
-  AddWide(app);
-  AddJson(app, &json);
-  app->add_flag("--all", all, "Print all rows of long tables");
+  commands.Add("explain",
+               "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)",
+               [&](const Typed&) { return Explain(files, all, json, limits); },
+               {{"file", "Experiment or mechanism files (JSON)", &files.paths, kRequired},
+                FilterOption(&files.filter),
+                CpuOption(&limits),
+                MemoryOption(&limits),
+                SetOption(&files.settings),
+                WideOption(),
+                JsonOption(&json),
+                {"--all", "Print all rows of long tables", &all}});
 }
 
 }  // namespace loopbench::harness

@@ -5,7 +5,7 @@
 #include <array>
 
 #include "harness/analysis/model_warnings.h"
-#include "harness/cli/explain.h"
+#include "harness/cli/commands.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/case_identity.h"
 #include "harness/text/terminal.h"
@@ -37,17 +37,10 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
     std::vector<std::string> joints, bodies;
     for (const int j : loop.joints) joints.push_back(description.joints[j].name);
     for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
-    Record row;
-    row.Set("cut", description.joints[loop.cut_joint].name);
-    row.Set("shift", loop.open_shift);
-    row.Set("turn", loop.open_rotation);
-    row.Set("what", std::string("joints"));
-    row.Set("through", Names(joints, view));
-    table.rows.push_back(row);
-    Record second;
-    second.Set("what", std::string("bodies"));
-    second.Set("through", Names(bodies, view));
-    table.rows.push_back(second);
+    AddRow({description.joints[loop.cut_joint].name, loop.open_shift, loop.open_rotation, "joints",
+            Names(joints, view)},
+           &table);
+    AddRow({"", Value(), Value(), "bodies", Names(bodies, view)}, &table);
   }
   return table;
 }
@@ -113,12 +106,9 @@ void PrintIslands(const MechanismDescription& description, const Structure& stru
                    {"held", "connected to", Format::kText, {}}};
   for (std::size_t i = 0; i < structure.islands.size(); ++i) {
     const Island& island = structure.islands[i];
-    Record row;
-    row.Set("subsystem", static_cast<std::int64_t>(i + 1));
-    row.Set("bodies", static_cast<std::int64_t>(island.bodies.size()));
-    row.Set("first", description.bodies[island.bodies.front()].name);
-    row.Set("held", std::string(island.grounded ? "ground" : "nothing (floating)"));
-    table.rows.push_back(row);
+    AddRow({i + 1, island.bodies.size(), description.bodies[island.bodies.front()].name,
+            island.grounded ? "ground" : "nothing (floating)"},
+           &table);
   }
   PrintSection("Separate subsystems, connected through ground at most", table, view, "subsystems");
 }
@@ -133,17 +123,13 @@ void PrintCoordinates(const Structure& structure, const ExplainView& view) {
                    {"free", "independent speeds", Format::kInteger, {}}};
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     const bool joint = set == Coordinates::kJoint;
-    Record row;
-    row.Set("set", std::string(ToString(set)));
-    row.Set("q", std::int64_t{joint ? structure.joint_q : structure.absolute_q});
-    row.Set("u", std::int64_t{joint ? structure.joint_u : structure.absolute_u});
-    row.Set("rows", std::int64_t{joint ? structure.loop_rows : structure.rows});
-    if (structure.analysed) {
-      const int speeds = joint ? structure.joint_u : structure.absolute_u;
-      row.Set("rank", std::int64_t{speeds - structure.freedom()});
-      row.Set("free", std::int64_t{structure.freedom()});
-    }
-    table.rows.push_back(row);
+    const int speeds = joint ? structure.joint_u : structure.absolute_u;
+    Record& row = AddRow({set, joint ? structure.joint_q : structure.absolute_q, speeds,
+                          joint ? structure.loop_rows : structure.rows},
+                         &table);
+    if (!structure.analysed) continue;
+    row.Set("rank", std::int64_t{speeds - structure.freedom()});
+    row.Set("free", std::int64_t{structure.freedom()});
   }
   PrintSection("Coordinates", table, view, "coordinates");
 }
@@ -165,13 +151,8 @@ void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView
     const odca::Plan plan = description.space == SpaceKind::kPlanar
                                 ? PlanFor<Planar>(description, solver)
                                 : PlanFor<Spatial>(description, solver);
-    Record row;
-    row.Set("solver", std::string(ToString(solver)));
-    row.Set("depth", std::int64_t{plan.depth()});
-    row.Set("handles", std::int64_t{plan.most_handles()});
-    row.Set("largest", std::int64_t{plan.largest_join()});
-    row.Set("loops", std::int64_t{plan.loop_joins()});
-    table.rows.push_back(row);
+    AddRow({solver, plan.depth(), plan.most_handles(), plan.largest_join(), plan.loop_joins()},
+           &table);
   }
   PrintSection("Plan of O-DCA", table, view, "odca_plan");
 }

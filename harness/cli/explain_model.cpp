@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "harness/cli/explain.h"
+#include "harness/cli/commands.h"
 #include "harness/text/terminal.h"
 #include "mechanism/model/mechanism.h"
 
@@ -123,15 +123,10 @@ Table JointTable(const MechanismDescription& description, const Structure& struc
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
     const int free = FreeSpeeds(description.space, joint);
-    Record& row = table.rows.emplace_back();
-    row.Set("name", joint.name);
-    row.Set("type", std::string(ToString(joint.type)));
-    row.Set("from", description.bodies[joint.from.body].name);
-    row.Set("to", description.bodies[joint.to.body].name);
-    row.Set("free", std::int64_t{free});
-    row.Set("rows", std::int64_t{dim - free});
-    row.Set("place", std::string(cut[j] ? "closes a loop" : "tree"));
-    row.Set("given", Given(description.space, joint));
+    AddRow({joint.name, joint.type, description.bodies[joint.from.body].name,
+            description.bodies[joint.to.body].name, free, dim - free,
+            cut[j] ? "closes a loop" : "tree", Given(description.space, joint)},
+           &table);
   }
   return table;
 }
@@ -184,8 +179,8 @@ Table FrameTable(const MechanismDescription& description) {
   return table;
 }
 
-/// Returns a force as "type", "acts on" and "with".
-Record ForceRow(const MechanismDescription& description, ForceDescription force) {
+/// Adds a force as "type", "acts on" and "with".
+void AddForce(const MechanismDescription& description, ForceDescription force, Table* table) {
   const ForceParts parts = PartsOf(force);
   std::vector<std::string> on, with;
   bool is_length = true;
@@ -211,11 +206,9 @@ Record ForceRow(const MechanismDescription& description, ForceDescription force)
     with.push_back(fmt::format("{} {} {}", number.key, ShortNumber(*number.value),
                                number.quantity.Unit(is_length)));
   }
-  Record row;
-  row.Set("type", std::string(parts.name));
-  row.Set("on", fmt::format("{}", fmt::join(on, ", ")));
-  row.Set("with", fmt::format("{}", fmt::join(with, ", ")));
-  return row;
+  AddRow({parts.name, fmt::format("{}", fmt::join(on, ", ")),
+          fmt::format("{}", fmt::join(with, ", "))},
+         table);
 }
 
 Table ForceTable(const MechanismDescription& description) {
@@ -223,9 +216,7 @@ Table ForceTable(const MechanismDescription& description) {
   table.columns = {{"type", "force", Format::kText, {}},
                    {"on", "acts on", Format::kText, {}},
                    {"with", "with", Format::kText, {}}};
-  for (const ForceDescription& force : description.forces) {
-    table.rows.push_back(ForceRow(description, force));
-  }
+  for (const ForceDescription& force : description.forces) AddForce(description, force, &table);
   return table;
 }
 

@@ -21,29 +21,20 @@ namespace loopbench::harness {
 namespace {
 
 struct HistoryAddCommand {
-  HistoryPlace place;
   std::filesystem::path results;
   std::string commit, date;  ///< "": from the checked-out commit
   bool replaces = false;
 };
 
 struct HistoryShowCommand {
-  HistoryPlace place;
   std::string one, measure;  ///< filters: parts of case and measure names; "": all
   std::string format = "text";
   bool json = false;
 };
 
 struct HistoryReportCommand {
-  HistoryPlace place;
   std::filesystem::path out;
-  std::string title;
-};
-
-struct HistoryMarkCommand {
-  HistoryPlace place;
-  std::string commit, mark, note;
-  bool keeps_accepted = false;
+  std::string title = "Measurements over commits";
 };
 
 void PrintWarnings(const std::vector<std::string>& warnings, const OpenHistory& open) {
@@ -138,7 +129,7 @@ JsonObject FindingsDocument(const History& history, const HistoryFindings& found
   return JsonObject().Add("series", all).Add("endings", endings);
 }
 
-int HistoryAdd(const HistoryAddCommand& command) {
+int HistoryAdd(const HistoryPlace& place, const HistoryAddCommand& command) {
   std::vector<std::string> warnings;
   const std::vector<Record> records = ReadMeasurements(command.results, &warnings);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
@@ -156,7 +147,7 @@ int HistoryAdd(const HistoryAddCommand& command) {
     if (entry.date.empty()) entry.date = found.date;
   }
   HistoryEntry added;
-  ChangePlace(command.place, /*may_begin=*/true, [&](const OpenHistory& open) {
+  ChangePlace(place, /*may_begin=*/true, [&](const OpenHistory& open) {
     std::vector<std::string> torn;
     added = AddToHistory(open.folder, entry, records, command.replaces, &torn);
     PrintWarnings(torn, open);
@@ -168,8 +159,9 @@ int HistoryAdd(const HistoryAddCommand& command) {
 }
 
 /// Prints steps, newest first, and the commits. Returns 0.
-int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
-  const auto [history, all] = ReadFindings(command.place);
+int HistoryShow(const HistoryPlace& place, const HistoryShowCommand& command,
+                const std::string& typed) {
+  const auto [history, all] = ReadFindings(place);
   const HistoryFindings found = Chosen(all, command);
   if (command.json) {
     PrintText(FindingsDocument(history, found).Text() + "\n");
@@ -192,24 +184,24 @@ int HistoryShow(const HistoryShowCommand& command, const std::string& typed) {
   return 0;
 }
 
-int HistoryReport(const HistoryReportCommand& command, const std::string& typed) {
-  const auto [history, found] = ReadFindings(command.place);
+int HistoryReport(const HistoryPlace& place, const HistoryReportCommand& command,
+                  const std::string& typed) {
+  const auto [history, found] = ReadFindings(place);
   const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
-  const auto out = !command.out.empty()          ? command.out
-                   : command.place.store.empty() ? std::filesystem::path("history.html")
-                                                 : command.place.store / "history.html";
+  const auto out = !command.out.empty()  ? command.out
+                   : place.store.empty() ? std::filesystem::path("history.html")
+                                         : place.store / "history.html";
   WriteFileAtomically(out, page);
   Print("wrote {}: {} series over {} entries, {} steps, {} kB\n", out.string(), found.series.size(),
         history.entries.size(), found.Steps(), (page.size() + 999) / 1000);
   return 0;
 }
 
-int HistoryMark(const HistoryMarkCommand& command) {
+int HistoryMark(const HistoryPlace& place, const Mark& wanted) {
   Mark mark;
-  ChangePlace(command.place, /*may_begin=*/false, [&](const OpenHistory& open) {
+  ChangePlace(place, /*may_begin=*/false, [&](const OpenHistory& open) {
     std::vector<std::string> torn;
-    mark = MarkInHistory(
-        open.folder, {command.commit, command.mark, command.note, command.keeps_accepted}, &torn);
+    mark = MarkInHistory(open.folder, wanted, &torn);
     PrintWarnings(torn, open);
     return fmt::format("{} is {}", ShortCommit(mark.commit), mark.mark);
   });
@@ -241,82 +233,50 @@ std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string
   return records;
 }
 
-namespace {
-
-void AddPlace(CLI::App* app, HistoryPlace* place) {
-  CLI::Option* store = app->add_option("--store", place->store, "Folder of the history");
-  app->add_option("--branch", place->branch,
-                  "Git branch that contains the history, instead of a folder")
-      ->excludes(store);
-}
-
-struct TypedHistory {
-  CLI::App *add_app, *show_app, *report_app, *mark_app;
-  HistoryPlace place;
-  HistoryAddCommand add;
-  HistoryShowCommand show;
-  HistoryReportCommand report;
-  HistoryMarkCommand mark;
-};
-
-int RunHistory(TypedHistory* typed, const std::string& line) {
-  typed->add.place = typed->show.place = typed->report.place = typed->mark.place = typed->place;
-  if (*typed->add_app) return HistoryAdd(typed->add);
-  if (*typed->show_app) return HistoryShow(typed->show, line);
-  if (*typed->report_app) return HistoryReport(typed->report, line);
-  return HistoryMark(typed->mark);
-}
-
-}  // namespace
-
 void AddHistory(Commands& commands) {
-  auto& typed = commands.Keep<TypedHistory>();
-  CLI::App* app = commands.Add("history", "Follow measurements over commits and find change points",
-                               [&](const Typed& words) { return RunHistory(&typed, words.line); });
-  app->require_subcommand(1);
-
-  typed.add_app = app->add_subcommand("add", "Add the results of a commit");
-  typed.add_app
-      ->add_option("results", typed.add.results,
-                   "Folder of a run, .jsonl, or JSON of Google Benchmark")
-      ->required();
-  typed.add_app->add_option("--commit", typed.add.commit,
-                            "Commit of the results (default: the one checked out)");
-  typed.add_app->add_option("--date", typed.add.date,
-                            "ISO 8601 date that orders commits (default: the commit's)");
-  typed.add_app->add_flag("--replace", typed.add.replaces,
-                          "Replace an earlier measurement of this commit");
-  AddPlace(typed.add_app, &typed.place);
-
-  typed.show_app = app->add_subcommand("show", "List change points and recent commits");
-  typed.show_app->add_option("--case", typed.show.one, "Only cases whose name contains this text");
-  typed.show_app->add_option("--measure", typed.show.measure,
-                             "Only measures whose name contains this text");
-  AddChoice(typed.show_app, "--format", &typed.show.format, "Output format",
-            {"text", "csv", "markdown", "json"});
-  AddPlace(typed.show_app, &typed.place);
-  AddJson(typed.show_app, &typed.show.json);
-  AddWide(typed.show_app);
-
-  typed.report_app =
-      app->add_subcommand("report", "Write an HTML page with all change points and charts");
-  typed.report_app->add_option("-o,--out", typed.report.out,
-                               "Output file (default: history.html in the folder)");
-  typed.report_app->add_option("--title", typed.report.title, "Page title")
-      ->default_val("Measurements over commits");
-  AddPlace(typed.report_app, &typed.place);
-
-  typed.mark_app = app->add_subcommand("mark", "Mark a commit as good, bad or accepted");
-  typed.mark_app->add_option("commit", typed.mark.commit, "Commit hash or prefix")->required();
-  typed.mark_app
-      ->add_option("mark", typed.mark.mark,
-                   "good and accepted: valid base of comparisons; bad: never a base")
-      ->required()
-      ->check(CLI::IsMember({"good", "accepted", "bad"}));
-  typed.mark_app->add_option("--note", typed.mark.note, "Reason, stored with the mark");
-  typed.mark_app->add_flag("--keep-accepted", typed.mark.keeps_accepted,
-                           "Keep an existing mark 'accepted' (for automatic jobs)");
-  AddPlace(typed.mark_app, &typed.place);
+  auto& place = commands.Keep<HistoryPlace>();
+  auto& add = commands.Keep<HistoryAddCommand>();
+  auto& show = commands.Keep<HistoryShowCommand>();
+  auto& report = commands.Keep<HistoryReportCommand>();
+  auto& mark = commands.Keep<Mark>();
+  const Option store = {"--store", "Folder of the history", &place.store};
+  const Option branch = {"--branch", "Git branch that contains the history, instead of a folder",
+                         &place.branch, Excludes({"--store"})};
+  commands.Add("history", "Follow measurements over commits and find change points");
+  commands.Add(
+      "history add", "Add the results of a commit",
+      [&](const Typed&) { return HistoryAdd(place, add); },
+      {{"results", "Folder of a run, .jsonl, or JSON of Google Benchmark", &add.results, kRequired},
+       {"--commit", "Commit of the results (default: the one checked out)", &add.commit},
+       {"--date", "ISO 8601 date that orders commits (default: the commit's)", &add.date},
+       {"--replace", "Replace an earlier measurement of this commit", &add.replaces},
+       store,
+       branch});
+  commands.Add("history show", "List change points and recent commits",
+               [&](const Typed& typed) { return HistoryShow(place, show, typed.line); },
+               {{"--case", "Only cases whose name contains this text", &show.one},
+                {"--measure", "Only measures whose name contains this text", &show.measure},
+                FormatOption(&show.format, {"text", "csv", "markdown", "json"}),
+                store,
+                branch,
+                JsonOption(&show.json),
+                WideOption()});
+  commands.Add("history report", "Write an HTML page with all change points and charts",
+               [&](const Typed& typed) { return HistoryReport(place, report, typed.line); },
+               {{"-o,--out", "Output file (default: history.html in the folder)", &report.out},
+                {"--title", "Page title", &report.title},
+                store,
+                branch});
+  commands.Add("history mark", "Mark a commit as good, bad or accepted",
+               [&](const Typed&) { return HistoryMark(place, mark); },
+               {{"commit", "Commit hash or prefix", &mark.commit, kRequired},
+                {"mark", "good and accepted: valid base of comparisons; bad: never a base",
+                 &mark.mark, kRequired, OneOf({"good", "accepted", "bad"})},
+                {"--note", "Reason, stored with the mark", &mark.note},
+                {"--keep-accepted", "Keep an existing mark 'accepted' (for automatic jobs)",
+                 &mark.keeps_accepted},
+                store,
+                branch});
 }
 
 }  // namespace loopbench::harness

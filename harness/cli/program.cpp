@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -13,7 +12,6 @@
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/record/provenance.h"
 #include "harness/store/result_store.h"
 #include "harness/text/files.h"
 #include "harness/text/run_program.h"
@@ -39,33 +37,6 @@ Formulations: {}.
 Levels of enforcement: {}.
 Exit status: 0 success; 1 a check failed; 2 invalid input, or nothing could be measured; 130 interrupted.)";
 
-/// Makes an option take only the next word, because file names may follow. Only experiments of a
-/// baseline are given as the shell expands them.
-void TakeOneWordEach(CLI::App* app) {
-  for (CLI::Option* option : app->get_options()) {
-    if (!option->get_positional() && !option->check_lname("experiments")) {
-      option->allow_extra_args(false);
-    }
-  }
-  for (CLI::App* command : app->get_subcommands({})) TakeOneWordEach(command);
-}
-
-/// Sets the headings of `loopbench --help`.
-void GroupCommands(CLI::App& app) {
-  const std::pair<const char*, std::vector<const char*>> groups[] = {
-      {"Mechanisms",
-       {"check", "explain", "view", "simplify", "import", "export-mechanism", "count", "generate"}},
-      {"Experiments", {"list", "estimate", "run", "merge", "advise"}},
-      {"Results",
-       {"table", "plot", "report", "trajectory", "work-precision", "robustness", "check-claims"}},
-      {"Regressions", {"compare", "fit-scaling", "export-metrics", "baseline", "history"}},
-      {"Clusters", {"submit", "status", "collect"}},
-      {"Shell", {"schema", "migrate", "completion", "manual"}}};
-  for (const auto& [heading, names] : groups) {
-    for (const char* name : names) app.get_subcommand(name)->group(heading);
-  }
-}
-
 /// Names the largest input of a command that ran out of memory, and its memory limit.
 std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::string>& words) {
   std::string largest;
@@ -89,44 +60,33 @@ std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::stri
   return message + fmt::format(", and this process may use {:.0f} MB", 1e-6 * FreeMemory(true));
 }
 
+/// Commands under the headings of `loopbench --help`.
+const std::pair<const char*, std::vector<void (*)(Commands&)>> kGroups[] = {
+    {"Experiments", {AddRun, AddList, AddPlan, AddAdvise, AddMerge}},
+    {"Mechanisms",
+     {AddCheck, AddExplain, AddView, AddSimplify, AddImport, AddConvert, AddGenerate, AddCount}},
+    {"Results", {AddResults, AddTrajectory, AddTradeoff, AddVerdicts}},
+    {"Regressions", {AddComparison, AddBaseline, AddHistory}},
+    {"Clusters", {AddCluster}},
+    {"Shell", {AddSchema, AddMigrate}}};
+
 int RunCommandLine(int argc, char** argv) {
-  CLI::App app{
-      "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
-      "loopbench"};
-  app.footer(
-      fmt::format(kFooter, fmt::join(FormulationNames(), ", "), fmt::join(LevelNames(), ", ")));
-  app.set_version_flag("--version", VersionText);
-  app.require_subcommand(1);
-  app.formatter(HelpLayout());
-  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
-    return EscapeTerminalLines(ParseFailure(*failed, error));
-  });
-  Commands commands(&app);
-  for (const auto add :
-       {AddRun,     AddList,    AddPlan,       AddAdvise,   AddMerge,      AddCheck,
-        AddExplain, AddView,    AddSimplify,   AddImport,   AddConvert,    AddGenerate,
-        AddCount,   AddTable,   AddPlot,       AddReport,   AddTrajectory, AddTradeoff,
-        AddMap,     AddVerdict, AddComparison, AddBaseline, AddHistory,    AddCluster,
-        AddSchema,  AddMigrate, AddShell}) {
-    add(commands);
-  }
-  TakeOneWordEach(&app);
-  GroupCommands(app);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+  Commands commands;
+  for (const auto& [heading, adders] : kGroups) {
+    commands.heading = heading;
+    for (const auto add : adders) add(commands);
   }
   const CommandInputs inputs;
   try {
-    return commands.Run({CommandLine(argc, argv), ShellLine({argv, argv + argc})});
+    return commands.Run(
+        argc, argv,
+        fmt::format(kFooter, fmt::join(FormulationNames(), ", "), fmt::join(LevelNames(), ", ")));
   } catch (const std::bad_alloc& error) {
     PrintError("{}\n", Lines{OutOfMemory(error, {argv + 1, argv + argc})});
-    return 2;
   } catch (const std::exception& error) {
     PrintError("{}\n", Lines{WithMigrationHint(error.what())});
-    return 2;
   }
+  return 2;
 }
 
 }  // namespace

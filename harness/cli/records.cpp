@@ -213,6 +213,12 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store, const Select
   return records;
 }
 
+void Deliver(const std::string& text, const std::filesystem::path& out) {
+  if (out.empty()) return PrintText(text);
+  WriteFileAtomically(out, text);
+  Print("wrote {}\n", out.string());
+}
+
 void AppendProvenance(Table& table, const std::string& typed) {
   for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
 }

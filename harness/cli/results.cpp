@@ -1,9 +1,10 @@
-// table, plot, verdict, map and report: views of the records of a store.
+// table, plot, report, robustness, check-claims, work-precision: views of the records of a store.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
@@ -14,6 +15,7 @@
 #include "harness/judge/claims.h"
 #include "harness/judge/reports.h"
 #include "harness/judge/robustness_map.h"
+#include "harness/judge/work_precision.h"
 #include "harness/record/provenance.h"
 #include "harness/report/html.h"
 #include "harness/store/result_store.h"
@@ -39,7 +41,7 @@ struct MapCommand {
   std::filesystem::path out;        ///< folder; no files if empty
   std::string format = "svg";       ///< of the picture: svg or pdf
   std::string size = "two-column";  ///< a name of a FigureSize
-  bool gate = false;                ///< return 1 if a required cell does not hold
+  std::string gate;                 ///< "required": return 1 if a required cell does not hold
 };
 
 struct VerdictCommand {
@@ -127,7 +129,7 @@ int WriteMap(const RobustnessMap& map, const MapCommand& command, const std::str
 
 /// Draws only the picture, from the map's own CSV.
 int RedrawMap(const MapRules& rules, const MapCommand& command) {
-  if (command.gate || command.out.empty()) {
+  if (!command.gate.empty() || command.out.empty()) {
     throw ConfigError(
         fmt::format("{}: found a CSV, expected --out and no --fail-on (only the picture is drawn "
                     "of it), or a store",
@@ -170,14 +172,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
     return 2;
   }
   AppendProvenance(table, typed);
-  if (on_terminal) {
-    PrintText(ToScreen(table));
-  } else if (command.out.empty()) {
-    PrintText(RenderKept(table, command.format));
-  } else {
-    WriteFileAtomically(command.out, RenderKept(table, command.format));
-    Print("wrote {}\n", command.out.string());
-  }
+  Deliver(on_terminal ? ToScreen(table) : RenderKept(table, command.format), command.out);
   return command.gate.empty() ? 0 : WarningGate(table.rows);
 }
 
@@ -221,12 +216,12 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
   }
   RequireOneContent(records, command.store, "robustness");
   const RobustnessMap map = MakeRobustnessMap(rules, records);
-  if (command.gate) RequireDemands(map, command.rules);
+  if (!command.gate.empty()) RequireDemands(map, command.rules);
   Table table = MapTable(map);
   AppendProvenance(table, typed);
   PrintText(ToScreen(table));
   const int written = command.out.empty() ? 0 : WriteMap(map, command, typed);
-  if (!command.gate) return written;
+  if (command.gate.empty()) return written;
   const std::vector<std::string> broken = BrokenDemands(map);
   for (const std::string& cell : broken) PrintError("must hold: {}\n", cell);
   return broken.empty() ? written : 1;
@@ -248,95 +243,6 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   if (!command.out.empty()) Print("wrote {}\n", command.out.string());
   return 0;
 }
-
-}  // namespace
-
-void AddTable(Commands& commands) {
-  auto& command = commands.Keep<TableCommand>();
-  auto& conditions = commands.Keep<std::vector<std::string>>();
-  CLI::App* app = commands.Add("table", "Print a table of stored records", [&](const Typed& typed) {
-    command.view.where = ParseSelection(conditions);
-    return PrintTable(command, typed.line);
-  });
-  app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
-  app->add_option("--kind", command.view.kind,
-                  "Kind of table (default: drift, or the first kind in the store)")
-      ->check(CLI::IsMember(
-          {"drift", "precision", "timing", "factorial", "models", "references", "all"}));
-  AddChoice(app, "--format", &command.format, "Output format",
-            {"text", "csv", "markdown", "json", "latex"});
-  AddWhere(app, &conditions);
-  app->add_option("--columns", command.view.columns, "Keys of records, in this order: a,b,c")
-      ->delimiter(',');
-  app->add_option("--group", command.view.group, "One table per value of this key");
-  app->add_option("--sort", command.view.sort, "Key to sort by");
-  app->add_flag("--descending", command.view.descending, "Sort in descending order")
-      ->needs("--sort");
-  app->add_option("-o,--out", command.out, "Output file (default: the terminal)");
-  AddGate(app, &command.gate);
-  AddWide(app);
-}
-
-void AddPlot(Commands& commands) {
-  auto& command = commands.Keep<PlotCommand>();
-  auto& conditions = commands.Keep<std::vector<std::string>>();
-  CLI::App* app = commands.Add("plot", "Draw the standard figures, or one value against another",
-                               [&](const Typed&) {
-                                 command.where = ParseSelection(conditions);
-                                 return Plot(command);
-                               });
-  app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
-  app->add_option("-o,--out", command.out,
-                  "Folder for the figures; with --x and --y also a file's name")
-      ->required();
-  app->add_option("--format", command.format, "Figure format (default: svg)")
-      ->check(CLI::IsMember({"svg", "pdf"}));
-  AddSize(app, &command.size);
-  AddWhere(app, &conditions);
-  app->add_option("--x", command.free.x, "Key of the horizontal axis");
-  app->add_option("--y", command.free.y, "Key of the vertical axis");
-  app->add_option("--group", command.free.group, "One curve per value of these keys: a,b");
-  app->add_option("--log", command.free.log,
-                  "Logarithmic axes (default: those that span two decades)")
-      ->check(CLI::IsMember({"x", "y", "xy", "none"}));
-  app->add_option_function<std::string>(
-      "--title", [&command](const std::string& title) { command.free.title = title; },
-      "Title, \"\" for none (default: values that all records share)");
-}
-
-void AddVerdict(Commands& commands) {
-  auto& command = commands.Keep<VerdictCommand>();
-  CLI::App* app =
-      commands.Add("check-claims", "Compare claims with stored records",
-                   [&](const Typed& typed) { return PrintVerdicts(command, typed.line); });
-  app->add_option("store", command.store, "Folder of a run, or a .jsonl file")->required();
-  app->add_option("--claims", command.claims, "Claims file (JSON)")->required();
-  app->add_option("-o,--out", command.out, "Markdown report with all numbers");
-
-  AddWide(app);
-}
-
-void AddMap(Commands& commands) {
-  auto& command = commands.Keep<MapCommand>();
-  CLI::App* app = commands.Add("robustness", "Tabulate which methods pass which stress tests",
-                               [&](const Typed& typed) { return PrintMap(command, typed.line); });
-  app->add_option("store", command.store,
-                  "Folder of a run, a .jsonl file, or robustness-map.csv to draw it again")
-      ->required();
-  app->add_option("--rules", command.rules, "Rules file (JSON): rows, methods, limits")->required();
-  app->add_option("-o,--out", command.out, "Folder for robustness-map.csv, .md and the figure");
-  AddChoice(app, "--format", &command.format, "Figure format", {"svg", "pdf"});
-  AddSize(app, &command.size);
-  app->add_option_function<std::string>(
-         "--fail-on", [&command](const std::string&) { command.gate = true; },
-         "Exit with status 1 if a required cell fails")
-      ->check(CLI::IsMember({"required"}));
-  AddWide(app);
-}
-
-// report: HTML page of a run.
-
-namespace {
 
 struct ReportCommand {
   std::filesystem::path store;
@@ -377,16 +283,168 @@ int WriteReport(const ReportCommand& command, const std::string& typed) {
 
 }  // namespace
 
-void AddReport(Commands& commands) {
-  auto& command = commands.Keep<ReportCommand>();
-  CLI::App* app =
-      commands.Add("report", "Write a self-contained HTML report of a run",
-                   [&](const Typed& typed) { return WriteReport(command, typed.line); });
-  app->add_option("store", command.store, "Folder with results.jsonl, or a .jsonl file")
-      ->required();
-  app->add_option("-o,--out", command.out, "Output file (default: report.html in the store)");
-  app->add_option("--rules", command.rules, "Rules of a robustness map to include");
-  app->add_option("--claims", command.claims, "Claims to include with their verdicts");
+void AddResults(Commands& commands) {
+  auto& table = commands.Keep<TableCommand>();
+  TableView& view = table.view;
+  commands.Add(
+      "table", "Print a table of stored records",
+      [&](const Typed& typed) { return PrintTable(table, typed.line); },
+      {StoreArgument(&table.store),
+       {"--kind", "Kind of table (default: drift, or the first kind in the store)", &view.kind,
+        OneOf({"drift", "precision", "timing", "factorial", "models", "references", "all"})},
+       TableFormatOption(&table.format),
+       WhereOption(&view.where),
+       {"--columns", "Keys of records, in this order: a,b,c", &view.columns, kSplits},
+       {"--group", "One table per value of this key", &view.group},
+       {"--sort", "Key to sort by", &view.sort},
+       {"--descending", "Sort in descending order", &view.descending, Needs("--sort")},
+       OutOption(&table.out),
+       GateOption(&table.gate),
+       WideOption()});
+  auto& plot = commands.Keep<PlotCommand>();
+  commands.Add("plot", "Draw the standard figures, or one value against another",
+               [&](const Typed&) { return Plot(plot); },
+               {StoreArgument(&plot.store),
+                {"-o,--out", "Folder for the figures; with --x and --y also a file's name",
+                 &plot.out, kRequired},
+                FormatOption(&plot.format, {"svg", "pdf"}, "Figure format (default: svg)"),
+                SizeOption(&plot.size),
+                WhereOption(&plot.where),
+                {"--x", "Key of the horizontal axis", &plot.free.x},
+                {"--y", "Key of the vertical axis", &plot.free.y},
+                {"--group", "One curve per value of these keys: a,b", &plot.free.group},
+                {"--log", "Logarithmic axes (default: those that span two decades)", &plot.free.log,
+                 OneOf({"x", "y", "xy", "none"})},
+                {"--title", "Title, \"\" for none (default: values that all records share)",
+                 &plot.free.title}});
+  auto& report = commands.Keep<ReportCommand>();
+  commands.Add("report", "Write a self-contained HTML report of a run",
+               [&](const Typed& typed) { return WriteReport(report, typed.line); },
+               {{"store", "Folder with results.jsonl, or a .jsonl file", &report.store, kRequired},
+                {"-o,--out", "Output file (default: report.html in the store)", &report.out},
+                {"--rules", "Rules of a robustness map to include", &report.rules},
+                {"--claims", "Claims to include with their verdicts", &report.claims}});
+}
+
+void AddVerdicts(Commands& commands) {
+  auto& map = commands.Keep<MapCommand>();
+  commands.Add(
+      "robustness", "Tabulate which methods pass which stress tests",
+      [&](const Typed& typed) { return PrintMap(map, typed.line); },
+      {{"store", "Folder of a run, a .jsonl file, or robustness-map.csv to draw it again",
+        &map.store, kRequired},
+       {"--rules", "Rules file (JSON): rows, methods, limits", &map.rules, kRequired},
+       {"-o,--out", "Folder for robustness-map.csv, .md and the figure", &map.out},
+       FormatOption(&map.format, {"svg", "pdf"}, "Figure format"),
+       SizeOption(&map.size),
+       {"--fail-on", "Exit with status 1 if a required cell fails", &map.gate, OneOf({"required"})},
+       WideOption()});
+  auto& claims = commands.Keep<VerdictCommand>();
+  commands.Add("check-claims", "Compare claims with stored records",
+               [&](const Typed& typed) { return PrintVerdicts(claims, typed.line); },
+               {StoreArgument(&claims.store),
+                {"--claims", "Claims file (JSON)", &claims.claims, kRequired},
+                {"-o,--out", "Markdown report with all numbers", &claims.out},
+                WideOption()});
+}
+
+namespace {
+
+struct WorkPrecisionCommand {
+  std::filesystem::path store;
+  WorkPrecisionOptions options;
+  std::string format = "text";      ///< format of the output: text, csv, markdown, json or latex
+  std::filesystem::path out;        ///< folder; default: the store's folder
+  bool draws = false;               ///< draw figures too
+  std::string figures = "svg";      ///< svg or pdf
+  std::string size = "two-column";  ///< of figures, a name of a FigureSize
+  bool all = false;                 ///< print every row, not only the front
+};
+
+/// Returns the folder of tables: for a store that is a file, the file's folder.
+std::filesystem::path FolderOf(const WorkPrecisionCommand& command) {
+  if (!command.out.empty()) return command.out;
+  const bool is_file = command.store.extension() == ".jsonl";
+  return is_file ? command.store.parent_path() : command.store;
+}
+
+void WriteTradeoff(const WorkPrecision& work_precision, const std::filesystem::path& folder,
+                   const std::string& typed) {
+  const std::string stem = (folder / "work-precision").string();
+  Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
+  Table cheapest = CheapestTable(work_precision);
+  AppendProvenance(rows, typed);
+  AppendProvenance(cheapest, typed);
+  WriteFileAtomically(stem + ".csv", RenderKept(rows, "csv"));
+  WriteFileAtomically(stem + "-overview.csv", RenderKept(cheapest, "csv"));
+  WriteFileAtomically(stem + ".md", WorkPrecisionMarkdown(work_precision, Provenance(typed)));
+}
+
+/// Prints fronts and overview for people, then which conditions were equal and which were not.
+void PrintForPeople(const WorkPrecision& work_precision, const WorkPrecisionCommand& command,
+                    const std::string& typed) {
+  const Table fronts = WorkPrecisionTable(work_precision, {.compact = true, .all = command.all});
+  PrintText(ToScreen(fronts) + "\n");
+  Table overview = OverviewTable(work_precision);
+  overview.notes = FairnessStatement(work_precision);
+  AppendProvenance(overview, typed);
+  PrintText(ToScreen(overview) + "\n");
+}
+
+/// Prints fronts, overview and fairness statement; writes tradeoff.csv, tradeoff-overview.csv,
+/// tradeoff.md and the figures.
+int PrintTradeoff(const WorkPrecisionCommand& command, const std::string& typed) {
+  const std::vector<Record> records = LoadRecords(command.store, command.options.where);
+  if (records.empty()) {
+    PrintError("{}: no records\n", command.store.string());
+    return 2;
+  }
+  RequireOneContent(records, command.store, "work-precision");
+  const WorkPrecision work_precision = MakeTradeoff(records, command.options);
+  const std::filesystem::path folder = FolderOf(command);
+  WriteTradeoff(work_precision, folder, typed);
+  if (command.format == "text") {
+    PrintForPeople(work_precision, command, typed);
+    const std::string stem = (folder / "work-precision").string();
+    Print("wrote {0}.csv, {0}-overview.csv, {0}.md\n", stem);
+  } else {
+    Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
+    for (std::string& line : FairnessStatement(work_precision))
+      rows.notes.push_back(std::move(line));
+    AppendProvenance(rows, typed);
+    PrintText(RenderKept(rows, command.format));
+  }
+  if (!command.draws) return 0;
+  return DrawAll(WorkPrecisionFigures(work_precision), folder / "figures", command.figures,
+                 FigureSizes().at(command.size));
+}
+
+}  // namespace
+
+void AddTradeoff(Commands& commands) {
+  auto& command = commands.Keep<WorkPrecisionCommand>();
+  WorkPrecisionOptions& options = command.options;
+  commands.Add(
+      "work-precision", "Compute work-precision tables and Pareto fronts",
+      [&](const Typed& typed) { return PrintTradeoff(command, typed.line); },
+      {StoreArgument(&command.store),
+       {"--error-key", "Key of the error (default: error_position_max, or an error in the store)",
+        &options.error},
+       {"--cost-key",
+        "Key that is the cost: wall_s (default: the timed median), rhs_equivalents, steps, ...",
+        &options.cost},
+       {"--per", "Keys that make one problem: a,b", &options.per, kSplits},
+       {"--error-levels", "Errors that the overview asks for: a,b", &options.classes,
+        From(0.0, 1e300), kSplits},
+       WhereOption(&options.where),
+       {"-o,--out", "Folder (default: that of the store)", &command.out},
+       TableFormatOption(&command.format),
+       {"--all", "Print all rows, not only Pareto fronts", &command.all},
+       WideOption(),
+       {"--figures", "Draw figures too", &command.draws},
+       {"--figure-format", "svg or pdf", &command.figures, OneOf({"svg", "pdf"}),
+        Needs("--figures")},
+       SizeOption(&command.size)});
 }
 
 }  // namespace loopbench::harness

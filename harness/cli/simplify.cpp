@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/cli/command_line.h"
-#include "harness/cli/explain.h"
+#include "harness/cli/commands.h"
 #include "harness/cli/models.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/isolation/processes.h"
@@ -39,7 +39,7 @@ struct SimplifyCommand {
   std::filesystem::path out;    ///< folder; no files if empty
   bool assembled = false;       ///< write the complete start in the full model
   bool force = false;           ///< write into an existing folder
-  ProcessLimits limits;
+  ProcessLimits limits = kFileLimits;
 };
 
 /// Returns names of rules, and of the rules with a limit.
@@ -101,11 +101,13 @@ Table CandidateTable(const SimplificationRule& idea, const Simplified& simplifie
                    {"taken", "taken", Format::kText, {}},
                    {"why", "because", Format::kText, {}}};
   for (const Candidate& candidate : simplified.candidates) {
-    Record& row = table.rows.emplace_back();
-    row.Set("what", candidate.what);
-    if (!std::isnan(candidate.number)) row.Set("number", fmt::format("{:.3g}", candidate.number));
-    if (idea.limit != nullptr) row.Set("taken", std::string(candidate.taken ? "yes" : "no"));
-    row.Set("why", candidate.why);
+    AddRow({candidate.what,
+            std::isnan(candidate.number) ? "" : fmt::format("{:.3g}", candidate.number),
+            idea.limit == nullptr ? ""
+            : candidate.taken     ? "yes"
+                                  : "no",
+            candidate.why},
+           &table);
   }
   return table;
 }
@@ -150,25 +152,20 @@ void PrintModels(const ProblemModels& ladder, const ExplainView& view) {
                    {"removed", "removed", Format::kText, {}}};
   const MechanismDescription& whole = ladder.models.front().description;
   for (const ProblemModel& model : ladder.models) {
-    Record& row = table.rows.emplace_back();
-    row.Set("name", model.name);
-    row.Set("motion", std::string(model.is_exact ? "the same" : "changed"));
-    row.Set("space", std::string(ToString(model.description.space)));
-    row.Set("bodies", static_cast<std::int64_t>(model.description.bodies.size() - 1));
-    row.Set("joints", static_cast<std::int64_t>(model.description.joints.size()));
-    row.Set("speeds", std::int64_t{SpeedsOf(model.description)});
-    row.Set("error", model.error);
-    row.Set("worst", model.worst);
-    if (model.rhs_evaluations >= 0) row.Set("evaluations", model.rhs_evaluations);
+    const auto& bodies = model.description.bodies;
     std::vector<std::string> gone;
     for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
       const std::string& name = whole.bodies[b].name;
-      const auto& bodies = model.description.bodies;
       const bool stays = std::ranges::find(bodies.begin() + 1, bodies.end(), name,
                                            &BodyDescription::name) != bodies.end();
       if (!stays) gone.push_back(name);
     }
-    row.Set("removed", fmt::format("{}", fmt::join(gone, ", ")));
+    AddRow({model.name, model.is_exact ? "the same" : "changed", model.description.space,
+            bodies.size() - 1, model.description.joints.size(), SpeedsOf(model.description),
+            model.error, model.worst,
+            model.rhs_evaluations < 0 ? Value() : Value(model.rhs_evaluations),
+            fmt::format("{}", fmt::join(gone, ", "))},
+           &table);
   }
   PrintSection("Models", table, view);
   Print(
@@ -243,7 +240,9 @@ void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
   Print("  {} records in {}\n", records.size(), store.file().string());
 }
 
-/// Runs in the child process.
+/// Lists the possible simplifications of each rule. With a folder, writes a mechanism file for each
+/// applicable rule, for all combined and for the full model, an experiment and a summary page.
+/// Returns 2 if the start cannot be assembled, or there is nothing to write.
 int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
                  const std::string& typed) {
   const std::vector<const SimplificationRule*> ideas = Chosen(command.only);
@@ -293,17 +292,6 @@ const std::vector<std::string>& LumpingNames() {
   return names;
 }
 
-/// Lists the possible simplifications of each rule. With a folder, writes a mechanism file for each
-/// applicable rule, for all combined and for the full model, an experiment and a summary page. The
-/// work is done in a child process under the limits. Returns 2 if the start cannot be assembled, or
-/// there is nothing to write.
-int Simplify(const SimplifyCommand& command, bool all, const std::string& typed) {
-  // the child process prints into memory, without a terminal
-  const ExplainView view = ViewOfOutput(all);
-  return PrintFromChild(command.mechanism.string(), command.limits,
-                        [&] { return SimplifyFile(command, view, typed); });
-}
-
 /// Returns a table of the rules with their thresholds.
 std::string RuleList() {
   std::string rules = "Rules; only those with a threshold change the motion:\n";
@@ -321,53 +309,46 @@ void AddSimplify(Commands& commands) {
   auto& lumping = commands.Keep(LumpingNames().front());
   auto& only_list = commands.Keep<bool>();
   auto& all = commands.Keep<bool>();
-  CLI::App* app =
-      commands.Add("simplify", "Generate simpler models of a mechanism and measure their errors",
-                   [&](const Typed& typed) {
-                     command.lumping = static_cast<Lumping>(
-                         std::ranges::find(LumpingNames(), lumping) - LumpingNames().begin());
-                     return Simplify(command, all, typed.line);
-                   });
-  app->add_option("mechanism", command.mechanism, "Mechanism file (JSON)")->required();
-  CLI::Option* list = app->add_flag("--list", only_list, "List possible simplifications (default)");
-  app->add_option("--only", command.only, "Rules to apply: NAME[,NAME]")->delimiter(',');
-  app->add_option("--threshold", command.thresholds,
-                  "Threshold of a rule, NAME=VALUE; defaults: " + LimitsText());
-  app->add_option("--lump-mass", lumping, "New place of a light link's mass")
-      ->check(CLI::IsMember(LumpingNames()))
-      ->capture_default_str();
-  app->add_option("--trial-duration", command.short_run,
-                  "Duration of the trial run that finds nearly rigid parts [s]; 0: none")
-      ->check(NumberFrom(0.0, 1e6))
-      ->capture_default_str();
-  app->add_option("--verify", command.errors,
-                  "Run all models for this time [s] and report errors of their points; 0: no")
-      ->check(NumberFrom(0.0, 1e6))
-      ->capture_default_str();
-  CLI::Option* accept =
-      app->add_option("--max-model-error", command.accept,
-                      "Largest acceptable error of a model [m], for its verdict in the store")
-          ->check(NumberFrom(1e-15, 1e6));
-  accept->needs("--verify");
-  app->add_option(
-         "--store", command.store,
-         "Store that receives a record per model: error against the full model, times, verdict "
-         "(loopbench table STORE --kind models)")
-      ->needs(accept);
-  app->add_option("--horizon", command.horizon, "Simulated time of the written experiment [s]")
-      ->check(NumberFrom(1e-9, 1e9))
-      ->capture_default_str();
-  AddWide(app);
-  app->add_option("-o,--out", command.out,
-                  "New folder for the models, an experiment that runs them, and models.md")
-      ->excludes(list);
-  app->add_flag("--assembled", command.assembled,
-                "Write the full model with all coordinates of its assembled start");
-  app->add_flag("--force", command.force, "Overwrite files of an existing folder");
-  command.limits = kFileLimits;
-  AddLimits(app, &command.limits);
-  app->add_flag("--all", all, "Print all rows of long tables");
-  app->footer(RuleList() + "\n" + app->get_footer());
+  commands.Add(
+      "simplify", "Generate simpler models of a mechanism and measure their errors",
+      [&](const Typed& typed) {
+        command.lumping = static_cast<Lumping>(std::ranges::find(LumpingNames(), lumping) -
+                                               LumpingNames().begin());
+        // the child process prints into memory, without a terminal
+
+        return PrintFromChild(
+            command.mechanism.string(), command.limits,
+            [&, view = ViewOfOutput(all)] { return SimplifyFile(command, view, typed.line); });
+      },
+      {MechanismArgument(&command.mechanism),
+       {"--list", "List possible simplifications (default)", &only_list},
+       {"--only", "Rules to apply: NAME[,NAME]", &command.only, kSplits},
+       {"--threshold", "Threshold of a rule, NAME=VALUE; defaults: " + LimitsText(),
+        &command.thresholds},
+       {"--lump-mass", "New place of a light link's mass", &lumping, OneOf(LumpingNames())},
+       {"--trial-duration", "Duration of the trial run that finds nearly rigid parts [s]; 0: none",
+        &command.short_run, From(0.0, 1e6)},
+       {"--verify", "Run all models for this time [s] and report errors of their points; 0: no",
+        &command.errors, From(0.0, 1e6), ShowsDefault(true)},
+       {"--max-model-error",
+        "Largest acceptable error of a model [m], for its verdict in the store", &command.accept,
+        From(1e-15, 1e6), Needs("--verify")},
+       {"--store",
+        "Store that receives a record per model: error against the full model, times, verdict "
+        "(loopbench table STORE --kind models)",
+        &command.store, Needs("--max-model-error")},
+       {"--horizon", "Simulated time of the written experiment [s]", &command.horizon,
+        From(1e-9, 1e9)},
+       WideOption(),
+       {"-o,--out", "New folder for the models, an experiment that runs them, and models.md",
+        &command.out, Excludes({"--list"})},
+       {"--assembled", "Write the full model with all coordinates of its assembled start",
+        &command.assembled},
+       {"--force", "Overwrite files of an existing folder", &command.force},
+       CpuOption(&command.limits),
+       MemoryOption(&command.limits),
+       {"--all", "Print all rows of long tables", &all}},
+      RuleList() + "\n");
 }
 
 }  // namespace loopbench::harness

@@ -252,7 +252,7 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
       largest.Add(std::abs(apart[row]), t);
     }
     most = std::max(most, compared);
-    AddRow({column.label, Maybe(largest), When(largest), Count(compared)}, &table);
+    AddRow({column.label, Maybe(largest), When(largest), compared}, &table);
   }
   if (most == 0) {
     throw std::runtime_error(fmt::format("{}: found no row to compare, expected times of {}",
@@ -305,27 +305,19 @@ int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed)
 
 void AddTrajectory(Commands& commands) {
   auto& command = commands.Keep<TrajectoryCommand>();
-  auto& conditions = commands.Keep<std::vector<std::string>>();
-  CLI::App* app =
-      commands.Add("trajectory", "List, write and check trajectories of runs or other programs",
-                   [&](const Typed& typed) {
-                     command.where = ParseSelection(conditions);
-                     return ShowTrajectories(command, typed.line);
-                   });
-  app->add_option("source", command.source, "Folder of a run, or a trajectory (.csv)")->required();
-  AddWhere(app, &conditions);
-  app->add_option("-o,--out", command.out, "Output folder; for a CSV source, output file");
-  AddChoice(app, "--format", &command.format, "Output format", {"csv", "jsonl"});
-  app->add_option("--columns", command.columns, "Only t and columns with these prefixes: a,b")
-      ->delimiter(',');
-  app->add_option("--every", command.every, "Only every N-th row")
-      ->check(NumberFrom(1, 1'000'000'000));
-  app->add_option("--mechanism", command.mechanism,
-                  "Mechanism (JSON) to check a CSV trajectory against");
-  app->add_option("--compare-with", command.ours, "Trajectory to compare a CSV trajectory with");
-  app->add_option("--figure", command.figure,
-                  "Figure of both trajectories and their difference: .svg, .pdf")
-      ->needs("--compare-with");
+  commands.Add(
+      "trajectory", "List, write and check trajectories of runs or other programs",
+      [&](const Typed& typed) { return ShowTrajectories(command, typed.line); },
+      {{"source", "Folder of a run, or a trajectory (.csv)", &command.source, kRequired},
+       WhereOption(&command.where),
+       {"-o,--out", "Output folder; for a CSV source, output file", &command.out},
+       FormatOption(&command.format, {"csv", "jsonl"}),
+       {"--columns", "Only t and columns with these prefixes: a,b", &command.columns, kSplits},
+       {"--every", "Only every N-th row", &command.every, From(1, 1e9), ShowsDefault(false)},
+       {"--mechanism", "Mechanism (JSON) to check a CSV trajectory against", &command.mechanism},
+       {"--compare-with", "Trajectory to compare a CSV trajectory with", &command.ours},
+       {"--figure", "Figure of both trajectories and their difference: .svg, .pdf", &command.figure,
+        Needs("--compare-with")}});
 }
 
 }  // namespace loopbench::harness

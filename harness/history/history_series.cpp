@@ -307,27 +307,27 @@ Table StepTable(const History& history, const HistoryFindings& found) {
                    {"after", "after", Format::kSeconds},
                    {"ratio", "ratio", Format::kSeconds},
                    {"confidence", "confidence", Format::kSeconds}};
-  std::vector<std::pair<std::size_t, std::vector<Value>>> rows;
+  std::vector<std::pair<std::size_t, Record>> rows;
   const auto add = [&](std::size_t place, const std::string& one, const std::string& measure,
-                       std::vector<Value> rest) {
+                       const AnyValue& before, const AnyValue& after, const AnyValue& ratio,
+                       const AnyValue& confidence) {
     const HistoryEntry& entry = history.entries[place];
-    std::vector<Value> row = {ShortCommit(entry.commit), entry.date, one, measure};
-    row.insert(row.end(), rest.begin(), rest.end());
-    rows.push_back({place, std::move(row)});
+    rows.emplace_back(place, AddRow({ShortCommit(entry.commit), entry.date, one, measure, before,
+                                     after, ratio, confidence},
+                                    &table));
   };
   for (const EndingChange& change : found.endings) {
-    add(change.entry, change.one, change.measure, {change.before, change.after, {}, {}});
+    add(change.entry, change.one, change.measure, change.before, change.after, Value(), Value());
   }
   for (const HistorySeries& one : found.series) {
     for (const LevelChange& change : one.changes) {
-      add(one.values[change.at].entry, one.one, one.measure,
-          {LevelOf(one, change.before), LevelOf(one, change.after),
-           change.before > 0.0 ? Value(change.after / change.before) : Value(),
-           change.Confidence()});
+      add(one.values[change.at].entry, one.one, one.measure, LevelOf(one, change.before),
+          LevelOf(one, change.after),
+          change.before > 0.0 ? Value(change.after / change.before) : Value(), change.Confidence());
     }
   }
   std::ranges::stable_sort(rows, std::greater<>(), [](const auto& row) { return row.first; });
-  for (const auto& [place, row] : rows) AddRow(row, &table);
+  for (std::size_t i = 0; i < rows.size(); ++i) table.rows[i] = std::move(rows[i].second);
   table.notes.push_back(
       fmt::format("{} series over {} entries; confidence: 1 less the number of such steps that "
                   "the noise of all series together would show, at most {}",

@@ -373,7 +373,7 @@ Table VerdictTable(std::span<const ClaimResult> results) {
   table.colour = &VerdictColour;
   table.columns = {{"id", "id"}, {"where", "paper"}, {"claim", "claim"}, {"verdict", "verdict"}};
   for (const auto& [rule, checks, verdict, text] : results) {
-    AddRow({rule.id, rule.where, rule.claim, std::string(ToString(verdict))}, &table);
+    AddRow({rule.id, rule.where, rule.claim, verdict}, &table);
   }
   return table;
 }
@@ -384,9 +384,7 @@ Table CheckTable(const ClaimResult& result) {
                    {"measured", "measured"},           {"expected", "expected"},
                    {"rows", "rows", Format::kInteger}, {"reason", "remark"}};
   for (const auto& [label, state, rows, measured, expected, reason] : result.checks) {
-    AddRow({label, std::string(ToString(state)), measured, expected,
-            static_cast<std::int64_t>(rows), reason},
-           &table);
+    AddRow({label, state, measured, expected, rows, reason}, &table);
   }
   return table;
 }

@@ -291,20 +291,13 @@ Table MapCellTable(const RobustnessMap& map) {
         "cases", "required", "reason", "case_id", "with_warnings", "warnings"}) {
     table.columns.push_back({key, key, Format::kShortest});
   }
-  const auto count = [](std::size_t n) { return static_cast<std::int64_t>(n); };
   EachCell(map, [&](const MapGroup& group, const MapRow& row, const MapMethod& column,
                     const MapCell& cell) {
     const Judged& decided = cell.decided;
-    AddRow({group.label,         row.label,
-            column.label,        std::string(ToString(cell.state)),
-            cell.word,           cell.outcome,
-            decided.measure,     decided.value,
-            decided.unit,        decided.limit,
-            decided.ratio,       cell.t_reached,
-            count(cell.holding), count(cell.records),
-            count(cell.cases),   cell.demanded,
-            cell.reason,         cell.case_id,
-            count(cell.flagged), cell.warnings},
+    AddRow({group.label,   row.label,       column.label,  cell.state,   cell.word,
+            cell.outcome,  decided.measure, decided.value, decided.unit, decided.limit,
+            decided.ratio, cell.t_reached,  cell.holding,  cell.records, cell.cases,
+            cell.demanded, cell.reason,     cell.case_id,  cell.flagged, cell.warnings},
            &table);
   });
   return table;
@@ -372,11 +365,8 @@ std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool 
   for (const std::string& key : CaseKeysOf(records)) {
     if (!NamesMethod(key)) continue;
     if (compact && key != "formulation" && IsAlike(records, key)) continue;
-    TableColumn column = ColumnOf(key, records);
-    const std::vector<TableColumn>& known = CompactCaseColumns();
-    const auto brief = std::ranges::find(known, key, &TableColumn::key);
-    if (compact && brief != known.end()) column = *brief;
-    columns.push_back(column);
+    const TableColumn column = ColumnOf(key, records);
+    columns.push_back(compact ? CompactCaseColumn(key).value_or(column) : column);
   }
   return columns;
 }
@@ -527,7 +517,7 @@ Table CheapestTable(const WorkPrecision& work_precision) {
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     for (const Cheapest& one : problem.cheapest) {
       if (one.row < 0) {
-        AddRow({problem.name, one.error_class, one.formulation, std::string(kNobody)}, &table);
+        AddRow({problem.name, one.error_class, one.formulation, kNobody}, &table);
         continue;
       }
       const WorkPrecisionRow& row = RowOf(problem, one);

@@ -256,6 +256,17 @@ WorkPrecision MakeTradeoff(std::span<const Record> records, const WorkPrecisionO
 }
 namespace {
 
+/// Returns the rows of all problems, only the compared ones or only the others.
+std::vector<const WorkPrecisionRow*> RowsOf(const WorkPrecision& work_precision, bool compared) {
+  std::vector<const WorkPrecisionRow*> rows;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const WorkPrecisionRow& row : problem.rows) {
+      if (row.reason.empty() == compared) rows.push_back(&row);
+    }
+  }
+  return rows;
+}
+
 /// Setting that may differ between runs, and its key in records.
 struct Aspect {
   const char* words;
@@ -338,28 +349,13 @@ std::string Joined(const std::vector<std::string>& parts) {
 }
 
 /// Reasons without their numbers and how many rows have them: "singular 3, warnings: energy 2".
-std::string CountReasons(const WorkPrecision& work_precision, std::size_t* left_out) {
+std::string CountReasons(const std::vector<const WorkPrecisionRow*>& rows) {
   std::map<std::string, int> counts;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (row.reason.empty()) continue;
-      ++*left_out;
-      ++counts[row.reason.substr(0, row.reason.find(" at "))];
-    }
-  }
+  for (const WorkPrecisionRow* row : rows)
+    ++counts[row->reason.substr(0, row->reason.find(" at "))];
   std::vector<std::string> parts;
   for (const auto& [reason, count] : counts) parts.push_back(fmt::format("{} {}", reason, count));
   return fmt::format("{}", fmt::join(parts, ", "));
-}
-
-std::vector<Record> TimingsOf(const WorkPrecision& work_precision) {
-  std::vector<Record> timings;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (!row.timing.items().empty()) timings.push_back(row.timing);
-    }
-  }
-  return timings;
 }
 
 bool IsTime(const std::string& cost) {
@@ -371,18 +367,15 @@ bool IsTime(const std::string& cost) {
 std::string ErrorLine(const WorkPrecision& work_precision) {
   double least = INFINITY, most = 0.0;
   int known = 0, bounds = 0, beyond = 0;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (!row.reason.empty()) continue;
-      const double certified = row.record.Number("reference_error");
-      if (std::isfinite(certified)) {
-        ++known;
-        least = std::min(least, certified);
-        most = std::max(most, certified);
-      }
-      bounds += row.is_bound ? 1 : 0;
-      beyond += row.record.Number("reference_valid_until") < row.record.Number("horizon") ? 1 : 0;
+  for (const WorkPrecisionRow* row : RowsOf(work_precision, true)) {
+    const double certified = row->record.Number("reference_error");
+    if (std::isfinite(certified)) {
+      ++known;
+      least = std::min(least, certified);
+      most = std::max(most, certified);
     }
+    bounds += row->is_bound ? 1 : 0;
+    beyond += row->record.Number("reference_valid_until") < row->record.Number("horizon") ? 1 : 0;
   }
   std::string line = fmt::format("error: {}", work_precision.error);
   if (known > 0 && work_precision.error.starts_with("error_")) {
@@ -409,13 +402,9 @@ std::string CostLine(const WorkPrecision& work_precision) {
   std::string line =
       fmt::format("cost: {}{}", work_precision.cost, unit.empty() ? "" : " [" + unit + "]");
   const bool is_count = work_precision.cost.starts_with("rhs_e") || work_precision.cost == "steps";
-  const auto implicit = [](const WorkPrecisionRow& row) {
-    return row.reason.empty() && row.record.Number("newton_iterations") > 0;
-  };
-  const bool any =
-      std::ranges::any_of(work_precision.problems, [&](const WorkPrecisionProblem& problem) {
-        return std::ranges::any_of(problem.rows, implicit);
-      });
+  const bool any = std::ranges::any_of(
+      RowsOf(work_precision, true),
+      [](const WorkPrecisionRow* row) { return row->record.Number("newton_iterations") > 0; });
   if (is_count && any) {
     line +=
         "; of implicit integrators it leaves out Jacobians and linear solves, so that they look "
@@ -427,10 +416,9 @@ std::string CostLine(const WorkPrecision& work_precision) {
 /// Returns true if compared formulations run library code, which is not equally optimized.
 bool ComparesLibraryCode(const WorkPrecision& work_precision) {
   std::set<std::string> formulations;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    for (const WorkPrecisionRow& row : problem.rows) {
-      if (!row.reason.empty() || !row.record.Text("execution").empty()) continue;
-      formulations.insert(row.record.Text("formulation"));
+  for (const WorkPrecisionRow* row : RowsOf(work_precision, true)) {
+    if (row->record.Text("execution").empty()) {
+      formulations.insert(row->record.Text("formulation"));
     }
   }
   return formulations.size() > 1 && formulations.contains("odca");
@@ -461,11 +449,18 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   if (!equal.empty()) lines.push_back("equal in all compared rows: " + Joined(equal));
   if (!unequal.empty()) lines.push_back("not equal (rows): " + Joined(unequal));
   if (!unknown.empty()) lines.push_back("not recorded: " + Joined(unknown));
-  std::size_t all = 0, left_out = 0;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) all += problem.rows.size();
-  const std::string reasons = CountReasons(work_precision, &left_out);
-  if (left_out > 0) {
-    lines.push_back(fmt::format("{} of {} rows are not compared: {}", left_out, all, reasons));
+  const auto left_out = RowsOf(work_precision, false);
+  std::size_t all = 0;
+  std::vector<Record> timings;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    all += problem.rows.size();
+    for (const WorkPrecisionRow& row : problem.rows) {
+      if (!row.timing.items().empty()) timings.push_back(row.timing);
+    }
+  }
+  if (!left_out.empty()) {
+    lines.push_back(fmt::format("{} of {} rows are not compared: {}", left_out.size(), all,
+                                CountReasons(left_out)));
   }
   if (!IsTime(work_precision.cost)) return lines;
   if (ComparesLibraryCode(work_precision)) {
@@ -477,8 +472,7 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   if (!one_machine) {
     lines.push_back("warning: the costs are times of more than one machine, which do not compare");
   }
-  for (std::string& line : NoiseWarnings(TimingsOf(work_precision)))
-    lines.push_back(std::move(line));
+  for (std::string& line : NoiseWarnings(timings)) lines.push_back(std::move(line));
   return lines;
 }
 

@@ -51,9 +51,7 @@ std::string ColumnText(const ReportTable& table, const TableColumn& column, bool
 
 /// Returns true for initially visible columns: those of terminal tables, warnings and errors.
 bool IsBrief(const ReportTable& table, const std::string& key) {
-  const std::vector<TableColumn>& few = table.kind == "timing"      ? CompactTimingColumns()
-                                        : table.kind == "precision" ? CompactPrecisionColumns()
-                                                                    : CompactDriftColumns();
+  const std::vector<TableColumn> few = ColumnsOfKind(table.kind, true);
   if (std::ranges::find(few, key, &TableColumn::key) != few.end()) return true;
   return key == "warnings" || key == "error_position_max";
 }

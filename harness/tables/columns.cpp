@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <iterator>
 #include <map>
+#include <ranges>
 #include <utility>
 
 #include "harness/text/files.h"
@@ -25,30 +25,72 @@ TableColumn Of(const Measure& measure, string_view key) {
   return {std::string(key), std::string(shown) + brackets, format, {}};
 }
 
-std::vector<TableColumn> Columns(std::initializer_list<string_view> keys) {
-  std::vector<TableColumn> columns;
-  for (const string_view key : keys) columns.push_back(Of(*FindMeasure(key), key));
-  return columns;
-}
+using Abbreviations = std::vector<std::pair<std::string, std::string>>;
 
-// Importance of result columns: dropped later than some columns that identify rows.
-constexpr int kAnswer = 2;
+/// Column of a narrow table: another heading, and shorter words for values.
+struct ShortColumn {
+  string_view key, header;
+  Abbreviations abbreviations = {};
+};
 
-// Column of a narrow table: another heading, and shorter words for values.
-TableColumn Short(string_view key, const char* header,
-                  std::vector<std::pair<std::string, std::string>> abbreviations = {},
-                  int importance = 0) {
-  return {std::string(key), header, FindMeasure(key)->heading.format, std::move(abbreviations),
-          importance};
-}
-
-std::vector<std::pair<std::string, std::string>> AbbreviatedLevels() {
-  std::vector<std::pair<std::string, std::string>> pairs;
+Abbreviations AbbreviatedLevels() {
+  Abbreviations pairs;
   for (const LevelTraits& level : Levels()) pairs.emplace_back(level.name, level.abbreviation);
   return pairs;
 }
 
-// Returns columns of measures that a program has added and that have words.
+/// Other columns of narrow tables have their key as heading.
+const std::vector<ShortColumn>& ShortColumns() {
+  static const Abbreviations kParts = {{"truncation", "trunc"}, {"round-off", "round"}};
+  static const std::vector<ShortColumn> kColumns = {
+      {"formulation", "form."},
+      {"enforcement", "enf.", AbbreviatedLevels()},
+      {"coordinates", "coord", {{"absolute", "abs"}}},
+      {"solver", "fact.", {{"rank-revealing", "r-rev"}}},
+      {"horizon", "T/s"},
+      {"outcome",
+       "outcome",
+       {{"finished", "ok"},
+        {"step-too-small", "small step"},
+        {"inconsistent-start", "bad start"},
+        {"inconsistent-motion", "bad motion"},
+        {"newton-failure", "newton"},
+        {"integrator-error", "integrator"}}},
+      {"drift_position_max", "drift [m]"},
+      {"energy_error_max", "dE [J]"},
+      {"growth_exponent", "t^p"},
+      {"rhs_ns_median", "rhs [ns]"},
+      {"wall_s_median", "wall [s]"},
+      {"error_final", "error [m]"},
+      {"error_dominated_by", "by", kParts},
+      {"drift_dominated_by", "by", kParts},
+      {"model_error", "model error [m]"},
+      {"rhs_evaluations", "rhs"},
+      {"model_rhs_ratio", "of full"},
+      {"wall_s", "wall [s]"},
+      {"model_wall_ratio", "of full"},
+      {"model_verdict", "verdict"},
+      {"reference_valid_until", "valid until [s]"},
+      {"reference_error", "to [m]"},
+      {"cpu_s", "CPU [s]"},
+      {"message", "why no further"}};
+  return kColumns;
+}
+
+/// Returns the column of a narrow table. "key+" is dropped later than columns that identify rows,
+/// "key-" earlier than others.
+TableColumn CompactColumn(string_view word) {
+  constexpr int kAnswer = 2;
+  const int importance = word.ends_with('+') ? kAnswer : word.ends_with('-') ? -1 : 0;
+  if (importance != 0) word.remove_suffix(1);
+  const auto known = std::ranges::find(ShortColumns(), word, &ShortColumn::key);
+  const bool is_known = known != ShortColumns().end();
+  return {std::string(word), std::string(is_known ? known->header : word),
+          FindMeasure(word)->heading.format, is_known ? known->abbreviations : Abbreviations(),
+          importance};
+}
+
+/// Returns columns of measures that a program has added and that have words.
 std::vector<TableColumn> AddedColumns() {
   std::vector<TableColumn> columns;
   for (const Measure* measure : AddedMeasures()) {
@@ -58,18 +100,66 @@ std::vector<TableColumn> AddedColumns() {
   return columns;
 }
 
-std::vector<TableColumn> Join(std::vector<TableColumn> head, const std::vector<TableColumn>& tail) {
-  head.insert(head.end(), tail.begin(), tail.end());
-  return head;
-}
-
-// Returns the columns of case and outcome that drift.csv and timing.csv share.
-std::vector<TableColumn> CaseColumns() {
-  return Columns({"experiment", "mechanism", "formulation", "enforcement", "coordinates", "solver",
-                  "integrator", "rtol", "atol", "horizon", "outcome", "t_reached"});
-}
+constexpr string_view kCase =
+    "experiment mechanism formulation enforcement coordinates solver integrator rtol atol horizon "
+    "outcome t_reached";
+constexpr string_view kCompactCase =
+    "mechanism formulation enforcement coordinates solver rtol horizon outcome";
 
 }  // namespace
+
+const std::vector<KindOfTable>& KindsOfTables() {
+  static const std::vector<KindOfTable> kKinds = {
+      {"drift", "accuracy", "Drift",
+       "CASE warnings agreement drift_position_max drift_rotation_max drift_velocity_max "
+       "drift_acceleration_max loop_closure_max correction_max worst_loop energy_error_max "
+       "growth_exponent growth_spread growth_regime growth_resolved growth_hypothesis "
+       "growth_hypothesis_resolved ensemble steps rejected rhs_evaluations rank_min rcond_min "
+       "state_hash restarts branch_error_max closed_form_error_max message ADDED",
+       "CASE drift_position_max+ energy_error_max growth_exponent"},
+      {"precision", "precision", "Precision",
+       "experiment mechanism formulation enforcement coordinates solver integrator scalar rtol "
+       "atol horizon outcome t_reached error_final error_dominated_by drift_position_max "
+       "drift_dominated_by steps rejected restarts rhs_evaluations",
+       "mechanism formulation enforcement coordinates scalar rtol outcome error_final+ "
+       "error_dominated_by drift_position_max drift_dominated_by steps"},
+      {"models", "model", "Models",
+       "mechanism model formulation enforcement coordinates integrator rtol horizon outcome "
+       "model_motion bodies joints model_error model_error_at reference_error "
+       "reference_valid_until model_accepts model_verdict error_position_max rhs_evaluations "
+       "model_rhs_ratio wall_s model_wall_ratio noise",
+       "mechanism model bodies model_error rhs_evaluations model_rhs_ratio wall_s "
+       "model_wall_ratio model_verdict"},
+      {"timing", "timing", "Timing",
+       "CASE bodies joints loops dof rhs_ns_median rhs_ns_p10 rhs_ns_p90 ns_per_body "
+       "step_us_median wall_s_median realtime_factor repeats rhs_ns_min wall_s_min wall_s_p10 "
+       "wall_s_p90 aa_spread aa_spread_wall calibration_ns calibration_wall_ns "
+       "discarded_repetitions load1 processors governor noise",
+       "CASE bodies- rhs_ns_median+ wall_s_median"},
+      {"references", "reference", "References",
+       "experiment mechanism horizon outcome reference reference_valid_until reference_error "
+       "reference_runs cpu_s rhs_evaluations message",
+       "mechanism horizon outcome reference reference_valid_until+ reference_error+ cpu_s "
+       "message"}};
+  return kKinds;
+}
+
+std::vector<TableColumn> ColumnsOfKind(string_view name, bool compact) {
+  const auto known = std::ranges::find(KindsOfTables(), name, &KindOfTable::name);
+  const KindOfTable& kind = known == KindsOfTables().end() ? KindsOfTables().front() : *known;
+  std::string words(compact ? kind.compact : kind.columns);
+  if (words.starts_with("CASE")) words.replace(0, 4, compact ? kCompactCase : kCase);
+  std::vector<TableColumn> columns;
+  for (const auto part : std::views::split(words, ' ')) {
+    const string_view word(part.begin(), part.end());
+    if (word == "ADDED") {
+      for (TableColumn& column : AddedColumns()) columns.push_back(std::move(column));
+    } else {
+      columns.push_back(compact ? CompactColumn(word) : Of(*FindMeasure(word), word));
+    }
+  }
+  return columns;
+}
 
 std::optional<TableColumn> KnownColumn(string_view key) {
   const Measure* measure = FindMeasure(key);
@@ -77,185 +167,11 @@ std::optional<TableColumn> KnownColumn(string_view key) {
   return Of(*measure, key);
 }
 
-const std::vector<TableColumn>& CompactCaseColumns() {
-  static const std::vector<TableColumn> kColumns = {
-      Short("mechanism", "mechanism"),
-      Short("formulation", "form."),
-      Short("enforcement", "enf.", AbbreviatedLevels()),
-      Short("coordinates", "coord", {{"absolute", "abs"}}),
-      Short("solver", "fact.", {{"rank-revealing", "r-rev"}}),
-      Short("rtol", "rtol"),
-      Short("horizon", "T/s"),
-      Short("outcome", "outcome",
-            {{"finished", "ok"},
-             {"step-too-small", "small step"},
-             {"inconsistent-start", "bad start"},
-             {"inconsistent-motion", "bad motion"},
-             {"newton-failure", "newton"},
-             {"integrator-error", "integrator"}}),
-  };
-  return kColumns;
-}
-
-const std::vector<TableColumn>& DriftColumns() {
-  static const std::vector<TableColumn> kColumns =
-      Join(Join(CaseColumns(), Columns({"warnings",
-                                        "agreement",
-                                        "drift_position_max",
-                                        "drift_rotation_max",
-                                        "drift_velocity_max",
-                                        "drift_acceleration_max",
-                                        "loop_closure_max",
-                                        "correction_max",
-                                        "worst_loop",
-                                        "energy_error_max",
-                                        "growth_exponent",
-                                        "growth_spread",
-                                        "growth_regime",
-                                        "growth_resolved",
-                                        "growth_hypothesis",
-                                        "growth_hypothesis_resolved",
-                                        "ensemble",
-                                        "steps",
-                                        "rejected",
-                                        "rhs_evaluations",
-                                        "rank_min",
-                                        "rcond_min",
-                                        "state_hash",
-                                        "restarts",
-                                        "branch_error_max",
-                                        "closed_form_error_max",
-                                        "message"})),
-           AddedColumns());
-  return kColumns;
-}
-
-const std::vector<TableColumn>& TimingColumns() {
-  static const std::vector<TableColumn> kMachine =
-      Columns({"aa_spread", "aa_spread_wall", "calibration_ns", "calibration_wall_ns",
-               "discarded_repetitions", "load1", "processors", "governor", "noise"});
-  static const std::vector<TableColumn> kTimes =
-      Columns({"bodies", "joints", "loops", "dof", "rhs_ns_median", "rhs_ns_p10", "rhs_ns_p90",
-               "ns_per_body", "step_us_median", "wall_s_median", "realtime_factor", "repeats",
-               "rhs_ns_min", "wall_s_min", "wall_s_p10", "wall_s_p90"});
-  static const std::vector<TableColumn> kColumns = Join(CaseColumns(), Join(kTimes, kMachine));
-  return kColumns;
-}
-
-const std::vector<TableColumn>& PrecisionColumns() {
-  static const std::vector<TableColumn> kColumns = Columns({"experiment",
-                                                            "mechanism",
-                                                            "formulation",
-                                                            "enforcement",
-                                                            "coordinates",
-                                                            "solver",
-                                                            "integrator",
-                                                            "scalar",
-                                                            "rtol",
-                                                            "atol",
-                                                            "horizon",
-                                                            "outcome",
-                                                            "t_reached",
-                                                            "error_final",
-                                                            "error_dominated_by",
-                                                            "drift_position_max",
-                                                            "drift_dominated_by",
-                                                            "steps",
-                                                            "rejected",
-                                                            "restarts",
-                                                            "rhs_evaluations"});
-  return kColumns;
-}
-
-const std::vector<TableColumn>& CompactPrecisionColumns() {
-  static const std::vector<TableColumn> kColumns = [] {
-    std::vector<TableColumn> columns = CompactCaseColumns();
-    std::erase_if(columns, [](const TableColumn& column) {
-      return column.key == "solver" || column.key == "horizon";
-    });
-    const auto rtol = std::ranges::find(columns, "rtol", &TableColumn::key);
-    columns.insert(rtol, Short("scalar", "scalar"));
-    const std::vector<std::pair<std::string, std::string>> parts = {{"truncation", "trunc"},
-                                                                    {"round-off", "round"}};
-    return Join(std::move(columns),
-                {Short("error_final", "error [m]", {}, kAnswer),
-                 Short("error_dominated_by", "by", parts), Short("drift_position_max", "drift [m]"),
-                 Short("drift_dominated_by", "by", parts), Short("steps", "steps")});
-  }();
-  return kColumns;
-}
-
-const std::vector<TableColumn>& ModelColumns() {
-  static const std::vector<TableColumn> kColumns = Columns({"mechanism",
-                                                            "model",
-                                                            "formulation",
-                                                            "enforcement",
-                                                            "coordinates",
-                                                            "integrator",
-                                                            "rtol",
-                                                            "horizon",
-                                                            "outcome",
-                                                            "model_motion",
-                                                            "bodies",
-                                                            "joints",
-                                                            "model_error",
-                                                            "model_error_at",
-                                                            "reference_error",
-                                                            "reference_valid_until",
-                                                            "model_accepts",
-                                                            "model_verdict",
-                                                            "error_position_max",
-                                                            "rhs_evaluations",
-                                                            "model_rhs_ratio",
-                                                            "wall_s",
-                                                            "model_wall_ratio",
-                                                            "noise"});
-  return kColumns;
-}
-
-const std::vector<TableColumn>& CompactModelColumns() {
-  static const std::vector<TableColumn> kColumns = {
-      Short("mechanism", "mechanism"),  Short("model", "model"),
-      Short("bodies", "bodies"),        Short("model_error", "model error [m]"),
-      Short("rhs_evaluations", "rhs"),  Short("model_rhs_ratio", "of full"),
-      Short("wall_s", "wall [s]"),      Short("model_wall_ratio", "of full"),
-      Short("model_verdict", "verdict")};
-  return kColumns;
-}
-
-const std::vector<TableColumn>& ReferenceColumns() {
-  static const std::vector<TableColumn> kColumns = Columns(
-      {"experiment", "mechanism", "horizon", "outcome", "reference", "reference_valid_until",
-       "reference_error", "reference_runs", "cpu_s", "rhs_evaluations", "message"});
-  return kColumns;
-}
-
-const std::vector<TableColumn>& CompactReferenceColumns() {
-  static const std::vector<TableColumn> kColumns = {
-      Short("mechanism", "mechanism"),
-      Short("horizon", "T/s"),
-      Short("outcome", "outcome"),
-      Short("reference", "reference"),
-      Short("reference_valid_until", "valid until [s]", {}, kAnswer),
-      Short("reference_error", "to [m]", {}, kAnswer),
-      Short("cpu_s", "CPU [s]"),
-      Short("message", "why no further")};
-  return kColumns;
-}
-
-const std::vector<TableColumn>& CompactDriftColumns() {
-  static const std::vector<TableColumn> kColumns = Join(
-      CompactCaseColumns(), {Short("drift_position_max", "drift [m]", {}, kAnswer),
-                             Short("energy_error_max", "dE [J]"), Short("growth_exponent", "t^p")});
-  return kColumns;
-}
-
-const std::vector<TableColumn>& CompactTimingColumns() {
-  static const std::vector<TableColumn> kColumns =
-      Join(CompactCaseColumns(),
-           {Short("bodies", "bodies", {}, -1), Short("rhs_ns_median", "rhs [ns]", {}, kAnswer),
-            Short("wall_s_median", "wall [s]")});
-  return kColumns;
+std::optional<TableColumn> CompactCaseColumn(string_view key) {
+  for (const auto part : std::views::split(kCompactCase, ' ')) {
+    if (string_view(part.begin(), part.end()) == key) return CompactColumn(key);
+  }
+  return std::nullopt;
 }
 
 // Columns for arbitrary record keys.
@@ -393,9 +309,7 @@ std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
       return false;
     }();
     if (!tells) continue;
-    const std::vector<TableColumn>& compact = CompactCaseColumns();
-    const auto known = std::ranges::find(compact, key, &TableColumn::key);
-    InsertBeforeOutcome(&columns, known != compact.end() ? *known : ColumnOf(key, rows));
+    InsertBeforeOutcome(&columns, CompactCaseColumn(key).value_or(ColumnOf(key, rows)));
     show(key);
   }
   return columns;

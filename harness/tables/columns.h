@@ -12,41 +12,25 @@
 
 namespace loopbench::harness {
 
-// Columns of the tables and their order.
+/// Table of the records of one kind.
+struct KindOfTable {
+  std::string_view name, records, title;
+  /// Keys in order, for files and for a terminal of about 100 columns. CASE: the keys of the case
+  /// and its outcome; ADDED: measures of user-defined observers. Drift is in m and rad, never
+  /// mixed. `loop_closure_max` differs from it only in absolute coordinates, in which every joint
+  /// can open and errors may cancel around a loop.
+  std::string_view columns, compact;
+};
 
-/// Columns of the case and its outcome for a terminal, with short words that differ in their first
-/// letters.
-const std::vector<TableColumn>& CompactCaseColumns();
+/// Kinds in order of preference: by default the first with records in the store.
+const std::vector<KindOfTable>& KindsOfTables();
 
-/// Columns of drift.csv (docs/reference/records.md): case, outcome, drift at position [m and rad,
-/// never mixed], velocity and acceleration level, energy, growth, counters, conditioning, measures
-/// of user-defined observers. `loop_closure_max` differs from the drift only in absolute
-/// coordinates, in which every joint can open and errors may cancel around a loop.
-const std::vector<TableColumn>& DriftColumns();
+/// Returns the columns of a kind (docs/reference/records.md), of drift for any other word. Compact
+/// columns have short words that differ in their first letters.
+std::vector<TableColumn> ColumnsOfKind(std::string_view name, bool compact);
 
-/// Columns of timing.csv: case and outcome, size of the mechanism, times.
-const std::vector<TableColumn>& TimingColumns();
-
-/// Columns of precision.csv: case with its scalar, outcome, error and drift with the dominant
-/// error, counters.
-const std::vector<TableColumn>& PrecisionColumns();
-
-/// Part of PrecisionColumns() that fits a terminal.
-const std::vector<TableColumn>& CompactPrecisionColumns();
-
-/// Errors and costs of simpler models of a mechanism (harness/cli/models.h), and the columns that
-/// fit a terminal.
-const std::vector<TableColumn>& ModelColumns();
-const std::vector<TableColumn>& CompactModelColumns();
-/// Columns of certified and published references.
-const std::vector<TableColumn>& ReferenceColumns();
-const std::vector<TableColumn>& CompactReferenceColumns();
-
-/// Part of DriftColumns() that fits a terminal of about 100 columns, with shortened words.
-const std::vector<TableColumn>& CompactDriftColumns();
-
-/// Part of TimingColumns() that fits a terminal of about 100 columns, with shortened words.
-const std::vector<TableColumn>& CompactTimingColumns();
+/// Returns the compact column of a key that identifies cases, if tables for a terminal have one.
+std::optional<TableColumn> CompactCaseColumn(std::string_view key);
 
 /// Column of a key that has words in the table of measures (harness/record/measures.h).
 std::optional<TableColumn> KnownColumn(std::string_view key);

@@ -113,9 +113,11 @@ std::vector<RowGroup> Groups(const Table& table) {
   return groups;
 }
 
-void AddRow(const std::vector<Value>& values, Table* table) {
+Record& AddRow(std::initializer_list<AnyValue> values, Table* table) {
   Record& row = table->rows.emplace_back();
-  for (std::size_t i = 0; i < values.size(); ++i) row.Set(table->columns.at(i).key, values[i]);
+  std::size_t column = 0;
+  for (const AnyValue& one : values) row.Set(table->columns.at(column++).key, one.value);
+  return row;
 }
 
 bool HasFailed(const Record& row) {

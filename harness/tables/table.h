@@ -2,8 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <initializer_list>
 #include <span>
 #include <string>
+#include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -46,8 +50,30 @@ struct Table {
   std::string (*colour)(const Record& row, const TableColumn& column) = &OutcomeColour;
 };
 
-/// Adds a row of `values` under the table's columns, in their order.
-void AddRow(const std::vector<Value>& values, Table* table);
+/// Value of a cell: a text of any type, a number, a count, a word of an enumeration, or a value.
+struct AnyValue {
+  template <class T>
+  AnyValue(const T& any) {
+    if constexpr (std::is_convertible_v<const T&, std::string_view>) {
+      value = std::string(std::string_view(any));
+    } else if constexpr (std::is_same_v<T, bool> || std::is_convertible_v<const T*, const Value*>) {
+      value = any;
+    } else if constexpr (std::is_integral_v<T>) {
+      value = static_cast<std::int64_t>(any);
+    } else if constexpr (requires { any.string(); }) {
+      value = any.string();
+    } else if constexpr (requires { ToString(any); }) {
+      value = std::string(ToString(any));
+    } else {
+      value = Value(any);
+    }
+  }
+  Value value;
+};
+
+/// Adds a row of `values` under the table's columns, in their order; fewer values leave the last
+/// columns empty.
+Record& AddRow(std::initializer_list<AnyValue> values, Table* table);
 
 /// Rows with one value of the group's key, under "key = value".
 struct RowGroup {

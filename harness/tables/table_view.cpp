@@ -247,24 +247,10 @@ bool HasKind(std::span<const Record> records, std::string_view kind) {
                              [&](const Record& record) { return record.Text("kind") == kind; });
 }
 
-/// Table of the records of one kind.
-struct KindOfTable {
-  std::string_view name, records, title;
-  const std::vector<TableColumn>& (*columns)();
-  const std::vector<TableColumn>& (*compact)();
-};
-/// Kinds in order of preference: by default the first with records in the store.
-constexpr KindOfTable kKinds[] = {
-    {"drift", "accuracy", "Drift", DriftColumns, CompactDriftColumns},
-    {"precision", "precision", "Precision", PrecisionColumns, CompactPrecisionColumns},
-    {"models", "model", "Models", ModelColumns, CompactModelColumns},
-    {"timing", "timing", "Timing", TimingColumns, CompactTimingColumns},
-    {"references", "reference", "References", ReferenceColumns, CompactReferenceColumns}};
-
 /// Returns nullptr for `factorial` and `all`.
 const KindOfTable* FindKind(std::string_view name) {
-  const auto kind = std::ranges::find(kKinds, name, &KindOfTable::name);
-  return kind == std::end(kKinds) ? nullptr : &*kind;
+  const auto kind = std::ranges::find(KindsOfTables(), name, &KindOfTable::name);
+  return kind == KindsOfTables().end() ? nullptr : &*kind;
 }
 
 // Checks keys; `rows` are the rows of the table: records, or for the factorial table its own rows.
@@ -281,12 +267,6 @@ std::vector<TableColumn> AllColumns(std::span<const Record> rows) {
     if (!key.starts_with("series.")) columns.push_back(ColumnOf(key, rows));
   }
   return columns;
-}
-
-const std::vector<TableColumn>& ColumnsOfKind(const std::string& kind, bool compact) {
-  const KindOfTable* known = FindKind(kind);
-  const KindOfTable& shown = known == nullptr ? kKinds[0] : *known;
-  return compact ? shown.compact() : shown.columns();
 }
 
 std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
@@ -375,8 +355,8 @@ Table Factorial(const std::vector<Record>& rows) {
 std::string KindOf(const TableView& view, std::span<const Record> records) {
   if (!view.kind.empty()) return view.kind;
   const auto first = std::ranges::find_if(
-      kKinds, [&](const KindOfTable& kind) { return HasKind(records, kind.records); });
-  return std::string(first == std::end(kKinds) ? "all" : first->name);
+      KindsOfTables(), [&](const KindOfTable& kind) { return HasKind(records, kind.records); });
+  return std::string(first == KindsOfTables().end() ? "all" : first->name);
 }
 
 std::vector<Record> RowsOf(std::span<const Record> records, const TableView& view) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cwchar>
 #include <iterator>
+#include <span>
 
 #include "harness/text/hash.h"
 
@@ -89,21 +90,12 @@ bool IsFormula(std::string_view text) {
 bool IsMarkup(std::string_view text, std::size_t i) {
   const char before = i > 0 ? text[i - 1] : ' ';
   const char after = i + 1 < text.size() ? text[i + 1] : ' ';
-  switch (text[i]) {
-    case '\\':
-    case '`':
-    case '*':
-    case '~':
-    case '|':
-    case '$':
-      return true;
-    case '_':  // no markup within a word
-      return !IsAlphanumeric(before) || !IsAlphanumeric(after);
-    case ']':  // of a link or a link definition
-      return after == '(' || after == '[' || after == ':';
-    default:
-      return false;
-  }
+  constexpr std::string_view kAlways = "\\`*~|$";
+  // no markup within a word
+  if (text[i] == '_') return !IsAlphanumeric(before) || !IsAlphanumeric(after);
+  // of a link or a link definition
+  if (text[i] == ']') return after == '(' || after == '[' || after == ':';
+  return kAlways.find(text[i]) != std::string_view::npos;
 }
 
 /// Letters that a font of 128 characters can compose: no thorn, no eth, no signs.
@@ -112,23 +104,21 @@ bool IsLatin1Letter(std::uint32_t code) {
   return code >= 0xC0 && code <= 0xFF && std::ranges::find(kOthers, code) == std::end(kOthers);
 }
 
-std::string_view LatexOf(char c) {
-  switch (c) {
-    case '\\':
-      return "\\textbackslash{}";
-    case '~':
-      return "\\textasciitilde{}";
-    case '^':
-      return "\\textasciicircum{}";
-    case '<':
-      return "\\textless{}";  // not every font encoding has these three
-    case '>':
-      return "\\textgreater{}";
-    case '|':
-      return "\\textbar{}";
-    default:
-      return "";
-  }
+struct Replacement {
+  char character;
+  std::string_view text;
+};
+constexpr Replacement kXml[] = {
+    {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
+// not every font encoding has the last three
+constexpr Replacement kLatex[] = {{'\\', "\\textbackslash{}"},  {'~', "\\textasciitilde{}"},
+                                  {'^', "\\textasciicircum{}"}, {'<', "\\textless{}"},
+                                  {'>', "\\textgreater{}"},     {'|', "\\textbar{}"}};
+
+/// Returns the text for a character, "" if it stays.
+std::string_view Replaced(std::span<const Replacement> table, char c) {
+  const auto known = std::ranges::find(table, c, &Replacement::character);
+  return known == table.end() ? "" : known->text;
 }
 
 }  // namespace
@@ -181,7 +171,7 @@ std::string EscapeLatex(std::string_view raw) {
       const bool known = IsLatin1Letter(character.code);
       escaped += known ? std::string(text.substr(0, character.length))
                        : fmt::format("(U+{:04X})", character.code);
-    } else if (const std::string_view command = LatexOf(c); !command.empty()) {
+    } else if (const std::string_view command = Replaced(kLatex, c); !command.empty()) {
       escaped += command;
     } else {
       // at the start of a row these two would belong to the line end before
@@ -216,25 +206,8 @@ std::string BreakableLatex(std::string_view raw) {
 std::string EscapeXml(std::string_view text) {
   std::string escaped;
   for (const char c : EscapeTerminal(text)) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
+    const std::string_view replaced = Replaced(kXml, c);
+    escaped += replaced.empty() ? std::string_view(&c, 1) : replaced;
   }
   return escaped;
 }

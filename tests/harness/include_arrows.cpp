@@ -96,6 +96,11 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
                "harness/judge/", "tests/harness/config", "tests/harness/store"});
     return allowed ? "" : "nlohmann-json is for the rooms that read and write JSON";
   }
+  if (header.starts_with("CLI/")) {
+    const bool allowed = OneOf(path, {"harness/cli/command_line.cpp", "harness/timing/count.cpp",
+                                      "harness/text/numeric_option.h"});
+    return allowed ? "" : "CLI11 is for the command lines of programs";
+  }
   if (header.starts_with("benchmark/")) {
     return path.starts_with("harness/timing/") ? "" : "Google Benchmark is for harness/timing";
   }

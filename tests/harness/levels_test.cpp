@@ -5,7 +5,7 @@
 
 #include "examples/own-parts/half_velocity.h"
 #include "harness/analysis/warnings.h"
-#include "harness/cli/schema.h"
+#include "harness/cli/commands.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/suite/reference_cases.h"
 #include "harness/text/files.h"

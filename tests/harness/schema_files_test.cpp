@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "harness/cli/schema.h"
+#include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
 #include "harness/json/fields.h"
 #include "harness/text/files.h"

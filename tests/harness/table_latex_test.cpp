@@ -47,10 +47,11 @@ Table Filled(std::vector<TableColumn> columns, int rows) {
 }
 
 std::vector<Table> Tables() {
-  std::vector<Table> tables = {Filled(DriftColumns(), 9), Filled(TimingColumns(), 9),
-                               Filled(CompactDriftColumns(), 90), Filled(CompactTimingColumns(), 3),
-                               Filled(CompactPrecisionColumns(), 1)};
-  tables.push_back(Filled(CompactCaseColumns(), 9));
+  std::vector<Table> tables = {
+      Filled(ColumnsOfKind("drift", false), 9), Filled(ColumnsOfKind("timing", false), 9),
+      Filled(ColumnsOfKind("drift", true), 90), Filled(ColumnsOfKind("timing", true), 3),
+      Filled(ColumnsOfKind("precision", true), 1)};
+  tables.push_back(Filled(ColumnsOfKind("drift", true), 9));
   tables.back().group = "mechanism";
   tables.push_back(Filled({{"a", "a"}, {"b", "b [m]", Format::kScientific}}, 9));
   return tables;
@@ -88,7 +89,7 @@ TEST(TableLatex, RowsHaveAsManyCellsAsColumnsAndNoCharacterThatPdflatexLacks) {
 }
 
 TEST(TableLatex, ColumnsThatFindNoPlaceAreNamed) {
-  const std::string text = ToLatex(Filled(DriftColumns(), 9));
+  const std::string text = ToLatex(Filled(ColumnsOfKind("drift", false), 9));
   EXPECT_NE(text.find("\\begin{landscape}"), std::string::npos);
   EXPECT_NE(text.find("% left out to fit the page: "), std::string::npos);
   EXPECT_NE(text.find("state hash"), std::string::npos) << text.substr(0, 500);

@@ -1,8 +1,9 @@
-// migrate: replaces names in files of earlier versions by today's names.
+// schema and migrate: keys of files of each kind, and of earlier versions.
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <exception>
 #include <fstream>
@@ -12,7 +13,10 @@
 #include <string_view>
 
 #include "harness/cli/command_line.h"
+#include "harness/cli/commands.h"
+#include "harness/config/file_schemas.h"
 #include "harness/json/json_document.h"
+#include "harness/judge/rule_schemas.h"
 #include "harness/record/record.h"
 #include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
@@ -21,6 +25,58 @@
 #include "harness/text/terminal.h"
 
 namespace loopbench::harness {
+namespace {
+
+struct Kind {
+  std::string name, title;
+  Json (*schema)();
+};
+
+const std::array<Kind, 6>& Kinds() {
+  static const std::array<Kind, 6> kinds = {
+      {{"mechanism", "mechanism", MechanismSchema},
+       {"experiment", "experiment", ExperimentSchema},
+       {"benchmarks", "benchmarks", BenchmarksSchema},
+       {"claims", "claims", ClaimsSchema},
+       {"map", "robustness map", MapSchema},
+       {"series", "published series", PublishedSeriesSchema}}};
+  return kinds;
+}
+
+const Kind& KindOf(const std::string& name) {
+  return *std::ranges::find(Kinds(), name, &Kind::name);
+}
+
+}  // namespace
+
+std::vector<std::string> SchemaKinds() {
+  std::vector<std::string> names;
+  for (const Kind& kind : Kinds()) names.push_back(kind.name);
+  return names;
+}
+
+std::string SchemaOfKind(const std::string& kind) {
+  return SchemaText("Loopbench " + KindOf(kind).title, KindOf(kind).schema());
+}
+
+std::string TablesOfKinds(const std::vector<std::string>& kinds) {
+  std::vector<std::pair<std::string, Json>> schemas;
+  for (const std::string& kind : kinds) schemas.emplace_back(kind, KindOf(kind).schema());
+  return SchemaTables(schemas);
+}
+
+void AddSchema(Commands& commands) {
+  auto& kind = commands.Keep<std::string>();
+  auto& tables = commands.Keep<bool>();
+  commands.Add("schema", "Print the JSON Schema (draft 07) of a file type",
+               [&](const Typed&) {
+                 PrintText(tables ? TablesOfKinds({kind}) : SchemaOfKind(kind));
+                 return 0;
+               },
+               {{"kind", "File type", &kind, kRequired, OneOf(SchemaKinds())},
+                {"--tables", "Tables of keys in Markdown instead", &tables}});
+}
+
 namespace {
 
 using std::string_view;
@@ -351,10 +407,10 @@ int Migrate(const std::vector<std::filesystem::path>& files) {
 
 void AddMigrate(Commands& commands) {
   auto& files = commands.Keep<std::vector<std::filesystem::path>>();
-  CLI::App* app = commands.Add("migrate", "Replace names of earlier versions in files",
-                               [&](const Typed&) { return Migrate(files); });
-  app->add_option("file", files, "Configuration files (JSON), stores and files of records")
-      ->required();
+  commands.Add(
+      "migrate", "Replace names of earlier versions in files",
+      [&](const Typed&) { return Migrate(files); },
+      {{"file", "Configuration files (JSON), stores and files of records", &files, kRequired}});
 }
 
 std::string WithMigrationHint(std::string message) {

@@ -1,16 +1,19 @@
-// Services from the declarations of all subcommands and options: spelling suggestions, shell
-// completion, a manual page.
+// The command line: options of all rows of commands by CLI11, and the services from the same rows:
+// help, spelling suggestions, shell completion, a manual page.
+#include "harness/cli/command_line.h"
+
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
+#include <array>
 #include <stdexcept>
-#include <vector>
+#include <type_traits>
 
-#include "harness/cli/command_line.h"
 #include "harness/record/provenance.h"
 #include "harness/text/files.h"
-#include "harness/text/terminal.h"
+#include "harness/text/numeric_option.h"
+#include "harness/text/run_program.h"
 #include "harness/text/words.h"
 
 namespace loopbench::harness {
@@ -290,8 +293,7 @@ void WriteManual(const CLI::App& app, const std::filesystem::path& folder) {
   }
 }
 
-}  // namespace
-
+/// Returns the message of a failed parse: unknown words with spelling suggestions, or `error`.
 std::string ParseFailure(const CLI::App& app, const CLI::Error& error) {
   const CLI::App* failed = &app;
   std::string command = app.get_name();
@@ -311,6 +313,7 @@ std::string ParseFailure(const CLI::App& app, const CLI::Error& error) {
                      is_missing ? "expected a command" : error.what());
 }
 
+/// Returns the section of a command in docs/reference/commands.md as plain text.
 std::string HelpSection(const std::string& command) {
   const std::string heading = "\n## " + command + "\n\n";
   const std::size_t at = kCommandReference.find(heading);
@@ -336,6 +339,7 @@ std::string HelpSection(const std::string& command) {
   return text;
 }
 
+/// Returns the layout of --help: a metavariable and the default of each option.
 std::shared_ptr<CLI::FormatterBase> HelpLayout() {
   class Layout final : public CLI::Formatter {
     std::string make_option_opts(const CLI::Option* option) const override {
@@ -353,33 +357,153 @@ std::shared_ptr<CLI::FormatterBase> HelpLayout() {
   layout->column_width(30);
   return layout;
 }
+/// Work of an option after all options are parsed, such as reading its conditions.
+using Finish = std::function<void()>;
 
-void AddShell(Commands& commands) {
-  auto& shell = commands.Keep<std::string>();
-  CLI::App* all = commands.app();
+/// Adds an option whose words are read by `read` into a list.
+template <class T>
+CLI::Option* AddLater(CLI::App* app, const Option& row, std::vector<T>* place,
+                      T (*read)(std::string_view), std::vector<Finish>* later) {
+  const auto texts = std::make_shared<std::vector<std::string>>();
+  later->push_back([texts, place, read] {
+    for (const std::string& text : *texts) place->push_back(read(text));
+  });
+  return app->add_option(row.names, *texts, row.sentence);
+}
+
+template <class T>
+bool IsEmpty(const T& value) {
+  if constexpr (requires { value.empty(); }) {
+    return value.empty();
+  } else {
+    return value == T{};
+  }
+}
+
+/// Adds an option with its default, and with its range if its place has numbers.
+template <class T>
+CLI::Option* AddValue(CLI::App* app, const Option& row, T* place) {
+  CLI::Option* option = app->add_option(row.names, *place, row.sentence);
+  const double from = row.rules.from, to = row.rules.to;
+  if constexpr (std::is_same_v<T, int>) {
+    if (to > from) option->check(NumberFrom(static_cast<int>(from), static_cast<int>(to)));
+  } else if (to > from) {
+    option->check(NumberFrom(from, to));
+  }
+  const bool shows = !option->get_positional() && !IsEmpty(*place);
+  if (row.rules.shows_default.value_or(shows)) option->capture_default_str();
+  return option;
+}
+
+void AddOption(CLI::App* app, const Option& row, std::vector<Finish>* later) {
+  const OptionRules& rules = row.rules;
+  const auto add = [&](auto* place) -> CLI::Option* {
+    using T = std::remove_pointer_t<decltype(place)>;
+    if constexpr (std::is_same_v<T, bool>) {
+      return app->add_flag(row.names, *place, row.sentence);
+    } else if constexpr (std::is_same_v<T, void()>) {
+      return app->add_flag_callback(row.names, place, row.sentence);
+    } else if constexpr (std::is_same_v<T, std::optional<std::string>>) {
+      const auto store = [place](const std::string& text) { *place = text; };
+      return app->add_option_function<std::string>(row.names, store, row.sentence);
+    } else if constexpr (std::is_same_v<T, Selection>) {
+      return AddLater(app, row, place, &ParseCondition, later);
+    } else if constexpr (std::is_same_v<T, std::vector<Setting>>) {
+      return AddLater(app, row, place, &ParseSetting, later);
+    } else {
+      return AddValue(app, row, place);
+    }
+  };
+  CLI::Option* option = std::visit(add, row.place);
+  option->required(rules.required);
+  if (!rules.words.empty()) option->check(CLI::IsMember(rules.words));
+  if (rules.exists) option->check(CLI::ExistingFile);
+  if (rules.splits) option->delimiter(',');
+  if (rules.most > 0) option->expected(1, rules.most);
+  if (!rules.needs.empty()) option->needs(app->get_option(rules.needs));
+  for (const std::string& other : rules.excludes) option->excludes(app->get_option(other));
+  // other options take only the next word, because file names may follow
+  if (!option->get_positional() && !rules.takes_all) option->allow_extra_args(false);
+}
+
+std::vector<std::string> GivenOptions(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() > 0) names.push_back(option->get_name());
+  }
+  return names;
+}
+
+}  // namespace
+
+void Commands::AddShell(const CLI::App& app) {
+  auto& [shell, subject] = Keep<std::array<std::string, 2>>();
+  auto& folder = Keep<std::filesystem::path>();
+  std::vector<std::string> names;
+  for (const Command& row : rows_) {
+    if (row.name.find(' ') == row.name.npos) names.push_back(row.name);
+  }
+  names.insert(names.end(), {"completion", "manual"});
   const auto print = [](const std::string& text) {
     PrintText(text);
     return 0;
   };
-  CLI::App* completion =
-      commands.Add("completion", "Print a completion script",
-                   [=, &shell](const Typed&) { return print(CompletionScript(*all, shell)); });
-  completion->add_option("shell", shell, "Shell to generate for")
-      ->required()
-      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
-  auto& subject = commands.Keep<std::string>();
-  auto& folder = commands.Keep<std::filesystem::path>();
-  CLI::App* manual =
-      commands.Add("manual", "Print manual pages", [=, &subject, &folder](const Typed&) {
-        if (!folder.empty()) {
-          WriteManual(*all, folder);
-          return 0;
+  Add("completion", "Print a completion script",
+      [&, print](const Typed&) { return print(CompletionScript(app, shell)); },
+      {{"shell", "Shell to generate for", &shell, kRequired, OneOf({"bash", "zsh", "fish"})}});
+  Add("manual", "Print manual pages",
+      [&, print](const Typed&) {
+        if (folder.empty()) {
+          return print(ManualPage(app, subject.empty() ? nullptr : app.get_subcommand(subject)));
         }
-        return print(ManualPage(*all, subject.empty() ? nullptr : all->get_subcommand(subject)));
+        WriteManual(app, folder);
+        return 0;
+      },
+      {{"command", "Command (default: all)", &subject, OneOf(names)},
+       {"-o,--out", "Folder for the pages of all commands", &folder}});
+}
+
+int Commands::Run(int argc, char** argv, const std::string& footer) {
+  CLI::App app{
+      "Measures constraint drift and time of formulations of closed-loop multibody dynamics.",
+      "loopbench"};
+  app.footer(footer);
+  app.set_version_flag("--version", VersionText);
+  app.require_subcommand(1);
+  app.formatter(HelpLayout());
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    return EscapeTerminalLines(ParseFailure(*failed, error));
+  });
+  AddShell(app);
+  std::vector<Finish> later;
+  std::function<int(const Typed&)> run;
+  Typed typed{CommandLine(argc, argv), ShellLine({argv, argv + argc}), {}};
+  for (const Command& row : rows_) {
+    const std::size_t space = row.name.find(' ');
+    CLI::App* command =
+        (space == row.name.npos ? &app : app.get_subcommand(row.name.substr(0, space)))
+            ->add_subcommand(row.name.substr(space == row.name.npos ? 0 : space + 1), row.sentence);
+    for (const Option& option : row.options) AddOption(command, option, &later);
+    if (space == row.name.npos) {
+      command->group(row.heading)->footer(row.notes + HelpSection(row.name));
+      if (!row.run) command->require_subcommand(1);
+    } else {
+      command->group("Subcommands");
+    }
+    if (row.run) {
+      command->callback([&run, &typed, command, &row] {
+        run = row.run;
+        typed.given = GivenOptions(*command);
       });
-  manual->add_option("command", subject, "Command (default: all)")
-      ->check(CLI::IsMember(CommandNames(*all)));
-  manual->add_option("-o,--out", folder, "Folder for the pages of all commands");
+    }
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  for (const Finish& finish : later) finish();
+  return run ? run(typed) : 0;
 }
 
 }  // namespace loopbench::harness

@@ -126,20 +126,6 @@ CurveStyle StyleBy(const std::vector<std::string>& keys, const Record& row, std:
   return style;
 }
 
-Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string& label,
-                  std::size_t index) {
-  Curve curve{.label = label, .style = StyleBy(KeysIn(wanted.group), row, index)};
-  curve.x = row.Numbers(wanted.x);
-  curve.y = row.Numbers(wanted.y);
-  curve.ends_early = HasFailed(row);
-  if (curve.ends_early && curve.x.empty() && wanted.x.ends_with('t')) {  // a series of times
-    curve.x = {row.Number("t_reached")};
-    curve.y = {NAN};
-  }
-  curve.style.flagged = HasWarning(row);
-  return curve;
-}
-
 // Makes a curve; `rows` are in order of x.
 Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
                  const std::string& label, std::size_t index) {
@@ -301,7 +287,10 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto& [label, members] = groups[g];
     for (std::size_t i = 0; is_series && i < members.size(); ++i) {
-      figure.curves.push_back(SeriesCurve(members[i], wanted, i == 0 ? label : "", g));
+      CurveStyle style = StyleBy(group_keys, members[i], g);
+      style.flagged = HasWarning(members[i]);
+      figure.curves.push_back(
+          CurveOverTime(members[i], wanted.x, wanted.y, i == 0 ? label : "", style));
     }
     if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, x, label, g));
     for (const std::string& key : telling) {

@@ -67,7 +67,7 @@ constexpr Budget kBudgets[] = {
     {"harness/tables",          { 2100,  10,   5},  1500},
     {"harness/judge",           { 3690,  17,   6},  2700},
     {"harness/figures",         { 2996,  12,   7},  1900},
-    {"harness/view",            { 2491,  10,   8},  2050},
+    {"harness/view",            { 2422,  10,   8},  2050},
     {"harness/exchange",        { 6855,  29,  10},  5000},
     {"harness/report",          { 1100,   4,  10},  1100},
     {"harness/history",         { 1970,  10,   7},  1500},

@@ -361,11 +361,4 @@ Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
   return both;
 }
 
-std::optional<std::string> DrawTrajectories(const std::filesystem::path& path,
-                                            const Trajectory& ours, const Trajectory& theirs,
-                                            std::span<const SharedColumn> columns,
-                                            const std::string& title) {
-  return WriteFigure(path, TrajectoryFigure(ours, theirs, columns, title));
-}
-
 }  // namespace loopbench::harness

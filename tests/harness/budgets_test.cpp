@@ -66,7 +66,7 @@ constexpr Budget kBudgets[] = {
     {"harness/advise",          {  657,   2,   8},   650},
     {"harness/tables",          { 2100,  10,   5},  1500},
     {"harness/judge",           { 3690,  17,   6},  2700},
-    {"harness/figures",         { 2996,  12,   7},  1900},
+    {"harness/figures",         { 2970,  12,   7},  1900},
     {"harness/view",            { 2422,  10,   8},  2050},
     {"harness/exchange",        { 6855,  29,  10},  5000},
     {"harness/report",          { 1100,   4,  10},  1100},

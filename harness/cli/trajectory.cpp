@@ -271,7 +271,8 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   for (const SharedColumn& column : shared) {
     if (column.unit == shared.front().unit && drawn.size() < kMost) drawn.push_back(column);
   }
-  const auto fault = DrawTrajectories(command.figure, ours, theirs, drawn, "ours and theirs");
+  const auto fault =
+      WriteFigure(command.figure, TrajectoryFigure(ours, theirs, drawn, "ours and theirs"));
   if (fault) throw std::runtime_error(fmt::format("{}: {}", command.figure.string(), *fault));
   Print("wrote {}: {} of {} columns\n", command.figure.string(), drawn.size(), shared.size());
   return 0;

@@ -222,23 +222,22 @@ void ReportRepeatedBenchmark(const JsonNode& node, const BenchmarkGroup& group,
 
 /// Reads the file of states; its errors are added with its own file name.
 StateHashes ReadStates(const std::filesystem::path& path, ErrorList* errors) {
-  StateHashes states;
   try {
-    const std::string text = ReadTextFile(path);
-    const Json document = ParseDocument(text, path.string());
-    ErrorList own(path.string(), text);
-    for (const auto& [name, node] : JsonNode(document, "", own).Members()) {
-      const std::string hash = node.Text();
-      const bool is_hash =
-          hash.size() == 16 && hash.find_first_not_of("0123456789abcdef") == std::string::npos;
-      if (!hash.empty() && !is_hash) node.Fail("16 hexadecimal digits");
-      states[name] = hash;
-    }
-    own.ThrowIfAny();
+    return ReadDocument(ReadTextFile(path), path.string(), [](const JsonNode& root) {
+      StateHashes states;
+      for (const auto& [name, node] : root.Members()) {
+        const std::string hash = node.Text();
+        const bool is_hash =
+            hash.size() == 16 && hash.find_first_not_of("0123456789abcdef") == std::string::npos;
+        if (!hash.empty() && !is_hash) node.Fail("16 hexadecimal digits");
+        states[name] = hash;
+      }
+      return states;
+    });
   } catch (const ConfigError& mistakes) {
     errors->AddText(mistakes.what());
+    return {};
   }
-  return states;
 }
 
 void ReadNamedStates(const JsonNode& node, BenchmarkSet& set) {
@@ -295,14 +294,12 @@ BenchmarkSet ReadBenchmarks(const std::filesystem::path& path) {
 }
 
 BenchmarkSet ParseBenchmarks(std::string_view text, const std::filesystem::path& path) {
-  const Json document = ParseDocument(text, path.string());
-  ErrorList errors(path.string(), text);
-  const JsonNode root(document, "", errors);
-  BenchmarkSet set;
-  set.path = path;
-  if (ExpectDocument(root, FileKind::kBenchmarks)) BenchmarkFields().ReadRows(root, &set);
-  errors.ThrowIfAny();
-  return set;
+  return ReadDocument(text, path.string(), [&](const JsonNode& root) {
+    BenchmarkSet set;
+    set.path = path;
+    if (ExpectDocument(root, FileKind::kBenchmarks)) BenchmarkFields().ReadRows(root, &set);
+    return set;
+  });
 }
 
 std::string StatesToJson(const StateHashes& states) {

@@ -53,11 +53,6 @@ Case MakeCase(const Experiment& experiment, std::size_t problem, const Method& m
   return one;
 }
 
-/// Returns `wanted` if positive, otherwise the shortest horizon.
-double HorizonOr(double wanted, const std::vector<double>& horizons) {
-  return wanted > 0.0 ? wanted : *std::min_element(horizons.begin(), horizons.end());
-}
-
 void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
   if (experiment.exclusions.empty()) return;
   std::erase_if(*cases, [&experiment](const Case& one) {
@@ -147,16 +142,24 @@ bool Matches(const EnsembleRule& rule, const Case& one) {
 
 namespace {
 
-/// Returns cases as Expand(), without ensembles.
-std::vector<Case> ExpandRuns(const Experiment& experiment) {
+/// Returns cases without ensembles. `horizon`: the only one of each problem (0: its shortest);
+/// nothing for all. `integrator`: the only one; "" for those of each method.
+std::vector<Case> ExpandRuns(const Experiment& experiment, const std::vector<Method>& methods,
+                             const std::vector<StepChoice>& choices,
+                             std::optional<double> horizon = std::nullopt,
+                             const std::string& integrator = "") {
   std::vector<Case> cases;
-  const std::vector<StepChoice> choices = StepChoices(experiment);
   for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
-    for (const double horizon : experiment.problems[problem].horizons) {
-      for (const Method& method : experiment.methods) {
-        for (const std::string& integrator : IntegratorsOf(experiment, method)) {
+    std::vector<double> horizons = experiment.problems[problem].horizons;
+    if (horizon && !horizons.empty()) {
+      horizons = {*horizon > 0.0 ? *horizon : std::ranges::min(horizons)};
+    }
+    for (const double own : horizons) {
+      for (const Method& method : methods) {
+        for (const std::string& name : integrator.empty() ? IntegratorsOf(experiment, method)
+                                                          : std::vector<std::string>{integrator}) {
           for (const StepChoice& choice : choices) {
-            cases.push_back(MakeCase(experiment, problem, method, choice, horizon, integrator));
+            cases.push_back(MakeCase(experiment, problem, method, choice, own, name));
           }
         }
       }
@@ -169,7 +172,7 @@ std::vector<Case> ExpandRuns(const Experiment& experiment) {
 }  // namespace
 
 std::vector<Case> Expand(const Experiment& experiment) {
-  std::vector<Case> cases = ExpandRuns(experiment);
+  std::vector<Case> cases = ExpandRuns(experiment, experiment.methods, StepChoices(experiment));
   for (Case& one : cases) {
     const auto rule =
         std::find_if(experiment.ensembles.begin(), experiment.ensembles.end(),
@@ -185,41 +188,18 @@ std::vector<Case> Expand(const Experiment& experiment) {
 }
 
 std::vector<Case> ExpandLadders(const Experiment& experiment) {
-  std::vector<Case> cases;
   const Precision& precision = experiment.precision;
-  if (precision.scalars.empty() || precision.tolerances.empty()) return cases;
-  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
-    const std::vector<double>& horizons = experiment.problems[problem].horizons;
-    if (horizons.empty()) continue;
-    const double horizon = HorizonOr(precision.horizon, horizons);
-    for (const Method& method : experiment.methods) {
-      // the only integrator available in every scalar
-      cases.push_back(MakeCase(experiment, problem, method,
-                               {.tolerance = precision.tolerances.front()}, horizon, "ode45"));
-    }
-  }
-  DropExcluded(experiment, &cases);
-  return cases;
+  if (precision.scalars.empty() || precision.tolerances.empty()) return {};
+  // the only integrator available in every scalar
+  return ExpandRuns(experiment, experiment.methods, {{.tolerance = precision.tolerances.front()}},
+                    precision.horizon, "ode45");
 }
 
 std::vector<Case> ExpandTiming(const Experiment& experiment) {
-  std::vector<Case> cases;
   const Timing& timing = experiment.timing;
-  if (timing.repeats == 0) return cases;
-  if (timing.cases) return ExpandRuns(experiment);
-  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
-    const std::vector<double>& horizons = experiment.problems[problem].horizons;
-    if (horizons.empty()) continue;
-    const double horizon = HorizonOr(timing.horizon, horizons);
-    for (const Method& method : timing.methods) {
-      for (const std::string& integrator : IntegratorsOf(experiment, method)) {
-        cases.push_back(MakeCase(experiment, problem, method, {.tolerance = timing.tolerance},
-                                 horizon, integrator));
-      }
-    }
-  }
-  DropExcluded(experiment, &cases);
-  return cases;
+  if (timing.repeats == 0) return {};
+  if (timing.cases) return ExpandRuns(experiment, experiment.methods, StepChoices(experiment));
+  return ExpandRuns(experiment, timing.methods, {{.tolerance = timing.tolerance}}, timing.horizon);
 }
 
 }  // namespace loopbench::harness

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numbers>
 #include <set>
@@ -189,17 +190,14 @@ namespace {
 
 constexpr std::int64_t kMaxUnits = 100'000;  ///< bars, windows, storeys
 
-/// {"family": "chain", ...} and so on; defaults of cranks are as in timing.
-struct ChainFamily {
-  std::vector<std::int64_t> bars;
-  double speed = 0.0;
-};
-struct LadderFamily {
-  std::vector<std::int64_t> windows;
+/// {"family": "chain", "bars": 10} and so on; `sizes` are bars or windows. Defaults of cranks are
+/// as in timing.
+struct Family {
+  std::vector<std::int64_t> sizes, storeys;
   double angle = 1.0, speed = 1.0;
 };
-struct GridFamily : LadderFamily {
-  std::vector<std::int64_t> storeys;
+struct ChainFamily : Family {
+  ChainFamily() { speed = 0.0; }
 };
 
 std::string CountsExpected(int least) {
@@ -210,94 +208,47 @@ const Fields<ChainFamily>& ChainFields() {
   static const Fields<ChainFamily> fields(
       "chain", "Closed chain of bars.",
       {{"family", ChoiceSchema({"chain"}), "Family type.", "a family"},
-       {"bars", IntegerList(&ChainFamily::bars, 3, kMaxUnits), "Number of bars.",
-        CountsExpected(3)},
-       {"speed", Number(&ChainFamily::speed), "Speed of the first bar [rad/s]."}});
+       {"bars", IntegerList(&Family::sizes, 3, kMaxUnits), "Number of bars.", CountsExpected(3)},
+       {"speed", Number(&Family::speed), "Speed of the first bar [rad/s]."}});
   return fields;
 }
 
-const Fields<LadderFamily>& LadderFields() {
-  static const Fields<LadderFamily> fields(
+const Fields<Family>& LadderFields() {
+  static const Fields<Family> fields(
       "ladder", "Windows in a row: parallel cranks with couplers between them.",
       {{"family", ChoiceSchema({"ladder"}), "Family type.", "a family"},
-       {"windows", IntegerList(&LadderFamily::windows, 1, kMaxUnits), "Number of windows.",
+       {"windows", IntegerList(&Family::sizes, 1, kMaxUnits), "Number of windows.",
         CountsExpected(1)},
-       {"angle", Number(&LadderFamily::angle), "Angle of the cranks [rad]."},
-       {"speed", Number(&LadderFamily::speed), "Speed of the cranks [rad/s]."}});
+       {"angle", Number(&Family::angle), "Angle of the cranks [rad]."},
+       {"speed", Number(&Family::speed), "Speed of the cranks [rad/s]."}});
   return fields;
 }
 
-const Fields<GridFamily>& GridFields() {
-  static const Fields<GridFamily> fields(
+const Fields<Family>& GridFields() {
+  static const Fields<Family> fields(
       "grid", "Storeys of windows.",
       {{"family", ChoiceSchema({"grid"}), "Family type.", "a family"},
-       {"storeys", IntegerList(&GridFamily::storeys, 1, kMaxUnits), "Number of storeys.",
+       {"storeys", IntegerList(&Family::storeys, 1, kMaxUnits), "Number of storeys.",
         CountsExpected(1)},
-       {"windows", IntegerList(&GridFamily::windows, 1, kMaxUnits), "Windows in each storey.",
+       {"windows", IntegerList(&Family::sizes, 1, kMaxUnits), "Windows in each storey.",
         CountsExpected(1)},
-       {"angle", Number(&GridFamily::angle),
+       {"angle", Number(&Family::angle),
         "Angle of the first storey's cranks [rad]. It increases by 0.1 per storey."},
-       {"speed", Number(&GridFamily::speed),
+       {"speed", Number(&Family::speed),
         "Speed of the first storey's cranks [rad/s]. Storey r has r times this speed."}});
   return fields;
 }
 
 /// Fixes joints for perturbation by ensembles: as many as degrees of freedom.
-void HoldNamed(MechanismDescription* description, std::string_view start, std::size_t count) {
+void HoldNamed(MechanismDescription* description, std::string_view start, std::string_view end,
+               std::size_t count) {
   for (std::size_t i = 0; i < description->joints.size(); ++i) {
     if (description->initial.held.size() == count) return;
-    if (description->joints[i].name.starts_with(start)) {
+    const std::string& name = description->joints[i].name;
+    if (name.starts_with(start) && name.ends_with(end)) {
       description->initial.held.push_back(static_cast<int>(i));
     }
   }
-}
-
-/// Members of a family. The number of bodies is checked before a member is built, to save time.
-class Members {
- public:
-  Members(const JsonNode& node, std::size_t room) : node_(node), room_(room) {}
-
-  template <class Build>
-  void Add(std::size_t bodies, std::string counts, const Json& canonical, Build build,
-           const ObservedQuantities& observe = {}) {
-    used_ += bodies;
-    if (used_ > room_) return;
-    FamilyMember member;
-    member.counts = std::move(counts);
-    member.mechanism.description = build();
-    member.mechanism.observe = observe;
-    member.mechanism.canonical = canonical.dump();
-    members_.push_back(std::move(member));
-  }
-
-  std::vector<FamilyMember> Take() {
-    if (used_ > room_) {
-      node_.FailAs(fmt::format("mechanisms with {} bodies", used_),
-                   fmt::format("at most {} in all problems", kMaxBodies));
-    }
-    return std::move(members_);
-  }
-
- private:
-  const JsonNode& node_;
-  std::size_t room_, used_ = 0;
-  std::vector<FamilyMember> members_;
-};
-
-std::vector<FamilyMember> MakeMembers(const ChainFamily& family, const JsonNode& node,
-                                      std::size_t room) {
-  Members members(node, room);
-  const double speed = family.speed;
-  for (const std::int64_t bars : family.bars) {
-    members.Add(static_cast<std::size_t>(bars), fmt::format("{}", bars),
-                {{"family", "chain"}, {"bars", bars}, {"speed", speed}}, [&] {
-                  MechanismDescription chain = Chain(static_cast<int>(bars));
-                  if (speed != 0.0) chain.initial.speeds.push_back({0, {speed}});
-                  HoldNamed(&chain, "J", static_cast<std::size_t>(bars) - 2);
-                  return chain;
-                });
-  }
-  return members.Take();
 }
 
 /// The cranks turn as one pendulum: n + 1 cranks and n couplers, which only shift, all of 1 m and
@@ -309,66 +260,39 @@ PendulumForm PendulumOfLadder(const MechanismDescription& ladder) {
           .frequency_squared = ((n + 1) / 2 + n) * -ladder.gravity.y() / ((n + 1) / 3 + n)};
 }
 
-std::vector<FamilyMember> MakeMembers(const LadderFamily& family, const JsonNode& node,
-                                      std::size_t room) {
-  Members members(node, room);
-  const double angle = family.angle, speed = family.speed;
-  for (const std::int64_t windows : family.windows) {
-    members.Add(static_cast<std::size_t>(2 * windows + 1), fmt::format("{}", windows),
-                {{"family", "ladder"}, {"windows", windows}, {"angle", angle}, {"speed", speed}},
-                [&] {
-                  MechanismDescription ladder = Ladder(static_cast<int>(windows), angle, speed);
-                  HoldNamed(&ladder, "O", 1);
-                  return ladder;
-                });
-  }
-  std::vector<FamilyMember> ladders = members.Take();
-  for (FamilyMember& ladder : ladders) {
-    ladder.mechanism.observe.closed_form = PendulumOfLadder(ladder.mechanism.description);
-  }
-  return ladders;
+MechanismFile MakeChain(const Family& family, int bars, int) {
+  MechanismFile made{Chain(bars), {}, {}};
+  if (family.speed != 0.0) made.description.initial.speeds.push_back({0, {family.speed}});
+  HoldNamed(&made.description, "J", "", static_cast<std::size_t>(bars) - 2);
+  made.canonical = Json{{"family", "chain"}, {"bars", bars}, {"speed", family.speed}}.dump();
+  return made;
 }
 
-/// Fixes the first crank of each storey, an independent coordinate: J crank 1.0, J crank 2.0, ...
-void HoldFirstCranks(MechanismDescription* grid) {
-  for (std::size_t i = 0; i < grid->joints.size(); ++i) {
-    const std::string& name = grid->joints[i].name;
-    if (name.starts_with("Jcrank") && name.ends_with(".0")) {
-      grid->initial.held.push_back(static_cast<int>(i));
-    }
-  }
+MechanismFile MakeLadder(const Family& family, int windows, int) {
+  MechanismFile made{Ladder(windows, family.angle, family.speed), {}, {}};
+  HoldNamed(&made.description, "O", "", 1);
+  made.observe.closed_form = PendulumOfLadder(made.description);
+  made.canonical = Json{
+      {"family", "ladder"},
+      {"windows", windows},
+      {"angle", family.angle},
+      {"speed",
+       family.speed}}.dump();
+  return made;
 }
 
-std::vector<FamilyMember> MakeMembers(const GridFamily& family, const JsonNode& node,
-                                      std::size_t room) {
-  Members members(node, room);
-  const double angle = family.angle, speed = family.speed;
-  for (const std::int64_t storeys : family.storeys) {
-    for (const std::int64_t windows : family.windows) {
-      members.Add(static_cast<std::size_t>(storeys * (2 * windows + 1)),
-                  fmt::format("{}x{}", storeys, windows),
-                  {{"family", "grid"},
-                   {"storeys", storeys},
-                   {"windows", windows},
-                   {"angle", angle},
-                   {"speed", speed}},
-                  [&] {
-                    MechanismDescription grid =
-                        Grid(static_cast<int>(storeys), static_cast<int>(windows), angle, speed);
-                    HoldFirstCranks(&grid);
-                    return grid;
-                  });
-    }
-  }
-  return members.Take();
-}
-
-template <class Family>
-std::vector<FamilyMember> ReadFamily(const Fields<Family>& fields, const JsonNode& node,
-                                     std::size_t room) {
-  Family family;
-  if (!fields.Read(node, &family)) return {};
-  return MakeMembers(family, node, room);
+MechanismFile MakeGrid(const Family& family, int windows, int storeys) {
+  MechanismFile made{Grid(storeys, windows, family.angle, family.speed), {}, {}};
+  // the first crank of each storey, an independent coordinate: Jcrank1.0, Jcrank2.0, ...
+  HoldNamed(&made.description, "Jcrank", ".0", static_cast<std::size_t>(storeys));
+  made.canonical = Json{
+      {"family", "grid"},
+      {"storeys", storeys},
+      {"windows", windows},
+      {"angle", family.angle},
+      {"speed",
+       family.speed}}.dump();
+  return made;
 }
 
 }  // namespace
@@ -379,12 +303,36 @@ Json FamilySchema() {
 }
 
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
-  const auto family = node.Required("family", "a family");
-  const auto kind = family ? family->Choice({"chain", "ladder", "grid"}, "a family") : std::nullopt;
-  if (kind == 0) return ReadFamily(ChainFields(), node, room);
-  if (kind == 1) return ReadFamily(LadderFields(), node, room);
-  if (kind == 2) return ReadFamily(GridFields(), node, room);
-  return {};
+  constexpr auto kMake = std::array{MakeChain, MakeLadder, MakeGrid};
+  const auto name = node.Required("family", "a family");
+  const auto kind = name ? name->Choice({"chain", "ladder", "grid"}, "a family") : std::nullopt;
+  if (!kind) return {};
+  Family family;
+  if (*kind == 0) {
+    ChainFamily chain;
+    ChainFields().Read(node, &chain);
+    family = chain;
+  } else {
+    (*kind == 1 ? LadderFields() : GridFields()).Read(node, &family);
+  }
+  const bool is_grid = *kind == 2;
+  if (!is_grid) family.storeys = {1};
+  std::vector<FamilyMember> members;
+  std::size_t bodies = 0;
+  for (const std::int64_t storeys : family.storeys) {
+    for (const std::int64_t size : family.sizes) {
+      bodies += static_cast<std::size_t>(*kind == 0 ? size : storeys * (2 * size + 1));
+      if (bodies > room) continue;  // before a large member is built
+      const auto make = kMake[static_cast<std::size_t>(*kind)];
+      members.push_back({make(family, static_cast<int>(size), static_cast<int>(storeys)),
+                         is_grid ? fmt::format("{}x{}", storeys, size) : fmt::format("{}", size)});
+    }
+  }
+  if (bodies > room) {
+    node.FailAs(fmt::format("mechanisms with {} bodies", bodies),
+                fmt::format("at most {} in all problems", kMaxBodies));
+  }
+  return members;
 }
 
 // "problems" of an experiment file and their mechanisms.

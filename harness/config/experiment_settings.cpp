@@ -30,8 +30,6 @@ void CheckOneCpuLimit(const JsonNode& node, Limits&) {
   node.FailAs("\"cpu_s\" and \"wall_s\"", "one of them: both limit CPU time");
 }
 
-void ReadFormerName(const JsonNode& node, Limits& limits) { limits.cpu_s = node.Number(kPositive); }
-
 void ReadSizes(const JsonNode& node, TimingFamily& family) {
   if (family.family.empty()) return;  // already reported
   const SizedFamily& of = SizedFamilyOf(family.family);
@@ -40,23 +38,22 @@ void ReadSizes(const JsonNode& node, TimingFamily& family) {
   }
 }
 
-/// Keys that accuracy cases define.
-constexpr const char* kOfCases[] = {"tolerance", "horizon", "methods"};
-
-void RequireCasesAlone(const JsonNode& node, Timing& timing) {
-  if (!timing.cases) return;
-  for (const char* key : kOfCases) {
-    if (!node.Optional(key)) continue;
-    node.FailAs(fmt::format("\"cases\" beside \"{}\"", key),
-                "one of them: cases are timed as they are");
-  }
-}
-
-Json CasesAloneSchema() {
-  Json others = Json::array();
-  for (const char* key : kOfCases) others.push_back(Requires({key}));
-  return {{"if", {{"required", {"cases"}}, {"properties", {{"cases", {{"const", true}}}}}}},
-          {"then", {{"not", {{"anyOf", others}}}}}};
+/// Rule that `key` (a flag: if true) excludes all `others`, for the reason `why`.
+template <class T>
+FieldValue<T> Alone(const std::string& key, bool is_flag, const std::vector<std::string>& others,
+                    const std::string& why) {
+  Json condition = Requires({key}), excluded = Json::array();
+  if (is_flag) condition["properties"] = {{key, {{"const", true}}}};
+  for (const std::string& other : others) excluded.push_back(Requires({other}));
+  return {{{"if", condition}, {"then", {{"not", {{"anyOf", excluded}}}}}},
+          [=](const JsonNode& node, T&) {
+            const auto given = node.Optional(key);
+            if (!given || (is_flag && given->value() != true)) return;
+            for (const std::string& other : others) {
+              if (!node.Optional(other)) continue;
+              node.FailAs(fmt::format("\"{}\" beside \"{}\"", key, other), "one of them: " + why);
+            }
+          }};
 }
 
 const Fields<TimingFamily>& TimingFamilyFields() {
@@ -90,7 +87,9 @@ const Fields<Limits>& LimitsFields() {
        {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Number of accepted steps."},
        {"memory_mb", Number(&Limits::memory_mb, kPositive),
         "Address space of a case's process [MiB]."},
-       {"wall_s", By(NumberSchema(kPositive), ReadFormerName), "Former name of cpu_s."}});
+       {"wall_s",
+        FieldValue<Limits>(NumberSchema(kPositive), Number(&Limits::cpu_s, kPositive).read),
+        "Former name of cpu_s."}});
   return fields;
 }
 
@@ -142,7 +141,8 @@ const Fields<Timing>& TimingFields() {
        {"cases", Bool(&Timing::cases),
         "If true, every accuracy case is timed with its own integrator, tolerance or step, and "
         "horizon. Not together with tolerance, horizon or methods."},
-       {"", By(CasesAloneSchema(), RequireCasesAlone)},
+       {"", Alone<Timing>("cases", true, {"tolerance", "horizon", "methods"},
+                          "cases are timed as they are")},
        {"families", ObjectList(&Timing::families, TimingFamilyFields(), "families")}});
   return fields;
 }
@@ -284,8 +284,6 @@ std::string ToString(const OutputOptions& output) {
 
 namespace {
 
-constexpr std::array<const char*, 3> kOfCertified = {"scalar", "points", "cpu_s"};
-
 /// Reads published data of one problem; its errors are added to the experiment's errors.
 void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentProblem* problem) {
   const std::string named = node.Text();
@@ -327,21 +325,6 @@ void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
   }
 }
 
-void RequireSeriesAlone(const JsonNode& node, ReferenceOptions&) {
-  if (!node.Optional("published_data")) return;
-  for (const char* key : kOfCertified) {
-    if (!node.Optional(key)) continue;
-    node.FailAs(fmt::format("\"published_data\" beside \"{}\"", key),
-                "one of them: what was published is not made");
-  }
-}
-
-Json SeriesAloneSchema() {
-  Json others = Json::array();
-  for (const char* key : kOfCertified) others.push_back(Requires({key}));
-  return {{"if", {{"required", {"published_data"}}}}, {"then", {{"not", {{"anyOf", others}}}}}};
-}
-
 }  // namespace
 
 const Fields<ReferenceOptions>& ReferenceFields() {
@@ -363,7 +346,8 @@ const Fields<ReferenceOptions>& ReferenceFields() {
         "Instead of a computed reference: path of published data (series.schema.json), relative "
         "to this file. For several problems, an object of paths by problem name. Problems "
         "without a path have no reference."},
-       {"", By(SeriesAloneSchema(), RequireSeriesAlone)}});
+       {"", Alone<ReferenceOptions>("published_data", false, {"scalar", "points", "cpu_s"},
+                                    "what was published is not made")}});
   return fields;
 }
 

@@ -335,20 +335,17 @@ void RequirePeersOwn(const JsonNode& node, MethodLists& lists) {
                   fmt::format("\"{}\", or nothing: a peer has its own", only));
     };
     static const Method kOwn;
-    for (const Coordinates set : lists.coordinates) {
-      if (set != kOwn.coordinates) refuse("coordinates", ToString(set), ToString(kOwn.coordinates));
-    }
-    for (const SolverKind solver : lists.solvers) {
-      if (solver != kOwn.solver) refuse("solver", ToString(solver), ToString(kOwn.solver));
-    }
-    for (const std::int64_t threads : lists.threads) {
-      if (threads != kOwn.threads) refuse("threads", std::to_string(threads), "1");
-    }
-    for (const Execution execution : lists.executions) {
-      if (execution != kOwn.execution) {
-        refuse("execution", ToString(execution), ToString(kOwn.execution));
+    const auto require = [&](std::string_view key, const auto& list, auto own, const auto& text) {
+      for (const auto& value : list) {
+        if (value != own) refuse(key, text(value), text(own));
       }
-    }
+    };
+    const auto name = [](auto value) { return ToString(value); };
+    const auto number = [](std::int64_t value) { return std::to_string(value); };
+    require("coordinates", lists.coordinates, kOwn.coordinates, name);
+    require("solver", lists.solvers, kOwn.solver, name);
+    require("threads", lists.threads, std::int64_t{kOwn.threads}, number);
+    require("execution", lists.executions, kOwn.execution, name);
     if (lists.gains) node.FailAs(fmt::format("\"{}\" with gains", formulation), "no gains");
   }
 }

@@ -81,12 +81,6 @@ Json WriteInertia(const Body& body) {
   return json;
 }
 
-void ReadNameOfBody(const JsonNode& node, Body& body) {
-  body.name = ReadNewName(node, body.draft->body_names);
-}
-
-Json WriteNameOfBody(const Body& body) { return body.name; }
-
 void ReadPointsOfBody(const JsonNode& node, Body& body) {
   ReadPoints(node, body.draft->space, &body);
 }
@@ -107,7 +101,7 @@ const Fields<Body>& BodyFields() {
                     ArraySchema(NumberSchema(), 6, 6)});
   static const Fields<Body> fields(
       "body", "A rigid body.",
-      {{"name", By(TextSchema(), ReadNameOfBody, WriteNameOfBody), "Unique name of the body.",
+      {{"name", NewName(&BodyDescription::name, &Draft::body_names), "Unique name of the body.",
         "a name"},
        {"mass", Number(&BodyDescription::mass, kPositive), "Mass [kg].", "a number > 0 [kg]"},
        {"inertia", By(inertia, ReadInertia, WriteInertia),
@@ -354,16 +348,10 @@ void AddParameters(std::vector<Field<Joint>>* rows) {
   rows->push_back({"", By({{"allOf", rules}}, ReadParameter)});
 }
 
-void ReadNameOfJoint(const JsonNode& node, Joint& joint) {
-  joint.name = ReadNewName(node, joint.draft->joint_names);
-}
-
-Json WriteNameOfJoint(const Joint& joint) { return joint.name; }
-
 Fields<Joint> MakeJointFields() {
   const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
   std::vector<Field<Joint>> rows = {
-      {"name", By(TextSchema(), ReadNameOfJoint, WriteNameOfJoint), "Unique name of the joint.",
+      {"name", NewName(&JointDescription::name, &Draft::joint_names), "Unique name of the joint.",
        "a name"},
       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType, WriteType), "Type of the joint.",
        "a joint type", IsMissingInPlane},

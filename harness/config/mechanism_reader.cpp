@@ -62,21 +62,9 @@ std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft) {
   return node.Choice(draft.joint_names, "a joint");
 }
 
-std::string ReadNewName(const JsonNode& node, const NameList& taken) {
-  std::string name = node.Text();
-  if (taken.Find(name)) node.Fail("a name that is not in use yet");
-  return name;
-}
-
 Json PlaceSchema() { return Named("place", EitherSchema({TextSchema(), VectorSchema()})); }
 
 namespace {
-
-void ReadComment(const JsonNode& node, Draft& draft) { draft.comment = node.Text(); }
-
-Json WriteComment(const Draft& draft) {
-  return draft.comment.empty() ? Json() : Json(draft.comment);
-}
 
 void ReadGravity(const JsonNode& node, Draft& draft) {
   draft.gravity = ReadVector(node, draft.space);
@@ -97,7 +85,7 @@ const Fields<Draft>& MechanismFileFields() {
       "that each joint has as many values as coordinates.",
       DocumentRows<Draft>(
           {{"name", Text(&Draft::name), "Name of the mechanism.", "a name"},
-           {"comment", By(TextSchema(), ReadComment, WriteComment), "Free text for readers."},
+           {"comment", Text(&Draft::comment), "Free text for readers."},
            {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
             "planar: all motion is in the x-y plane, and third components are 0."},
            {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
@@ -126,11 +114,7 @@ MechanismFile ReadMechanism(const std::filesystem::path& path) {
 }
 
 MechanismFile ParseMechanism(std::string_view text, const std::string& file) {
-  const Json document = ParseDocument(text, file);
-  ErrorList errors(file, text);
-  MechanismFile result = ReadMechanismObject(JsonNode(document, "", errors));
-  errors.ThrowIfAny();
-  return result;
+  return ReadDocument(text, file, ReadMechanismObject);
 }
 
 MechanismFile ReadMechanismObject(const JsonNode& root) {
@@ -281,10 +265,6 @@ void CheckIndependentName(const JsonNode& node, const std::string& name, const S
 
 using Form = PartOf<PendulumForm>;
 
-void ReadFormType(const JsonNode& node, Form&) { node.Choice({"pendulum"}, "a closed form"); }
-
-Json WriteFormType(const Form&) { return "pendulum"; }
-
 void ReadFormBody(const JsonNode& node, Form& form) {
   const auto index = ReadBodyName(node, *form.draft);
   if (index) form.body = form.draft->bodies[*index].name;
@@ -295,8 +275,7 @@ Json WriteFormBody(const Form& form) { return form.body; }
 const Fields<Form>& PendulumFields() {
   static const Fields<Form> fields(
       "closed_form", "Closed-form motion of one body: a simple pendulum.",
-      {{"type", By(ChoiceSchema({"pendulum"}), ReadFormType, WriteFormType), "Closed-form type.",
-        "\"pendulum\""},
+      {{"type", Constant<Form>("pendulum", "a closed form"), "Closed-form type.", "\"pendulum\""},
        {"body", By(TextSchema(), ReadFormBody, WriteFormBody), "Body whose angle is theta.",
         "the name of a body"},
        {"down_angle", Number(&PendulumForm::down_angle),

@@ -69,8 +69,6 @@ Json PlaceSchema();
 std::optional<int> ReadBodyName(const JsonNode& node, const Draft& draft);
 /// Reads the name of a joint and returns its index.
 std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft);
-/// Reads a name that is not empty and not in `taken`.
-std::string ReadNewName(const JsonNode& node, const NameList& taken);
 
 /// Reads a part; `start` contains the defaults.
 template <class T>
@@ -103,6 +101,18 @@ FieldValue<PartOf<Owner>> Part(T Owner::*member, const Fields<PartOf<T>>& fields
           [member, &fields](const PartOf<Owner>& owner) {
             return WritePart(fields, *owner.draft, owner.*member);
           }};
+}
+
+/// Field for a name that `taken` does not contain.
+template <class T>
+FieldValue<PartOf<T>> NewName(std::string T::*member, NameList Draft::*taken) {
+  return {TextSchema(),
+          [=](const JsonNode& node, PartOf<T>& owner) {
+            owner.*member = node.Text();
+            if ((owner.draft->*taken).Find(owner.*member))
+              node.Fail("a name that is not in use yet");
+          },
+          nullptr, [=](const PartOf<T>& owner) { return Json(owner.*member); }};
 }
 
 template <class T>

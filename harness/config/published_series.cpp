@@ -210,16 +210,13 @@ std::size_t PublishedSeries::NumWithin(double horizon) const {
 
 PublishedSeries ReadPublishedSeries(const std::filesystem::path& path,
                                     const MechanismDescription* mechanism) {
-  const std::string text = ReadTextFile(path);
-  const Json document = ParseDocument(text, path.string());
-  ErrorList errors(path.string(), text);
-  const JsonNode root(document, "", errors);
-  SeriesDraft draft;
-  draft.mechanism = mechanism;
-  if (ExpectDocument(root, FileKind::kSeries)) SeriesFileFields().ReadRows(root, &draft);
-  errors.ThrowIfAny();
-  draft.canonical = document.dump(-1, ' ', false, Json::error_handler_t::replace);
-  return static_cast<PublishedSeries&&>(draft);
+  return ReadDocument(ReadTextFile(path), path.string(), [&](const JsonNode& root) {
+    SeriesDraft draft;
+    draft.mechanism = mechanism;
+    if (ExpectDocument(root, FileKind::kSeries)) SeriesFileFields().ReadRows(root, &draft);
+    draft.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
+    return static_cast<PublishedSeries>(std::move(draft));
+  });
 }
 
 }  // namespace loopbench::harness

@@ -216,10 +216,6 @@ struct Sidecar : Draft {
 struct Loop : JointDescription {};
 using LoopPart = PartOf<Loop>;
 
-void ReadNameOfLoop(const JsonNode& node, LoopPart& loop) {
-  loop.name = ReadNewName(node, loop.draft->joint_names);
-}
-
 void ReadTypeOfLoop(const JsonNode& node, LoopPart& loop) {
   loop.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
   if (!TraitsOf(loop.type).parameter.key.empty() || loop.type == JointType::kFree) {
@@ -227,19 +223,9 @@ void ReadTypeOfLoop(const JsonNode& node, LoopPart& loop) {
   }
 }
 
-void ReadFirst(const JsonNode& node, LoopPart& loop) {
-  loop.from.body = ReadBodyName(node, *loop.draft).value_or(-1);
-}
-
 void ReadSecond(const JsonNode& node, LoopPart& loop) {
   loop.to.body = ReadBodyName(node, *loop.draft).value_or(-1);
   if (loop.to.body >= 0 && loop.to.body == loop.from.body) node.Fail("another body");
-}
-
-void ReadPlaceOfLoop(const JsonNode& node, LoopPart& loop) {
-  if (loop.from.body < 0) return;
-  const BodyDescription& body = loop.draft->bodies[loop.from.body];
-  loop.from.position = ReadPoint(node, body, loop.draft->space);
 }
 
 void ReadAxisOfLoop(const JsonNode& node, LoopPart& loop) {
@@ -252,14 +238,17 @@ void ReadAxisOfLoop(const JsonNode& node, LoopPart& loop) {
 }
 
 const Fields<LoopPart>& LoopFields() {
+  const auto body = [](Loop& loop) -> int& { return loop.from.body; };
+  const auto at = [](Loop& loop) -> Eigen::Vector3d& { return loop.from.position; };
   static const Fields<LoopPart> fields(
       "loop", "A joint given on one side, which closes where all coordinates are 0.",
-      {{"name", By(TextSchema(), ReadNameOfLoop), "One that no other joint has.", "a name"},
+      {{"name", NewName<Loop>(&Loop::name, &Draft::joint_names), "One that no other joint has.",
+        "a name"},
        {"type", By(ChoiceSchema(JointTypeNames().all()), ReadTypeOfLoop), "What it leaves free.",
         "a joint type"},
-       {"from", By(TextSchema(), ReadFirst), "A body's name or \"ground\".", "the name of a body"},
+       {"from", BodyOf<Loop>(body, true), "A body's name or \"ground\".", "the name of a body"},
        {"to", By(TextSchema(), ReadSecond), "Another.", "the name of a body"},
-       {"at", By(PlaceSchema(), ReadPlaceOfLoop), "The joint in axes of `from` [m].",
+       {"at", PlaceOf<Loop>(body, at), "The joint in axes of `from` [m].",
         "a point of `from`, or coordinates in its axes"},
        {"axis", By(VectorSchema(), ReadAxisOfLoop), "In axes of `from`."}});
   return fields;
@@ -294,8 +283,7 @@ void ReadGravityOfSidecar(const JsonNode& node, Sidecar& sidecar) {
 const Fields<Sidecar>& SidecarFields() {
   static const Fields<Sidecar> fields(
       "sidecar", "What a description of another program cannot say.",
-      {{"comment", By<Sidecar>(TextSchema(), [](const JsonNode& node, Sidecar&) { node.Text(); }),
-        "Free text for readers."},
+      {{"comment", Text(&Draft::comment), "Free text for readers."},
        {"gravity", By(VectorSchema(), ReadGravityOfSidecar), "In place of the file's [m/s^2]."},
        {"loops", By(ArraySchema(LoopFields().Schema()), ReadLoops), "Joints given on one side."},
        {"joints", JointsValue(), "Joints given on both sides."},
@@ -310,16 +298,13 @@ const Fields<Sidecar>& SidecarFields() {
 /// ConfigError with all mistakes, one per line.
 Sidecar ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
                     MechanismDescription* description) {
-  const std::string text = ReadTextFile(path);
-  const Json document = ParseDocument(text, path.string());
-  ErrorList errors(path.string(), text);
   Sidecar sidecar;
   static_cast<MechanismDescription&>(sidecar) = *description;
   sidecar.at_rest = at_rest;
   for (const BodyDescription& body : sidecar.bodies) sidecar.body_names.Add(body.name);
   for (const JointDescription& joint : sidecar.joints) sidecar.joint_names.Add(joint.name);
-  SidecarFields().Read(JsonNode(document, "", errors), &sidecar);
-  errors.ThrowIfAny();
+  ReadDocument(ReadTextFile(path), path.string(),
+               [&](const JsonNode& root) { return SidecarFields().Read(root, &sidecar); });
   *description = static_cast<MechanismDescription&>(sidecar);
   return sidecar;
 }

@@ -166,15 +166,9 @@ void ImportDraft::AddSpringAndDamper(double stiffness, double rest, double dampi
   if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
 }
 
-void ImportDraft::AddLift(int body, double share) { lifts_.emplace_back(body, share); }
-
 void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
   description.gravity = {0.0, 0.0, -gravity};
   assumed_gravity_ = element;
-}
-
-void ImportDraft::Note(const XmlElement& element, std::string reason, bool changes_motion) {
-  Note(element, "", std::move(reason), changes_motion);
 }
 
 void ImportDraft::Note(const XmlElement& element, const std::string& attribute, std::string reason,

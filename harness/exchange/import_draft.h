@@ -135,7 +135,7 @@ class ImportDraft {
   /// Records that the mass is in a file that is not read: `value` is rejected if the body moves.
   void LeaveMass(int body, const XmlValue& value) { without_mass_.emplace_back(body, value); }
   /// Adds an upward force of `share` times its weight: gravity compensation.
-  void AddLift(int body, double share);
+  void AddLift(int body, double share) { lifts_.emplace_back(body, share); }
 
   /// Sets the default gravity of the format along -z [m/s^2].
   void AssumeGravity(const XmlElement& element, double gravity);
@@ -146,7 +146,9 @@ class ImportDraft {
   /// Returns three numbers in the same way.
   Eigen::Vector3d Vector(const XmlValue& value, std::string_view kinds);
 
-  void Note(const XmlElement& element, std::string reason, bool changes_motion = false);
+  void Note(const XmlElement& element, std::string reason, bool changes_motion = false) {
+    Note(element, "", std::move(reason), changes_motion);
+  }
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
             bool changes_motion = false);
   /// Adds a note of an attribute that is not there, a change of the motion.

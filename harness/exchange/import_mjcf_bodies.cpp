@@ -17,13 +17,6 @@ struct MjcfGeom {
   Placement X;
 };
 
-/// Mass, centre of mass and inertia in body axes [kg, m, kg m^2].
-struct MassProperties {
-  double mass = 0.0;
-  Eigen::Vector3d com = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
-};
-
 // Masses of MuJoCo shapes.
 
 using std::numbers::pi;
@@ -144,11 +137,12 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes,
   return true;
 }
 
-/// Computes mass properties. Rejects meshes, whose files are not read, unless they are ignored.
-MassProperties MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
-                           bool drops_meshes) {
+/// Computes mass, centre of mass and inertia in body axes. Rejects meshes, whose files are not
+/// read, unless they are ignored.
+BodyDescription MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
+                            bool drops_meshes) {
   std::vector<std::pair<BodyDescription, Placement>> all;
-  MassProperties sum;
+  BodyDescription sum;
   for (const MjcfGeom& geom : geoms) {
     BodyDescription part;
     Placement X;
@@ -224,9 +218,11 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
 }
 
 /// Reads <inertial>: about its own axes, rotated into body axes.
-MassProperties ReadInertial(const XmlElement& element, const MjcfModel& model) {
+BodyDescription ReadInertial(const XmlElement& element, const MjcfModel& model) {
   const Placement X = model.PlacementOf(MjcfElement(element));
-  MassProperties read = {element.Required("mass", "a number [kg]").Number(kNotNegative), X.p};
+  BodyDescription read;
+  read.mass = element.Required("mass", "a number [kg]").Number(kNotNegative);
+  read.com = X.p;
   const auto full = element.Attribute("fullinertia");
   const auto diagonal = element.Attribute("diaginertia");
   if (full && diagonal) full->Fail("either fullinertia or diaginertia");
@@ -251,7 +247,7 @@ void ReadMasses(const XmlElement& element, const Contents& contents, int body, b
   }
   const bool wants_geoms = settings.inertia == MjcfSettings::kFromGeoms ||
                            (settings.inertia == MjcfSettings::kAuto && !inertial);
-  MassProperties masses;
+  BodyDescription masses;
   if (wants_geoms) masses = MassOfGeoms(*model, geoms, is_fixed && settings.total_mass <= 0.0);
   const bool from_geoms = masses.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains
   if (from_geoms && inertial) {

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -258,14 +257,10 @@ class SdfReader {
 
  private:
   void ReadVersion(const XmlValue& value) {
-    const std::string& text = value.text();
-    const bool first = text.starts_with("1.");
-    const char *start = text.data() + (first ? 2 : 0), *last = text.data() + text.size();
-    const auto [end, error] = std::from_chars(start, last, minor_);
-    const bool whole = first && error == std::errc() && end == last;
-    if (!whole || minor_ < kFirstVersion || minor_ > kLastVersion) {
-      value.Fail("a version from 1.4 to 1.12");
+    for (minor_ = kFirstVersion; minor_ <= kLastVersion; ++minor_) {
+      if (value.text() == fmt::format("1.{}", minor_)) return;
     }
+    value.Fail("a version from 1.4 to 1.12");
   }
 
   static void Shorten(SdfScope* scope, std::size_t length) {

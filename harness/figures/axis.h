@@ -40,6 +40,8 @@ class AxisRange {
     low_ = std::min(low_, value);
     high_ = std::max(high_, value);
   }
+  /// Returns the axis from the least to the largest value.
+  Axis Exact() const { return {low_, high_, logarithmic_}; }
   /// Returns the axis. `margin` is a fraction of the extent. Values that agree in their first
   /// digits still get a range that three digits can express.
   Axis WithMargin(double margin) const;

@@ -15,15 +15,11 @@
 #include "harness/figures/figures.h"
 #include "harness/record/select.h"
 #include "harness/tables/columns.h"
+#include "harness/tables/table.h"
 #include "harness/tables/table_view.h"
 
 namespace loopbench::harness {
 namespace {
-
-bool Failed(const Record& record) {
-  const std::string outcome = record.Text("outcome");
-  return !outcome.empty() && outcome != "finished";
-}
 
 // Returns "1.97 ± 0.05", with a "?" if the power is not resolved.
 std::string FittedPower(const Record& record) {
@@ -60,15 +56,8 @@ Figure FigureOfDrift(std::span<const Record> records, std::string_view what, boo
                 .curves = {}};
   if (!records.empty()) figure.legend = ChannelLegend(records);
   for (const Record& record : records) {
-    Curve curve{.label = MethodLabel(record, records),
-                .x = record.Numbers("series.drift_t"),
-                .y = record.Numbers("series.drift"),
-                .style = StyleOf(record)};
-    curve.ends_early = Failed(record);
-    if (curve.ends_early && curve.x.empty()) {  // it has only a time
-      curve.x = {record.Number("t_reached")};
-      curve.y = {std::numeric_limits<double>::quiet_NaN()};
-    }
+    Curve curve = CurveOverTime(record, "series.drift_t", "series.drift",
+                                MethodLabel(record, records), StyleOf(record));
     if (with_fit) curve.remark = FittedPower(record);
     if (curve.ends_early) {
       curve.remark += fmt::format("{}{} at {} s", curve.remark.empty() ? "" : ", ",
@@ -115,7 +104,7 @@ double Smallness(const Record& record, const char* key) {
 auto MotionRank(const Record& record) {
   const double energy = record.Number("energy_error_relative");
   constexpr double kTrusted = 1e-2;
-  return std::tuple(!Failed(record), !HasWarning(record) && !(energy > kTrusted),
+  return std::tuple(!HasFailed(record), !HasWarning(record) && !(energy > kTrusted),
                     GrowthAt(record) == DriftGrowth::kNone, Smallness(record, "rtol"),
                     Smallness(record, "energy_error_relative"),
                     Smallness(record, "drift_position_max"));
@@ -165,7 +154,7 @@ Figure PanelOf(const Record& record, const CoordinateKind& kind, const std::vect
                 .style = DistinctStyle(panel.curves.size())};
     curve.style.shape = Shape::kNone;
     curve.style.flagged = HasWarning(record);
-    curve.ends_early = Failed(record) && !opening;
+    curve.ends_early = HasFailed(record) && !opening;
     panel.curves.push_back(std::move(curve));
   }
   panel.names_at_ends = true;
@@ -370,13 +359,6 @@ Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
   both.names_at_ends = true;
   both.below.push_back(std::move(apart));
   return both;
-}
-
-std::optional<std::string> DrawTrajectories(const std::filesystem::path& path,
-                                            const Trajectory& ours, const Trajectory& theirs,
-                                            std::span<const SharedColumn> columns,
-                                            const std::string& title) {
-  return WriteFigure(path, TrajectoryFigure(ours, theirs, columns, title));
 }
 
 }  // namespace loopbench::harness

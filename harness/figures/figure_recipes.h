@@ -1,8 +1,6 @@
 // The standard figures of a store, and figures of precision runs and trajectories.
 #pragma once
 
-#include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,12 +53,5 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records);
 /// Makes both panels; columns that coincide are one curve. `columns` have one unit.
 Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
                         std::span<const SharedColumn> columns, const std::string& title);
-
-/// Draws the trajectories; returns nothing on success, else the reason (figures.h).
-[[nodiscard]] std::optional<std::string> DrawTrajectories(const std::filesystem::path& path,
-                                                          const Trajectory& ours,
-                                                          const Trajectory& theirs,
-                                                          std::span<const SharedColumn> columns,
-                                                          const std::string& title);
 
 }  // namespace loopbench::harness

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "harness/analysis/warnings.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/figures/panel.h"
+#include "harness/tables/table.h"
 
 namespace loopbench::harness {
 namespace {
@@ -196,6 +198,17 @@ CurveStyle StyleOf(const Record& record) {
           .width = WidthOfSolver(record),
           .shape = ShapeOf(record),
           .flagged = HasWarning(record)};
+}
+
+Curve CurveOverTime(const Record& record, const std::string& x, const std::string& y,
+                    const std::string& label, const CurveStyle& style) {
+  Curve curve{.label = label, .x = record.Numbers(x), .y = record.Numbers(y), .style = style};
+  curve.ends_early = HasFailed(record);
+  if (curve.ends_early && curve.x.empty() && x.ends_with('t')) {
+    curve.x = {record.Number("t_reached")};
+    curve.y = {std::numeric_limits<double>::quiet_NaN()};
+  }
+  return curve;
 }
 
 std::string MethodLabel(const Record& record, std::span<const Record> all) {

@@ -131,6 +131,11 @@ inline constexpr const char* kChannelKeys[] = {"formulation", "enforcement", "co
 
 CurveStyle StyleOf(const Record& record);
 
+/// Returns the curve of two series of a run. A failed run ends early; without series it has only
+/// the time of its failure, if `x` are times.
+Curve CurveOverTime(const Record& record, const std::string& x, const std::string& y,
+                    const std::string& label, const CurveStyle& style);
+
 /// Returns the values of the channel keys that vary among `all`: "odca, joint". Returns the
 /// formulation if none does.
 std::string MethodLabel(const Record& record, std::span<const Record> all);

@@ -126,20 +126,6 @@ CurveStyle StyleBy(const std::vector<std::string>& keys, const Record& row, std:
   return style;
 }
 
-Curve SeriesCurve(const Record& row, const FreeFigure& wanted, const std::string& label,
-                  std::size_t index) {
-  Curve curve{.label = label, .style = StyleBy(KeysIn(wanted.group), row, index)};
-  curve.x = row.Numbers(wanted.x);
-  curve.y = row.Numbers(wanted.y);
-  curve.ends_early = HasFailed(row);
-  if (curve.ends_early && curve.x.empty() && wanted.x.ends_with('t')) {  // a series of times
-    curve.x = {row.Number("t_reached")};
-    curve.y = {NAN};
-  }
-  curve.style.flagged = HasWarning(row);
-  return curve;
-}
-
 // Makes a curve; `rows` are in order of x.
 Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
                  const std::string& label, std::size_t index) {
@@ -301,7 +287,10 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto& [label, members] = groups[g];
     for (std::size_t i = 0; is_series && i < members.size(); ++i) {
-      figure.curves.push_back(SeriesCurve(members[i], wanted, i == 0 ? label : "", g));
+      CurveStyle style = StyleBy(group_keys, members[i], g);
+      style.flagged = HasWarning(members[i]);
+      figure.curves.push_back(
+          CurveOverTime(members[i], wanted.x, wanted.y, i == 0 ? label : "", style));
     }
     if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, x, label, g));
     for (const std::string& key : telling) {
@@ -316,8 +305,6 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
 namespace {
 
 constexpr int kFinest = 4096;  ///< cells of an axis: finer than any screen
-
-bool IsPositive(double value) { return value > 0.0 && std::isfinite(value); }
 
 }  // namespace
 
@@ -348,17 +335,15 @@ void DistinctPoints::Add(const Record& record) {
   while (kept_.size() > most_) Coarsen();
 }
 
-std::string DistinctPoints::CellOf(const Record& record, int axis) const {
-  const std::string& key = axes_[static_cast<std::size_t>(axis)];
-  const double value = record.Number(key);
-  if (!std::isfinite(value)) return record.Text(key);  // a text, or no value
-  const Span& span = spans_[static_cast<std::size_t>(axis)];
-  const auto cell = [this](double at, double from, double to) {
-    return to > from ? std::floor((at - from) / (to - from) * parts_) : 0.0;
-  };
-  const double size =
-      IsPositive(value) ? cell(std::log(value), span.least_size, span.largest_size) : -1.0;
-  return fmt::format("{},{}", cell(value, span.least, span.largest), size);
+std::string DistinctPoints::CellOf(const Record& record, std::size_t axis) const {
+  const double value = record.Number(axes_[axis]);
+  if (!std::isfinite(value)) return record.Text(axes_[axis]);  // a text, or no value
+  std::string cell;
+  for (const Axis& scale : scales_[axis]) {
+    const double part = scale.high > scale.low ? std::floor(scale.Place(value) * parts_) : 0.0;
+    cell += fmt::format("{},", scale.CanShow(value) ? part : -1.0);
+  }
+  return cell;
 }
 
 std::string DistinctPoints::KeyOf(const Record& record) const {
@@ -376,17 +361,11 @@ void DistinctPoints::Coarsen() {
         fmt::format("found more than {} curves, expected fewer: choose another --group", most_));
   }
   for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
-    Span span{INFINITY, -INFINITY, INFINITY, -INFINITY};
-    for (const Record& record : kept_) {
-      const double value = record.Number(axes_[axis]);
-      if (!std::isfinite(value)) continue;
-      span.least = std::min(span.least, value);
-      span.largest = std::max(span.largest, value);
-      if (!IsPositive(value)) continue;
-      span.least_size = std::min(span.least_size, std::log(value));
-      span.largest_size = std::max(span.largest_size, std::log(value));
+    for (const bool logarithmic : {false, true}) {
+      AxisRange range(logarithmic);
+      for (const Record& record : kept_) range.Include(record.Number(axes_[axis]));
+      scales_[axis][logarithmic ? 1 : 0] = range.Exact();
     }
-    spans_[axis] = span;
   }
   cells_.clear();
   std::erase_if(kept_, [this](const Record& one) { return !cells_.insert(KeyOf(one)).second; });

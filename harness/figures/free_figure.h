@@ -10,6 +10,7 @@
 #include <unordered_set>
 #include <vector>
 
+#include "harness/figures/axis.h"
 #include "harness/figures/figures.h"
 #include "harness/record/record.h"
 
@@ -69,18 +70,15 @@ class DistinctPoints {
   double cell() const { return parts_ == 0 ? 0.0 : 1.0 / parts_; }
 
  private:
-  struct Span {
-    double least = 0.0, largest = 0.0, least_size = 0.0, largest_size = 0.0;
-  };
   std::string KeyOf(const Record& record) const;
-  std::string CellOf(const Record& record, int axis) const;
+  std::string CellOf(const Record& record, std::size_t axis) const;
   void Coarsen();
 
   std::array<std::string, 2> axes_;
   std::vector<std::string> group_, keys_;  ///< keys_: all keys that the figure uses
   std::size_t most_, seen_ = 0;
-  int parts_ = 0;  ///< cells per axis; 0: all points are kept
-  std::array<Span, 2> spans_;
+  int parts_ = 0;                              ///< cells per axis; 0: all points are kept
+  std::array<std::array<Axis, 2>, 2> scales_;  ///< of x and y: linear and logarithmic
   std::vector<Record> kept_;
   std::unordered_set<std::string> cells_;
 };

@@ -42,24 +42,16 @@ struct Glyph {
   const char* meaning = "";
 };
 
-Glyph GlyphOf(CellState state) {
-  switch (state) {
-    case CellState::kHolds:
-      return {7, 0.25, "", "holds"};
-    case CellState::kStopped:
-      return {8, 0.6, "", "stopped and said why"};
-    case CellState::kLimit:
-      return {6, 0.55, "", "did not end by itself"};
-    case CellState::kInaccurate:
-      return {2, 0.55, "", "wrong without a word"};
-    case CellState::kBroken:
-      return {3, 0.6, "", "crashed, or no result"};
-    case CellState::kNotApplicable:
-      return {0, 0.0, "–", "not applicable"};
-    case CellState::kNotMeasured:
-      break;
-  }
-  return {0, 0.0, "?", "not measured"};
+const Glyph& GlyphOf(CellState state) {
+  // in the order of CellState
+  static constexpr Glyph kGlyphs[] = {{7, 0.25, "", "holds"},
+                                      {0, 0.0, "–", "not applicable"},
+                                      {0, 0.0, "?", "not measured"},
+                                      {8, 0.6, "", "stopped and said why"},
+                                      {6, 0.55, "", "did not end by itself"},
+                                      {2, 0.55, "", "wrong without a word"},
+                                      {3, 0.6, "", "crashed, or no result"}};
+  return kGlyphs[static_cast<std::size_t>(state)];
 }
 
 class MapPainter {
@@ -315,35 +307,29 @@ std::string LabelOfAxis(const std::string& key) {
   return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
 }
 
-/// Returns the cost of a failed run up to its failure.
-double SpentBy(const WorkPrecisionRow& row) {
-  if (std::isfinite(row.cost)) return row.cost;
-  return row.record.Number("cpu_s");
-}
-
-/// Draws a run's error over `x`; failed runs are crosses there, or at the cost reached.
+/// Draws runs as marks of `sound`: error over `x`, hollow with warnings. Failed runs are crosses
+/// there, or at the cost reached. A line joins sound runs only if no two of them share an x.
 template <class X>
-void AddPoint(const WorkPrecisionRow& row, X x, Curve* sound, Curve* flagged) {
-  if (HasFailed(row.record)) {
-    const double at = x(row);
-    sound->crosses.emplace_back(std::isfinite(at) ? at : SpentBy(row), kNowhere);
-    return;
-  }
-  Curve& curve = IsFlagged(row) ? *flagged : *sound;
-  curve.x.push_back(x(row));
-  curve.y.push_back(row.error);
-}
-
-/// Draws all runs of a formulation in one coordinate set as marks, hollow with warnings.
-void AddCloud(const Rows& rows, Figure* figure) {
-  Curve sound{.style = StyleOf(rows.front()->record), .points = true, .line = false};
+void AddRuns(const Rows& rows, X x, Curve sound, Figure* figure) {
+  sound.points = true;
   sound.style.flagged = false;
   Curve flagged = sound;
+  flagged.label = "";
+  flagged.line = false;
   flagged.style.flagged = true;
   for (const WorkPrecisionRow* row : rows) {
-    AddPoint(
-        *row, [](const WorkPrecisionRow& one) { return one.cost; }, &sound, &flagged);
+    double at = x(*row);
+    if (HasFailed(row->record)) {
+      if (!std::isfinite(at))
+        at = std::isfinite(row->cost) ? row->cost : row->record.Number("cpu_s");
+      sound.crosses.emplace_back(at, kNowhere);
+      continue;
+    }
+    Curve& curve = IsFlagged(*row) ? flagged : sound;
+    curve.x.push_back(at);
+    curve.y.push_back(row->error);
   }
+  sound.line = sound.line && std::ranges::adjacent_find(sound.x) == sound.x.end();
   if (!flagged.x.empty()) figure->curves.push_back(std::move(flagged));
   figure->curves.push_back(std::move(sound));
 }
@@ -451,7 +437,10 @@ Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
   figure.legend = ChannelLegend(records);
   constexpr const char* kHueAndMark[] = {"formulation", "coordinates"};
   constexpr const char* kHueAndDash[] = {"formulation", "enforcement"};
-  for (const auto& [name, own] : RowsBy(kHueAndMark, rows)) AddCloud(own, &figure);
+  const auto cost = [](const WorkPrecisionRow& row) { return row.cost; };
+  for (const auto& [name, own] : RowsBy(kHueAndMark, rows)) {
+    AddRuns(own, cost, {.style = StyleOf(own.front()->record), .line = false}, &figure);
+  }
   for (const auto& [name, own] : RowsBy(kHueAndDash, rows)) AddBest(own, &figure);
   figure.curves.push_back(Stairs(problem));
   figure.legend.push_back(RowOf(figure.curves.back()));
@@ -477,20 +466,8 @@ Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionP
   const std::vector<Record> records = RecordsOf(rows);
   figure.legend = ChannelLegend(records);
   for (const auto& [name, own] : RowsBy(kChannelKeys, rows)) {
-    Curve sound{.label = MethodLabel(own.front()->record, records),
-                .style = StyleOf(own.front()->record),
-                .points = true};
-    sound.style.flagged = false;
-    Curve flagged = sound;
-    flagged.label = "";
-    flagged.line = false;
-    flagged.style.flagged = true;
-    for (const WorkPrecisionRow* row : own) AddPoint(*row, rtol, &sound, &flagged);
-    // several runs at one tolerance form a cloud without a line
-    std::vector<double> places = sound.x;
-    sound.line = std::ranges::adjacent_find(places) == places.end();
-    if (!flagged.x.empty()) figure.curves.push_back(std::move(flagged));
-    figure.curves.push_back(std::move(sound));
+    const Record& first = own.front()->record;
+    AddRuns(own, rtol, {.label = MethodLabel(first, records), .style = StyleOf(first)}, &figure);
   }
   const bool is_length =
       IsErrorOfPositions(work_precision.error) || UnitOf(ColumnOf(work_precision.error, {})) == "m";
@@ -528,12 +505,8 @@ Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::strin
   const std::vector<Record> records = RecordsOf(rows);
   if (!records.empty()) figure.legend = ChannelLegend(records);
   for (const Record& record : records) {
-    Curve curve{.label = MethodLabel(record, records),
-                .x = record.Numbers("series.error_t"),
-                .y = record.Numbers("series.error"),
-                .style = StyleOf(record)};
-    curve.ends_early = HasFailed(record);
-    figure.curves.push_back(std::move(curve));
+    figure.curves.push_back(CurveOverTime(record, "series.error_t", "series.error",
+                                          MethodLabel(record, records), StyleOf(record)));
   }
   for (Curve& line : TrustLines(rows, figure.curves)) {
     if (!line.label.empty()) figure.legend.push_back(RowOf(line));

@@ -147,10 +147,11 @@ FieldValue<T> By(Json schema, void (*read)(const JsonNode&, T&),
   return {std::move(schema), read, nullptr, write};
 }
 
-/// Returns the constant word of an object's type, which the caller has already read.
+/// Returns the constant word of an object's type; `what` names the object.
 template <class T>
-FieldValue<T> Constant(const std::string& word) {
-  return {ChoiceSchema({word}), nullptr, nullptr, [word](const T&) { return Json(word); }};
+FieldValue<T> Constant(const std::string& word, const std::string& what = "") {
+  return {ChoiceSchema({word}), [=](const JsonNode& node, T&) { node.Choice({word}, what); },
+          nullptr, [word](const T&) { return Json(word); }};
 }
 
 template <class T>

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <fstream>
-#include <iterator>
+#include <ranges>
 #include <set>
 #include <string>
 #include <string_view>
@@ -18,125 +18,30 @@
 #include "harness/text/words.h"
 
 namespace loopbench::harness {
-// Parser events with the pointer and the line of each value.
-//
-// Internal to harness/config (see json_document.h).
-
-/// Position of the parser.
-struct Reading {
-  std::size_t line = 1;
-  std::size_t line_before = 1;  ///< without the last character: numbers are read one too far
-};
-
-/// Gives the parser its characters and counts their lines.
-class LineCounter {
- public:
-  using iterator_category = std::input_iterator_tag;
-  using value_type = char;
-  using difference_type = std::ptrdiff_t;
-  using pointer = const char*;
-  using reference = const char&;
-
-  LineCounter(const char* at, Reading* reading) : at_(at), reading_(reading) {}
-  reference operator*() const { return *at_; }
-  LineCounter& operator++() {
-    reading_->line_before = reading_->line;
-    if (*at_ == '\n') ++reading_->line;
-    ++at_;
-    return *this;
-  }
-  LineCounter operator++(int) {
-    LineCounter old = *this;
-    ++*this;
-    return old;
-  }
-  friend bool operator==(const LineCounter& a, const LineCounter& b) { return a.at_ == b.at_; }
-
- private:
-  const char* at_;
-  Reading* reading_;
-};
-
-/// Follows the parser and records the pointer and the line of each value.
-class Walker : public nlohmann::json_sax<Json> {
- public:
-  /// Walks through `text` to its end, or until a callback returns false.
-  void Walk(std::string_view text) {
-    const LineCounter begin(text.data(), &reading_), end(text.data() + text.size(), &reading_);
-    Json::sax_parse(begin, end, this);
-  }
-
-  bool null() final { return Value(Json()); }
-  bool boolean(bool value) final { return Value(Json(value)); }
-  bool number_integer(number_integer_t value) final { return Value(Json(value)); }
-  bool number_unsigned(number_unsigned_t value) final { return Value(Json(value)); }
-  bool number_float(number_float_t value, const string_t& token) final {
-    return CheckNumber(value, token) && Value(Json(value));
-  }
-  bool string(string_t& value) final { return Value(Json(std::move(value))); }
-  bool binary(binary_t&) final { return true; }
-  bool start_object(std::size_t) final { return Open(false); }
-  bool start_array(std::size_t) final { return Open(true); }
-  bool end_object() final { return Close(); }
-  bool end_array() final { return Close(); }
-  bool key(string_t& key) final {
-    levels_.back().key = key;
-    return Key(key);
-  }
-
- protected:
-  virtual bool Key(const std::string&) { return true; }
-  virtual bool CheckNumber(double, const std::string&) { return true; }
-  /// Adds a value; containers are still empty.
-  virtual bool Put(Json value) = 0;
-  /// Completes the last open container.
-  virtual void Finish() {}
-
-  /// Returns the pointer of the current value or key.
-  std::string Pointer() const {
-    std::string pointer;
-    for (const Level& level : levels_) {
-      pointer += "/" + (level.is_array ? std::to_string(level.index) : PointerToken(level.key));
-    }
-    return pointer;
-  }
-  std::size_t line() const { return reading_.line_before; }
-  std::size_t depth() const { return levels_.size(); }
-  const std::string& current_key() const { return levels_.back().key; }
-
- private:
-  struct Level {
-    bool is_array = false;
-    std::size_t index = 0;
-    std::string key;
-  };
-
-  bool Value(Json value) {
-    const bool go_on = Put(std::move(value));
-    if (!levels_.empty()) ++levels_.back().index;
-    return go_on;
-  }
-  bool Open(bool is_array) {
-    const bool go_on = Put(is_array ? Json::array() : Json::object());
-    levels_.push_back({is_array, 0, {}});
-    return go_on;
-  }
-  bool Close() {
-    levels_.pop_back();
-    if (!levels_.empty()) ++levels_.back().index;
-    Finish();
-    return true;
-  }
-
-  Reading reading_;
-  std::vector<Level> levels_;
-};
 namespace {
 
-/// Builds the document and records errors that the parser accepts.
-class Builder final : public Walker {
+/// Line and column of the byte at `position`, from 1. Columns count bytes, as in the messages of
+/// compilers.
+std::pair<std::ptrdiff_t, std::size_t> PlaceOf(std::string_view text, std::size_t position) {
+  const std::string_view before = text.substr(0, position);
+  // from the line end before the place, or from npos = -1
+  return {std::ranges::count(before, '\n') + 1, position - before.rfind('\n')};
+}
+
+/// Builds the document. Records errors that the parser accepts, and the lines of wanted values.
+class Builder final : public nlohmann::json_sax<Json> {
  public:
-  Builder(std::string_view text, const std::string& file) : text_(text), file_(file) {}
+  /// Parses `text` to its end, to its first syntax error, or until all `wanted` pointers are found.
+  Builder(std::string_view text, const std::string& file,
+          const std::vector<std::string>& wanted = {})
+      : text_(text), file_(file), wanted_(wanted.begin(), wanted.end()) {
+    // without the last character: numbers are read one too far
+    const auto counted = text | std::views::transform([this](char c) {
+                           if (std::exchange(last_, c) == '\n') ++line_;
+                           return c;
+                         });
+    Json::sax_parse(counted.begin(), counted.end(), this);
+  }
 
   /// Returns the document; throws ConfigError with all errors if there are any.
   Json Take() {
@@ -144,14 +49,38 @@ class Builder final : public Walker {
     if (more_ > 0) complaints_.push_back(fmt::format("{}: and {} more", file_, more_));
     throw ConfigError(fmt::format("{}", fmt::join(complaints_, "\n")));
   }
+  const std::map<std::string, std::size_t>& lines() const { return lines_; }
+
+  bool null() override { return Put(Json()); }
+  bool boolean(bool value) override { return Put(value); }
+  bool number_integer(number_integer_t value) override { return Put(value); }
+  bool number_unsigned(number_unsigned_t value) override { return Put(value); }
+  bool number_float(number_float_t value, const string_t& token) override {
+    const std::string_view digits = std::string_view(token).substr(0, token.find_first_of("eE"));
+    if (value == 0.0 && digits.find_first_of("123456789") != std::string_view::npos) {
+      Complain(
+          fmt::format("found {}, expected 0 or a number of at least 4.9e-324", ShortToken(token)));
+    }
+    return Put(value);
+  }
+  bool string(string_t& value) override { return Put(std::move(value)); }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override { return Put(Json::object()); }
+  bool start_array(std::size_t) override { return Put(Json::array()); }
+  bool end_object() override { return Close(); }
+  bool end_array() override { return Close(); }
+  bool key(string_t& key) override {
+    levels_.back().key = key;
+    if (!levels_.back().keys.insert(key).second) {
+      Complain(fmt::format("found key \"{}\" twice, expected each key once in an object",
+                           ShortToken(key)));
+    }
+    return true;
+  }
 
   bool parse_error(std::size_t position, const std::string& token,
                    const nlohmann::detail::exception& error) override {
-    const std::string_view read = text_.substr(0, std::min(position, text_.size()));
-    const auto line = std::count(read.begin(), read.end(), '\n') + 1;
-    const std::size_t start = read.rfind('\n');
-    const std::size_t column =
-        start == std::string_view::npos ? read.size() : read.size() - start - 1;
+    const auto [line, column] = PlaceOf(text_, std::min(position, text_.size()));
     // overflow is reported at the end of the number, and the parser's message has no "parsing"
     const bool too_large = dynamic_cast<const Json::out_of_range*>(&error) != nullptr;
     const std::string what =
@@ -160,75 +89,80 @@ class Builder final : public Walker {
                         "1.8e308)",
                         ShortToken(token))
                   : SyntaxMessage(error.what(), text_, position);
-    complaints_.push_back(fmt::format("{}:{}:{}: {}", file_, line, std::max<std::size_t>(column, 1),
-                                      Printable(what)));
+    // of the last character that was read
+    complaints_.push_back(fmt::format("{}:{}:{}: {}", file_, line,
+                                      std::max<std::size_t>(column - 1, 1), Printable(what)));
     return false;
   }
 
- protected:
-  bool Key(const std::string& key) override {
-    if (!keys_.back().insert(key).second) {
-      Complain(fmt::format("found key \"{}\" twice, expected each key once in an object",
-                           ShortToken(key)));
-    }
-    return true;
-  }
+ private:
+  /// A container that is not yet complete; only the last one grows.
+  struct Level {
+    Json* container;
+    std::string key = {};
+    std::unordered_set<std::string> keys = {};
+  };
 
-  bool CheckNumber(double value, const std::string& token) override {
-    const std::string_view digits = std::string_view(token).substr(0, token.find_first_of("eE"));
-    if (value == 0.0 && digits.find_first_of("123456789") != std::string_view::npos) {
-      Complain(
-          fmt::format("found {}, expected 0 or a number of at least 4.9e-324", ShortToken(token)));
-    }
-    return true;
-  }
-
-  bool Put(Json value) override {
-    const bool container = value.is_structured();
-    Json* placed = &root_;
-    if (open_.empty()) {
-      root_ = std::move(value);
-    } else if (open_.back()->is_array()) {
-      auto& array = open_.back()->get_ref<Json::array_t&>();
-      placed = &array.emplace_back(std::move(value));
-    } else {
-      // Not the map's own emplace, which searches all keys: Key() has checked them.
-      auto& object = open_.back()->get_ref<Json::object_t&>();
-      placed = &object.emplace_back(current_key(), std::move(value)).second;
-    }
-    if (!container) return true;
-    if (depth() >= kMaxConfigDepth) {
+  /// Adds a value; containers are still empty.
+  bool Put(Json value) {
+    if (!wanted_.empty() && wanted_.contains(Pointer())) lines_.emplace(Pointer(), line_);
+    const bool is_container = value.is_structured();
+    if (is_container && levels_.size() >= kMaxConfigDepth) {
       Complain(fmt::format("found nesting deeper than {} levels, expected at most {}",
                            kMaxConfigDepth, kMaxConfigDepth));
       return false;
     }
-    open_.push_back(placed);
-    keys_.emplace_back();
+    Json* placed = &root_;
+    if (levels_.empty()) {
+      root_ = std::move(value);
+    } else if (Json& owner = *levels_.back().container; owner.is_array()) {
+      placed = &owner.get_ref<Json::array_t&>().emplace_back(std::move(value));
+    } else {
+      // Not the map's own emplace, which searches all keys: key() has checked them.
+      placed = &owner.get_ref<Json::object_t&>()
+                    .emplace_back(levels_.back().key, std::move(value))
+                    .second;
+    }
+    if (is_container) levels_.push_back({placed});
+    return wanted_.empty() || lines_.size() < wanted_.size();
+  }
+
+  bool Close() {
+    levels_.pop_back();
     return true;
   }
 
-  void Finish() override {
-    open_.pop_back();
-    keys_.pop_back();
+  /// Returns the pointer of the current value or key.
+  std::string Pointer() const {
+    std::string pointer;
+    for (const Level& level : levels_) {
+      // an open container is already an element of the array around it
+      const std::size_t index = level.container->size() - (&level == &levels_.back() ? 0 : 1);
+      pointer +=
+          "/" + (level.container->is_array() ? std::to_string(index) : PointerToken(level.key));
+    }
+    return pointer;
   }
 
- private:
   void Complain(const std::string& what) {
     if (complaints_.size() >= kMaxMessages) {
       ++more_;
     } else {
-      complaints_.push_back(fmt::format("{}:{}: {}: {}", file_, line(),
+      complaints_.push_back(fmt::format("{}:{}: {}: {}", file_, line_,
                                         Printable(ShownPointer(Pointer())), Printable(what)));
     }
   }
 
   std::string_view text_;
   const std::string& file_;
+  std::size_t line_ = 1;
+  char last_ = '\0';
   Json root_;
-  std::vector<Json*> open_;  ///< containers not yet complete; only the last one grows
-  std::vector<std::unordered_set<std::string>> keys_;
+  std::vector<Level> levels_;
   std::vector<std::string> complaints_;
   std::size_t more_ = 0;
+  std::set<std::string> wanted_;
+  std::map<std::string, std::size_t> lines_;
 };
 
 }  // namespace
@@ -269,9 +203,7 @@ Json ParseDocument(std::string_view text, const std::string& file) {
   if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
     throw ConfigError(fmt::format("{}:1:1: found an empty file, expected a JSON object", file));
   }
-  Builder builder(text, file);
-  builder.Walk(text);
-  return builder.Take();
+  return Builder(text, file).Take();
 }
 
 std::string ShownPointer(const std::string& pointer) {
@@ -334,28 +266,14 @@ std::size_t CharacterLength(std::string_view text) {
   const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned first = byte(0);
   if (first < 0x80) return 1;
-  std::size_t length = 0;
-  if (first >= 0xC2 && first <= 0xDF) length = 2;
-  if (first >= 0xE0 && first <= 0xEF) length = 3;
-  if (first >= 0xF0 && first <= 0xF4) length = 4;
-  if (length == 0 || text.size() < length) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xC0u) != 0x80u) return 0;
-  }
+  const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  if (first < 0xC2 || first > 0xF4 || text.size() < length) return 0;
+  if (!std::ranges::all_of(text.substr(1, length - 1), ContinuesCharacter)) return 0;
   // overlong forms, surrogates, beyond U+10FFFF
   const unsigned second = byte(1);
   const bool refused = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
                        (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
   return refused ? 0 : length;
-}
-
-/// "LINE:COLUMN" of the byte at `position`; columns count bytes, as in the messages of compilers.
-std::string PlaceOf(std::string_view text, std::size_t position) {
-  const std::string_view before = text.substr(0, position);
-  const auto line = std::count(before.begin(), before.end(), '\n') + 1;
-  const std::size_t start = before.rfind('\n');
-  return fmt::format("{}:{}", line,
-                     start == std::string_view::npos ? position + 1 : position - start);
 }
 
 }  // namespace
@@ -367,60 +285,26 @@ std::string EncodingFault(std::string_view text) {
   if (const std::string_view wide = WideEncoding(text); !wide.empty()) {
     return fmt::format("1:1: found {} text, {}", wide, kExpected);
   }
-  for (std::size_t i = 0; i < text.size();) {
-    if (text[i] == '\0') {
-      return fmt::format("{}: found a zero byte, {}", PlaceOf(text, i), kExpected);
-    }
-    const std::size_t length = CharacterLength(text.substr(i, 4));
-    if (length > 0) {
-      i += length;
-      continue;
-    }
+  for (std::size_t i = 0, length = 0; i < text.size(); i += length) {
+    length = text[i] == '\0' ? 0 : CharacterLength(text.substr(i));
+    if (length > 0) continue;
     const auto byte = static_cast<unsigned char>(text[i]);
+    const auto [line, column] = PlaceOf(text, i);
     // Latin-1 has letters from C0 on; below are Windows' quotes and dashes
-    return fmt::format("{}: found the byte {:02X}, which is not UTF-8 (it may be {}), {}",
-                       PlaceOf(text, i), byte, byte >= 0xA0 ? "Latin-1" : "Windows-1252",
+    return fmt::format("{}:{}: found {}, {}", line, column,
+                       byte == 0 ? "a zero byte"
+                                 : fmt::format("the byte {:02X}, which is not UTF-8 (it may be {})",
+                                               byte, byte >= 0xA0 ? "Latin-1" : "Windows-1252"),
                        kExpected);
   }
   return "";
 }
 
-// LinesOf: a second pass through the text, only if there are errors.
-
-namespace {
-
-/// Finds the lines of given values.
-class LineFinder final : public Walker {
- public:
-  explicit LineFinder(const std::vector<std::string>& wanted)
-      : wanted_(wanted.begin(), wanted.end()) {}
-
-  const std::map<std::string, std::size_t>& lines() const { return lines_; }
-
-  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
-    return false;
-  }
-
- protected:
-  bool Put(Json) override {
-    const std::string pointer = Pointer();
-    if (wanted_.contains(pointer)) lines_.emplace(pointer, line());
-    return lines_.size() < wanted_.size();
-  }
-
- private:
-  std::set<std::string> wanted_;
-  std::map<std::string, std::size_t> lines_;
-};
-
-}  // namespace
-
 std::map<std::string, std::size_t> LinesOf(std::string_view text,
                                            const std::vector<std::string>& pointers) {
-  LineFinder finder(pointers);
-  finder.Walk(text);
-  return finder.lines();
+  return Builder(text, "", pointers).lines();
 }
+
 namespace {
 
 bool IsWordCharacter(char c) {

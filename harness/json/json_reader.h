@@ -243,4 +243,14 @@ class JsonNode {
   ErrorList* errors_;
 };
 
+/// Parses `text` and returns `read(top level)`. Throws ConfigError with all reported errors.
+template <class Read>
+auto ReadDocument(std::string_view text, const std::string& file, Read read) {
+  const Json document = ParseDocument(text, file);
+  ErrorList errors(file, text);
+  auto result = read(JsonNode(document, "", errors));
+  errors.ThrowIfAny();
+  return result;
+}
+
 }  // namespace loopbench::harness

@@ -152,19 +152,16 @@ Record ReadContext(const JsonNode& root) {
 }  // namespace
 
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file) {
-  const Json document = ParseDocument(text, file);
-  ErrorList errors(file, text);
-  const JsonNode root(document, "", errors);
-  if (!document.is_object()) root.Fail("the JSON object that Google Benchmark writes");
-  const std::vector<Repetitions> all = ReadRuns(root);
-  const Record context = ReadContext(root);
-  errors.ThrowIfAny();
-  std::vector<Record> records;
-  for (const Repetitions& one : all) {
-    records.push_back(one.ToRecord());
-    for (const auto& [key, value] : context.items()) records.back().Set(key, value);
-  }
-  return records;
+  return ReadDocument(text, file, [](const JsonNode& root) {
+    if (!root.value().is_object()) root.Fail("the JSON object that Google Benchmark writes");
+    std::vector<Record> records;
+    for (const Repetitions& one : ReadRuns(root)) records.push_back(one.ToRecord());
+    const Record context = ReadContext(root);
+    for (Record& record : records) {
+      for (const auto& [key, value] : context.items()) record.Set(key, value);
+    }
+    return records;
+  });
 }
 
 std::vector<Record> ReadMeasurements(const std::filesystem::path& path,

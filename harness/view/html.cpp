@@ -20,12 +20,6 @@ std::string_view NameOf(ShapeKind kind) {
   return kNames[static_cast<std::size_t>(kind)];
 }
 
-std::string_view NameOf(ShapeStyle style) {
-  constexpr std::string_view kNames[] = {"body",   "ground", "joint",  "solid", "guide", "rod",
-                                         "centre", "spring", "damper", "force", "drive"};
-  return kNames[static_cast<std::size_t>(style)];
-}
-
 std::string_view NameOf(ItemKind kind) {
   constexpr std::string_view kNames[] = {"body", "joint", "force"};
   return kNames[static_cast<std::size_t>(kind)];
@@ -64,8 +58,9 @@ std::string ShapeText(const PictureShape& shape) {
               : "";
   return fmt::format(
       R"({{"kind":"{}","style":"{}","item":{},"radius":{},"aside":{},"lift":{},"at":{}{}}})",
-      NameOf(shape.kind), NameOf(shape.style), shape.item, Number(shape.radius),
-      Number(shape.aside), Number(Lift(shape.style)), ListOf(shape.places, PlaceText), offsets);
+      NameOf(shape.kind), TraitsOf(shape.style).name, shape.item, Number(shape.radius),
+      Number(shape.aside), Number(TraitsOf(shape.style).lift), ListOf(shape.places, PlaceText),
+      offsets);
 }
 
 std::string LoopText(const PictureLoop& loop) {
@@ -207,8 +202,6 @@ std::string ToHtml(const Picture& picture) {
   return page + "</script>\n</body>\n</html>\n";
 }
 namespace {
-
-using Eigen::Vector3d;
 
 TableColumn Words(const char* key, const char* header) {
   return {.key = key, .header = header, .format = Format::kText};

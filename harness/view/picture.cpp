@@ -234,30 +234,6 @@ class Maker {
 
 }  // namespace
 
-double Lift(ShapeStyle style) {
-  switch (style) {
-    case ShapeStyle::kGround:
-    case ShapeStyle::kBody:
-      return 0.0;
-    case ShapeStyle::kGuide:
-      return 1.0;
-    case ShapeStyle::kRod:
-    case ShapeStyle::kSpring:
-    case ShapeStyle::kDamper:
-      return 1.5;
-    case ShapeStyle::kJoint:
-      return 3.0;
-    case ShapeStyle::kSolid:
-      return 3.3;
-    case ShapeStyle::kCentre:
-      return 12.0;
-    case ShapeStyle::kForce:
-    case ShapeStyle::kDrive:
-      return 4.0;
-  }
-  return 0.0;
-}
-
 Picture MakePicture(const MechanismDescription& description, const std::string& file) {
   Picture picture;
   picture.name = description.name;
@@ -278,8 +254,6 @@ Picture MakePicture(const MechanismDescription& description, const std::string& 
   }
   return picture;
 }
-
-using Eigen::Vector3d;
 
 const std::vector<std::string>& ViewNames() {
   static const std::vector<std::string> names = {"oblique", "front", "side", "top"};

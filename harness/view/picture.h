@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mechanism/description/joint_frames.h"
@@ -60,9 +61,21 @@ enum class ShapeStyle {
   kDrive,   ///< prescribed motion
 };
 
-/// Returns the shift of a shape towards the viewer [symbol sizes], in space. Symbols are above
-/// bodies, the ball of a joint above its cup, centres of mass above everything.
-double Lift(ShapeStyle style);
+/// Properties of a style.
+struct StyleTraits {
+  std::string_view name;  ///< in JSON
+  int floor;              ///< drawing order: ground below bodies, pins above them
+  /// Shift towards the viewer [symbol sizes], in space. Symbols are above bodies, the ball of a
+  /// joint above its cup, centres of mass above everything.
+  double lift;
+};
+inline const StyleTraits& TraitsOf(ShapeStyle style) {
+  static constexpr StyleTraits kTraits[] = {
+      {"body", 2, 0.0},   {"ground", 0, 0.0}, {"joint", 4, 3.0},   {"solid", 4, 3.3},
+      {"guide", 1, 1.0},  {"rod", 3, 1.5},    {"centre", 5, 12.0}, {"spring", 3, 1.5},
+      {"damper", 3, 1.5}, {"force", 6, 4.0},  {"drive", 6, 4.0}};
+  return kTraits[static_cast<std::size_t>(style)];
+}
 
 struct PictureShape {
   ShapeKind kind = ShapeKind::kLine;

@@ -100,8 +100,6 @@ std::vector<std::vector<int>> HullFaces(const Points& points, double tolerance) 
   return kept.size() > kMost ? std::vector<std::vector<int>>() : Triangles(points, kept, tolerance);
 }
 
-using Eigen::Vector3d;
-
 JointPlaces PlacesOf(const JointDescription& joint) {
   const Frame aligned{AxisAlignment(joint), Vector3d::Zero()};
   return {PoseOf(joint.from) * aligned, PoseOf(joint.to) * aligned};
@@ -153,30 +151,6 @@ std::vector<std::vector<Vector3d>> Attachments(const MechanismDescription& descr
 }
 
 namespace {
-
-int Floor(ShapeStyle style) {
-  switch (style) {
-    case ShapeStyle::kGround:
-      return 0;
-    case ShapeStyle::kGuide:
-      return 1;
-    case ShapeStyle::kBody:
-      return 2;
-    case ShapeStyle::kRod:
-    case ShapeStyle::kSpring:
-    case ShapeStyle::kDamper:
-      return 3;
-    case ShapeStyle::kJoint:
-    case ShapeStyle::kSolid:
-      return 4;
-    case ShapeStyle::kCentre:
-      return 5;
-    case ShapeStyle::kForce:
-    case ShapeStyle::kDrive:
-      return 6;
-  }
-  return 6;
-}
 
 void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>& points,
              bool boxed, Pen pen, Picture* picture) {
@@ -245,18 +219,14 @@ void AddShapes(const MechanismDescription& description, Picture* picture) {
     picture->items[item].anchor = {.body = joint.to.body, .at = joint.to.position};
     AddJointShapes(joint, Pen(picture, item), *picture);
   }
-  // drawing order: ground below bodies, pins above them
   std::ranges::stable_sort(picture->shapes, {},
-                           [](const PictureShape& shape) { return Floor(shape.style); });
+                           [](const PictureShape& shape) { return TraitsOf(shape.style).floor; });
 }
 
 // Symbols of forces: springs, dashpots, arrows. Forces of other programs have an arrow at a joint,
 // or a ring at each of their points.
 
 namespace {
-
-using Eigen::Vector3d;
-using Points = std::vector<Vector3d>;
 
 /// Adds a shape between the frames of a sliding joint, next to its guide.
 void AddBeside(const JointDescription& joint, ShapeKind kind, ShapeStyle style, double y, Pen pen) {
@@ -336,9 +306,6 @@ PicturePlace AddForceShapes(const MechanismDescription& description, ForceDescri
 // Symbols of joints, by their free directions. Joints of other programs have a plain diamond.
 
 namespace {
-
-using Eigen::Vector3d;
-using Points = std::vector<Vector3d>;
 
 /// Adds hatched ground `below` the origin of a frame whose y points down.
 void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {

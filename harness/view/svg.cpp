@@ -295,32 +295,16 @@ struct Ink {
 };
 
 Ink InkOf(const PictureItem& item, ShapeStyle style) {
-  const bool gone = !item.gone.empty();
-  switch (style) {
-    case ShapeStyle::kBody:
-      return gone ? Ink{"#777", "#f4f4f4", 1.0, "4 2"} : Ink{"#222", "#cfdcea", 1.1};
-    case ShapeStyle::kGround:
-      return {"#444", "#e4e4e4", 0.9};
-    case ShapeStyle::kJoint:
-      return gone ? Ink{"#777", "#f4f4f4", 1.0, "2 2"} : Ink{"#111", "#fff", 1.3};
-    case ShapeStyle::kSolid:
-      return {"#111", "#222", 0.8};
-    case ShapeStyle::kGuide:
-      return {"#333", "#ececec", 1.0};
-    case ShapeStyle::kRod:
-      return {"#222", "#fff", 0.9};
-    case ShapeStyle::kCentre:
-      return {"#444", "#fff", 0.8};
-    case ShapeStyle::kSpring:
-      return {"#14532d", "none", 1.2};
-    case ShapeStyle::kDamper:
-      return {"#5b2a86", "none", 1.2};
-    case ShapeStyle::kForce:
-      return {"#9a3412", "#9a3412", 1.5};
-    case ShapeStyle::kDrive:
-      return {"#0b4f9e", "#0b4f9e", 1.8, "5 2"};
-  }
-  return {"#000", "none", 1.0};
+  // in the order of ShapeStyle
+  static constexpr Ink kInks[] = {
+      {"#222", "#cfdcea", 1.1},    {"#444", "#e4e4e4", 0.9},          {"#111", "#fff", 1.3},
+      {"#111", "#222", 0.8},       {"#333", "#ececec", 1.0},          {"#222", "#fff", 0.9},
+      {"#444", "#fff", 0.8},       {"#14532d", "none", 1.2},          {"#5b2a86", "none", 1.2},
+      {"#9a3412", "#9a3412", 1.5}, {"#0b4f9e", "#0b4f9e", 1.8, "5 2"}};
+  const bool is_gone = !item.gone.empty();
+  if (is_gone && style == ShapeStyle::kBody) return {"#777", "#f4f4f4", 1.0, "4 2"};
+  if (is_gone && style == ShapeStyle::kJoint) return {"#777", "#f4f4f4", 1.0, "2 2"};
+  return kInks[static_cast<std::size_t>(style)];
 }
 
 std::string Decimal(double value) {
@@ -496,7 +480,7 @@ void SvgPen::DrawAll(const Poses& poses) {
     double depth = 0.0;
     for (const PicturePlace& place : shape.places) depth += camera_.See(place.In(poses)).depth;
     depth /= static_cast<double>(shape.places.size());
-    depths.push_back(depth + picture_.symbol * Lift(shape.style));
+    depths.push_back(depth + picture_.symbol * TraitsOf(shape.style).lift);
   }
   std::vector<std::size_t> order(depths.size());
   std::iota(order.begin(), order.end(), 0u);

@@ -142,7 +142,7 @@ TEST_F(StoreIntegrity, MemoryThatIsTooSmallIsSaid) {
   for (const char* call : {"table large", "compare large other", "report large"}) {
     for (int kilobytes = 26'000; kilobytes < 60'000; kilobytes += 3'000) {
       const Ending ending = Call(call, fmt::format("ulimit -v {} &&", kilobytes));
-      const bool is_started = ending.text.find("shared libraries") == std::string::npos;
+      const bool is_started = ending.code != 127;  // which the loader of shared libraries returns
       const bool is_done = ending.code == 0 || ending.text.find("Compared") != std::string::npos;
       if (is_done || !is_started) continue;
       ++refusals;

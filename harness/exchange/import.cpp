@@ -12,7 +12,6 @@
 #include "harness/text/files.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/islands.h"
-#include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {
 
@@ -162,7 +161,10 @@ void ImportDraft::MergeFixed(bool whole) {
       Note(elements_[body], reason);
     }
   }
-  if (std::ranges::none_of(attachments, &Attachment::attached)) return;
+  if (std::ranges::any_of(attachments, &Attachment::attached)) Attach(attachments);
+}
+
+void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
   Renumbering renumbering;
   MechanismDescription merged_description =
       MergeRigidBodies(description, attachments, &renumbering);
@@ -174,7 +176,7 @@ void ImportDraft::MergeFixed(bool whole) {
                      joint.name));
   }
   description = std::move(merged_description);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < attachments.size(); ++i) {
     const int kept = renumbering.bodies[i];  // never above i
     if (kept < 0) continue;
     at_rest[kept] = at_rest[i];
@@ -342,6 +344,7 @@ Imported ImportDraft::Finish(const std::string& format) {
   HoldFloatingParts();
   CheckUnreadMasses();
   MergeFixed(false);
+  ComposeChains();
   MergeFixed(true);
   CheckMasses();
   if (description.bodies.size() < 2) {

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "harness/exchange/import_mjcf.h"
-#include "mechanism/model/joint.h"
 
 namespace loopbench::harness {
 
@@ -225,88 +224,9 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-/// Motion of a chain of joints at its coordinates, in drawn body axes.
-struct ChainMotion {
-  Placement X;                    ///< the product of their motions
-  Vector3d w = Vector3d::Zero();  ///< angular velocity
-  Vector3d v = Vector3d::Zero();  ///< velocity of the point `at` in the moved body
-};
-
-Placement MotionOf(const MjcfJoint& joint, const double* q) {
-  if (joint.kind == MjcfKind::kSlide) return Placement((q[0] - joint.reference) * joint.axis);
-  Placement X;
-  X.q = joint.kind == MjcfKind::kBall
-            ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
-            : Quaterniond(Eigen::AngleAxisd(q[0] - joint.reference, joint.axis));
-  X.p = joint.position - X.q * joint.position;
-  return X;
-}
-
-ChainMotion Move(const MjcfModel& model, const MjcfChain& chain, const double* q, const double* u) {
-  std::vector<Placement> before;
-  ChainMotion motion;
-  const double* position = q;
-  for (const std::size_t part : chain.parts) {
-    before.push_back(motion.X);
-    motion.X = motion.X * MotionOf(model.joints[part], position);
-    position += model.joints[part].num_q();
-  }
-  const Vector3d Mo = motion.X.At(chain.X_BJ.p);
-  for (std::size_t i = 0; i < chain.parts.size(); ++i) {
-    const MjcfJoint& joint = model.joints[chain.parts[i]];
-    const Placement& after = i + 1 < before.size() ? before[i + 1] : motion.X;
-    if (joint.kind == MjcfKind::kSlide) {
-      motion.v += before[i].q * joint.axis * u[0];
-    } else {
-      const Vector3d w = joint.kind == MjcfKind::kBall ? after.q * Vector3d(u[0], u[1], u[2])
-                                                       : before[i].q * joint.axis * u[0];
-      motion.w += w;
-      motion.v += w.cross(Mo - before[i].At(joint.position));
-    }
-    u += joint.num_u();
-  }
-  return motion;
-}
-
-/// Converts several joints to one: coordinates from their common pose, speeds from the velocity
-/// along the free directions, which contain it completely.
-void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type, const double* q,
-                 const double* u, std::vector<double>* coordinates, std::vector<double>* speeds) {
-  const ChainMotion motion = Move(model, chain, q, u);
-  const JointKind<Spatial, double>& kind = KindOf<Spatial, double>(type);
-  Placement X_FM = chain.X_BJ.Inverse() * motion.X * chain.X_BJ;
-  Vector3d w = chain.X_BJ.q.conjugate() * motion.w, v = chain.X_BJ.q.conjugate() * motion.v;
-  if (chain.from_is_child) {
-    // reversed: velocity of the origin of the parent's frame, in axes of the child's frame
-    const Placement X_MF = X_FM.Inverse();
-    v = X_MF.q * Vector3d(-(v + w.cross(-X_FM.p)));
-    w = X_MF.q * Vector3d(-w);
-    X_FM = X_MF;
-  }
-  Pose<Spatial, double> pose;
-  pose.R = X_FM.q.toRotationMatrix();
-  pose.p = X_FM.p;
-  coordinates->resize(static_cast<std::size_t>(kind.num_q));
-  kind.coordinates(pose, coordinates->data(), 0.0);
-  speeds->resize(static_cast<std::size_t>(kind.num_u));
-  Basis<Spatial, double> basis;
-  if (kind.basis != nullptr) kind.basis(pose, basis, 0.0);
-  for (int i = 0; i < kind.num_u; ++i) {
-    double& speed = (*speeds)[i];
-    if (kind.basis != nullptr) {
-      const auto column = basis[i];
-      speed = 0.0;
-      for (int k = 0; k < 3; ++k) speed += column.angular[k] * w[k] + column.linear[k] * v[k];
-    } else {
-      const int axis = kind.axes[i];
-      speed = axis < 3 ? w[axis] : v[axis - 3];
-    }
-  }
-}
-
 void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const double* q) {
   for (const MjcfJoint& joint : model.joints) {
-    const double* turn = q + (joint.kind == MjcfKind::kFree ? 3 : 0);
+    const double* turn = q + (joint.kind == SerialKind::kFree ? 3 : 0);
     if (joint.num_q() > 1) UnitQuaternion(qpos, {turn[0], turn[1], turn[2], turn[3]});
     q += joint.num_q();
   }
@@ -323,7 +243,7 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
     const MjcfJoint& first = model->joints[chain.parts[0]];
     const JointDescription& ours = model->draft->description.joints[chain.joint];
     std::vector<double> coordinates, speeds;
-    if (first.alone && first.kind == MjcfKind::kFree) {
+    if (first.alone && first.kind == SerialKind::kFree) {
       // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
       const Vector3d w =
@@ -333,7 +253,9 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
       coordinates = {q[0] - first.reference};
       speeds = {u[0]};
     } else {
-      SetComposed(*model, chain, ours.type, q, u, &coordinates, &speeds);
+      std::vector<SerialJoint> series;
+      for (const std::size_t part : chain.parts) series.push_back(model->joints[part]);
+      SetComposed(series, chain.composed, q, u, &coordinates, &speeds);
     }
     if (!ours.motions.empty()) {
       // a start that contradicts an <equality>

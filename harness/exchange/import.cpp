@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "harness/config/mechanism_sections.h"
 #include "harness/exchange/import_draft.h"
@@ -20,8 +21,12 @@ const std::vector<std::string>& ImportFormats() {
   return formats;
 }
 
-Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
-  const XmlFile xml(text, file);
+namespace {
+
+/// Reads a text. `path`: its file, beside which it may include others; nothing without one.
+Imported Import(std::string_view text, const std::string& file,
+                const std::optional<std::filesystem::path>& path, const ImportOptions& options) {
+  XmlFile xml(text, file);
   const XmlElement root = xml.root();
   const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
                                                : tag == "robot" ? "urdf"
@@ -36,6 +41,7 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
   }
   ImportDraft draft(xml, options);
   draft.description.name = std::filesystem::path(file).stem().string();
+  if (format == "mjcf" && path) xml.Include(*path);
   if (format == "mjcf") ReadMjcf(root, &draft);
   if (format == "urdf") ReadUrdf(root, options, &draft);
   if (format == "sdf") ReadSdf(root, &draft);
@@ -43,8 +49,14 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
   return draft.Finish(format);
 }
 
+}  // namespace
+
+Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
+  return Import(text, file, std::nullopt, options);
+}
+
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options) {
-  return ImportText(ReadTextFile(path), path.string(), options);
+  return Import(ReadTextFile(path), path.string(), path, options);
 }
 
 // Steps common to all formats after the import.
@@ -353,7 +365,9 @@ Imported ImportDraft::Finish(const std::string& format) {
   if (options_.planar) GoToPlane();
   const std::string fault = Validate(description);
   if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
-  std::ranges::stable_sort(notes_, {}, &ImportNote::line);
+  std::ranges::stable_sort(notes_, {}, [&](const ImportNote& note) {
+    return std::tuple(note.file != file_.name(), note.file, note.line);
+  });
   imported.description = std::move(description);
   imported.notes = std::move(notes_);
   return imported;

@@ -232,6 +232,24 @@ void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const d
   }
 }
 
+/// Returns the coordinates in the drawn position: qpos0 of MuJoCo.
+std::vector<double> DrawnCoordinates(const MjcfModel& model) {
+  std::vector<double> qpos;
+  for (const MjcfChain& chain : model.chains) {
+    for (const std::size_t part : chain.parts) {
+      const MjcfJoint& joint = model.joints[part];
+      const Vector3d& p = chain.X_PB.p;
+      const Quaterniond& q = chain.X_PB.q;
+      if (joint.num_q() == 1) qpos.push_back(joint.reference);
+      if (joint.kind == SerialKind::kBall) qpos.insert(qpos.end(), {1.0, 0.0, 0.0, 0.0});
+      if (joint.kind == SerialKind::kFree) {
+        qpos.insert(qpos.end(), {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
+      }
+    }
+  }
+  return qpos;
+}
+
 /// Sets coordinates, and speeds if given, of the Loopbench joints from MuJoCo's.
 void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<double>& qpos,
                   const std::vector<double>& qvel, bool has_speeds) {
@@ -262,7 +280,9 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
       const double held = std::get<Polynomial>(ours.motions[0].value).coefficients[0];
       const std::string reason =
           fmt::format("of joint \"{}\" dropped: an <equality> holds it at {:.6g}", ours.name, held);
-      if (coordinates[0] != held) model->draft->Note(key, "qpos", reason, true);
+      if (key.Attribute("qpos") && coordinates[0] != held) {
+        model->draft->Note(key, "qpos", reason, true);
+      }
       if (speeds[0] != 0.0) model->draft->Note(key, "qvel", reason, true);
     } else {
       initial.coordinates.push_back({chain.joint, coordinates});
@@ -294,20 +314,18 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
   const std::vector<XmlElement> keys = root.InSections("keyframe", "key");
   std::optional<XmlValue> controls;
   if (!keys.empty()) {
-    std::vector<double> qpos, qvel;
+    std::vector<double> qpos = DrawnCoordinates(*model), qvel;
     for (const MjcfJoint& joint : model->joints) {
-      qpos.insert(qpos.end(), static_cast<std::size_t>(joint.num_q()), 0.0);
       qvel.insert(qvel.end(), static_cast<std::size_t>(joint.num_u()), 0.0);
     }
     const auto positions = keys[0].Attribute("qpos");
     const auto speeds = keys[0].Attribute("qvel");
-    if (speeds && !positions) keys[0].Fail("qvel without qpos", "both");
     if (speeds) qvel = speeds->Numbers(qvel.size(), qvel.size());
     if (positions) {
       qpos = positions->Numbers(qpos.size(), qpos.size());
       RefuseZeroQuaternions(*model, *positions, qpos.data());
-      SetMjcfStart(model, keys[0], qpos, qvel, speeds.has_value());
     }
+    if (positions || speeds) SetMjcfStart(model, keys[0], qpos, qvel, speeds.has_value());
     controls = keys[0].Attribute("ctrl");
     keys[0].Attribute("name");
     keys[0].Attribute("time");

@@ -112,6 +112,11 @@ struct MjcfChain {
   ComposedJoint composed;
 };
 
+/// A site: a point of a body, and the orientation of its frame there.
+struct MjcfSite : BodyPoint {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+};
+
 class MjcfModel {
  public:
   explicit MjcfModel(ImportDraft* draft_) : draft(draft_) {}
@@ -121,7 +126,7 @@ class MjcfModel {
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
   std::vector<MjcfChain> chains;  ///< of all bodies, in the order of the file
-  std::map<std::string, BodyPoint> sites;
+  std::map<std::string, MjcfSite> sites;
   std::map<std::string, std::size_t> joint_names;
 
   /// Returns the orientation of the element in any notation; by default the one of its class.
@@ -139,7 +144,7 @@ class MjcfModel {
   /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
   /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
-  const BodyPoint& SiteNamed(const XmlValue& value) const {
+  const MjcfSite& SiteNamed(const XmlValue& value) const {
     return Named(sites, value, "the name of a site");
   }
   MjcfJoint& JointNamed(const XmlValue& value) {

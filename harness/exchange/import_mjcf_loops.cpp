@@ -28,8 +28,8 @@ std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equal
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
   if (!site1) return std::nullopt;
   if (!site2) equality.own().Fail("no \"site2\"", "a site of the other body");
-  const BodyPoint &a = model.SiteNamed(*site1), &b = model.SiteNamed(*site2);
-  return Ends{a.body, b.body, Placement(a.at), Placement(b.at)};
+  const MjcfSite &a = model.SiteNamed(*site1), &b = model.SiteNamed(*site2);
+  return Ends{a.body, b.body, {a.q, a.at}, {b.q, b.at}};
 }
 
 Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
@@ -62,26 +62,33 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
     ends->X_second.p = AtRestOn(*model, ends->first, ends->X_first, ends->second).p;
   }
   RequireTwoBodies(equality, *ends);
+  ends->X_first.q.setIdentity();
+  ends->X_second.q.setIdentity();
   AddLoopJoint(equality, JointType::kSpherical, *ends, model->draft);
 }
 
-/// Adds a weld. `relpose`: pose of the second body in the first, from the anchor on the second.
-void AddWeld(const MjcfElement& equality, MjcfModel* model) {
-  if (equality.Attribute("site1")) {
-    equality.own().Fail("a weld of sites", "a weld of bodies (body1, body2)");
-  }
-  Ends ends = EndsOnBodies(*model, equality);
-  RequireTwoBodies(equality, ends);
-  ends.X_first = AtRestOn(*model, ends.second, {}, ends.first);
+/// Returns the ends of a weld of bodies. `relpose`: pose of the second body in the first, from the
+/// anchor on the second.
+Ends EndsOfBodies(const MjcfElement& equality, const MjcfModel& model) {
+  Ends ends = EndsOnBodies(model, equality);
+  ends.X_first = AtRestOn(model, ends.second, {}, ends.first);
   if (const auto pose = equality.Attribute("relpose")) {
-    const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
+    const std::vector<double> p = model.draft->Numbers(*pose, "nnnq");
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
     // a zero quaternion selects the drawn poses
     if (q.norm() > 0.0) ends.X_first = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
   }
-  equality.Attribute("anchor");  // point of the weld; irrelevant, since a weld holds everywhere
-  equality.Attribute("torquescale");
-  AddLoopJoint(equality, JointType::kWeld, ends, model->draft);
+  return ends;
+}
+
+/// Adds a weld of two bodies, or of two sites, whose frames coincide.
+void AddWeld(const MjcfElement& equality, MjcfModel* model) {
+  auto ends = EndsAtSites(*model, equality);
+  if (!ends) ends = EndsOfBodies(equality, *model);
+  RequireTwoBodies(equality, *ends);
+  // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
+  for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
+  AddLoopJoint(equality, JointType::kWeld, *ends, model->draft);
 }
 
 /// Returns the constant coefficient of `polycoef`.

@@ -145,7 +145,7 @@ JsonObject Document(const Imported& imported, const ImportCommand& command,
   std::vector<JsonObject> notes;
   for (const ImportNote& note : imported.notes) {
     JsonObject& one = notes.emplace_back();
-    one.Add("line", std::int64_t{note.line});
+    one.Add("file", note.file).Add("line", std::int64_t{note.line});
     one.Add("element", note.element);
     one.Add("reason", note.reason);
     one.Add("changes_motion", note.changes_motion);
@@ -176,7 +176,7 @@ int ImportHere(const ImportCommand& command) {
     return 0;
   }
   for (const ImportNote& note : imported.notes) {
-    Print("{}:{}: {}: {}{}\n", command.file.string(), note.line, note.element, note.reason,
+    Print("{}:{}: {}: {}{}\n", note.file, note.line, note.element, note.reason,
           note.changes_motion ? " [changes the motion]" : "");
   }
   const auto changed = std::ranges::count(imported.notes, true, &ImportNote::changes_motion);

@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "harness/config/mechanism_sections.h"
 #include "harness/exchange/import_draft.h"
 #include "harness/text/files.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/islands.h"
-#include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {
 
@@ -21,8 +21,12 @@ const std::vector<std::string>& ImportFormats() {
   return formats;
 }
 
-Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
-  const XmlFile xml(text, file);
+namespace {
+
+/// Reads a text. `path`: its file, beside which it may include others; nothing without one.
+Imported Import(std::string_view text, const std::string& file,
+                const std::optional<std::filesystem::path>& path, const ImportOptions& options) {
+  XmlFile xml(text, file);
   const XmlElement root = xml.root();
   const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
                                                : tag == "robot" ? "urdf"
@@ -37,6 +41,7 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
   }
   ImportDraft draft(xml, options);
   draft.description.name = std::filesystem::path(file).stem().string();
+  if (format == "mjcf" && path) xml.Include(*path);
   if (format == "mjcf") ReadMjcf(root, &draft);
   if (format == "urdf") ReadUrdf(root, options, &draft);
   if (format == "sdf") ReadSdf(root, &draft);
@@ -44,8 +49,14 @@ Imported ImportText(std::string_view text, const std::string& file, const Import
   return draft.Finish(format);
 }
 
+}  // namespace
+
+Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
+  return Import(text, file, std::nullopt, options);
+}
+
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options) {
-  return ImportText(ReadTextFile(path), path.string(), options);
+  return Import(ReadTextFile(path), path.string(), path, options);
 }
 
 // Steps common to all formats after the import.
@@ -162,7 +173,10 @@ void ImportDraft::MergeFixed(bool whole) {
       Note(elements_[body], reason);
     }
   }
-  if (std::ranges::none_of(attachments, &Attachment::attached)) return;
+  if (std::ranges::any_of(attachments, &Attachment::attached)) Attach(attachments);
+}
+
+void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
   Renumbering renumbering;
   MechanismDescription merged_description =
       MergeRigidBodies(description, attachments, &renumbering);
@@ -174,7 +188,7 @@ void ImportDraft::MergeFixed(bool whole) {
                      joint.name));
   }
   description = std::move(merged_description);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < attachments.size(); ++i) {
     const int kept = renumbering.bodies[i];  // never above i
     if (kept < 0) continue;
     at_rest[kept] = at_rest[i];
@@ -342,6 +356,7 @@ Imported ImportDraft::Finish(const std::string& format) {
   HoldFloatingParts();
   CheckUnreadMasses();
   MergeFixed(false);
+  ComposeChains();
   MergeFixed(true);
   CheckMasses();
   if (description.bodies.size() < 2) {
@@ -350,7 +365,9 @@ Imported ImportDraft::Finish(const std::string& format) {
   if (options_.planar) GoToPlane();
   const std::string fault = Validate(description);
   if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
-  std::ranges::stable_sort(notes_, {}, &ImportNote::line);
+  std::ranges::stable_sort(notes_, {}, [&](const ImportNote& note) {
+    return std::tuple(note.file != file_.name(), note.file, note.line);
+  });
   imported.description = std::move(description);
   imported.notes = std::move(notes_);
   return imported;

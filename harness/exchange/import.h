@@ -17,6 +17,7 @@ namespace loopbench::harness {
 
 /// A part of the file that the mechanism does not have, or represents differently.
 struct ImportNote {
+  std::string file;     ///< the imported file, or a file that it includes
   int line = 0;         ///< in the file
   std::string element;  ///< <joint name="knee">, optionally with an attribute
   std::string reason;   ///< replacement or omission, and the reason
@@ -27,7 +28,7 @@ struct Imported {
   std::string format;  ///< "mjcf", "urdf" or "sdf"
   MechanismDescription description;
   ObservedQuantities observe;
-  std::vector<ImportNote> notes;  ///< by line
+  std::vector<ImportNote> notes;  ///< of the imported file first, by line
 };
 
 // Import of files for other programs: MuJoCo's MJCF, URDF and SDF (docs/exchange.md).
@@ -48,7 +49,7 @@ const std::vector<std::string>& ImportFormats();
 /// found and expected value.
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options = {});
 
-/// Reads a text; `file` is the name used in messages.
+/// Reads a text, which includes no other files; `file` is the name used in messages.
 Imported ImportText(std::string_view text, const std::string& file,
                     const ImportOptions& options = {});
 

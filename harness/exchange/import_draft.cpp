@@ -174,7 +174,7 @@ void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
 void ImportDraft::Note(const XmlElement& element, const std::string& attribute, std::string reason,
                        bool changes_motion) {
   const std::string shown = element.Shown() + (attribute.empty() ? "" : " ") + attribute;
-  notes_.push_back({element.line(), shown, std::move(reason), changes_motion});
+  notes_.push_back({element.file(), element.line(), shown, std::move(reason), changes_motion});
 }
 
 void ImportDraft::Drop(const XmlElement& element, const std::string& attribute,

@@ -17,6 +17,7 @@
 #include "harness/exchange/import.h"
 #include "harness/exchange/xml_file.h"
 #include "mechanism/description/joint_frames.h"
+#include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {
 
@@ -91,6 +92,8 @@ struct DroppedReason {
 };
 
 inline constexpr const char* kDryFriction = "dry friction is no force of mechanism files";
+/// Reason why springs, dampers and efforts of a joint with several coordinates are dropped.
+inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
 /// Returns the entry that a value names; if there is none, rejects the value with `expected`.
@@ -101,6 +104,44 @@ const Entry& Named(const std::map<std::string, Entry>& entries, const XmlValue& 
   if (found == entries.end()) value.Fail(expected);
   return found->second;
 }
+
+// Joints in series without mass between them (import_chain.cpp).
+
+enum class SerialKind { kHinge, kSlide, kBall, kFree };
+
+/// A joint of a series, in the drawn axes of the last body.
+struct SerialJoint {
+  SerialKind kind = SerialKind::kHinge;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
+  double reference = 0.0;                              ///< its coordinate in the drawn position
+
+  int num_q() const { return kind == SerialKind::kFree ? 7 : kind == SerialKind::kBall ? 4 : 1; }
+  int num_u() const { return kind == SerialKind::kFree ? 6 : kind == SerialKind::kBall ? 3 : 1; }
+};
+
+/// The joint of a mechanism that a series forms.
+struct ComposedJoint {
+  JointType type = JointType::kWeld;
+  Placement X_BJ;              ///< its frame on the last body, in drawn axes of that body
+  bool from_is_child = false;  ///< it leads from the last body to the first
+};
+
+inline constexpr const char* kAxesOfOneJoint =
+    "axes of a universal, cylindrical, planar, spherical or free joint or a pin in a slot";
+
+/// Returns the joint that a series forms, if there is one.
+std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints);
+/// Returns the kinds, for messages: "hinge, slide".
+std::string WordsOf(const std::vector<SerialJoint>& joints);
+/// Returns the motion of a joint, not a free one, at its coordinates `q`.
+Placement MotionOf(const SerialJoint& joint, const double* q);
+/// Converts several joints to one: coordinates from their common pose, speeds from the velocity
+/// along the free directions, which contain it completely.
+void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& composed,
+                 const double* q, const double* u, std::vector<double>* coordinates,
+                 std::vector<double>* speeds);
+struct MasslessChain;
 
 class ImportDraft {
  public:
@@ -126,6 +167,9 @@ class ImportDraft {
   /// Adds a joint from X_PF on `from` to X_QM on `to`; the reference is valid until the next call.
   JointDescription& AddJoint(const std::string& name, JointType type, int from,
                              const Placement& X_PF, int to, const Placement& X_QM);
+  /// Adds the joint of a series between two bodies; X_PF is its frame on the parent.
+  JointDescription& AddComposed(const std::string& name, const ComposedJoint& composed, int parent,
+                                const Placement& X_PF, int child);
   /// Adds a weld of a body, named after it with this ending.
   void Fix(int parent, const Placement& X, int body, const char* ending);
   /// Adds spring and damper of the joint that was added last, where they are not 0.
@@ -168,6 +212,12 @@ class ImportDraft {
   /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
   /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);
+  /// Makes one joint of joints in series through bodies without mass. Rejects series that form
+  /// none.
+  void ComposeChains();
+  void ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed);
+  /// Removes attached bodies (one entry per body) and the joints within their carriers.
+  void Attach(const std::vector<Attachment>& attachments);
   /// Rejects invalid masses and inertias of moving bodies, including their merged bodies.
   void CheckMasses() const;
   void MakeBallsPins(const Eigen::Vector3d& n);

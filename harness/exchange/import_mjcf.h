@@ -14,9 +14,6 @@
 
 namespace loopbench::harness {
 
-/// Reason why springs, dampers and efforts of a joint with several coordinates are dropped.
-inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
-
 inline constexpr const char* kNoRotors = "rotors have no inertia beside that of the bodies";
 
 /// Attributes that limit the efforts of all actuators of a joint.
@@ -89,29 +86,21 @@ struct MjcfSettings {
   double Angle(double value) const { return degrees ? value * kDegree : value; }
 };
 
-enum class MjcfKind { kHinge, kSlide, kBall, kFree };
-
 /// Minimum and maximum value.
 using MjcfLimits = std::pair<double, double>;
 
 /// A joint of MuJoCo; several on one body form one Loopbench joint.
-struct MjcfJoint {
+struct MjcfJoint : SerialJoint {
   explicit MjcfJoint(MjcfElement element_) : element(std::move(element_)) {}
 
   MjcfElement element;
-  MjcfKind kind = MjcfKind::kHinge;
   std::string name;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in body axes [m]
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
-  double reference = 0.0;                              ///< its coordinate in the drawn position
-  double spring_reference = 0.0;                       ///< its coordinate with a relaxed spring
-  int joint = -1;                                      ///< Loopbench joint that contains it
-  bool alone = true;                                   ///< it is the only part of that joint
+  double spring_reference = 0.0;  ///< its coordinate with a relaxed spring
+  int joint = -1;                 ///< Loopbench joint that contains it
+  bool alone = true;              ///< it is the only part of that joint
 
-  int num_q() const { return kind == MjcfKind::kFree ? 7 : kind == MjcfKind::kBall ? 4 : 1; }
   /// True if the Loopbench joint has its coordinate and no other.
   bool has_coordinate() const { return num_q() == 1 && alone; }
-  int num_u() const { return kind == MjcfKind::kFree ? 6 : kind == MjcfKind::kBall ? 3 : 1; }
 };
 
 /// The joints of a body, from the outermost, and the Loopbench joint that they form.
@@ -120,8 +109,12 @@ struct MjcfChain {
   Placement X_PB;                  ///< drawn pose of the body in its parent
   std::vector<std::size_t> parts;  ///< in MjcfModel::joints; none for a fixed body
   int joint = -1;
-  bool from_is_child = false;  ///< the Loopbench joint leads from the child to its parent
-  Placement X_BJ;              ///< Loopbench joint frame on the child, in its axes
+  ComposedJoint composed;
+};
+
+/// A site: a point of a body, and the orientation of its frame there.
+struct MjcfSite : BodyPoint {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
 };
 
 class MjcfModel {
@@ -133,7 +126,7 @@ class MjcfModel {
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
   std::vector<MjcfChain> chains;  ///< of all bodies, in the order of the file
-  std::map<std::string, BodyPoint> sites;
+  std::map<std::string, MjcfSite> sites;
   std::map<std::string, std::size_t> joint_names;
 
   /// Returns the orientation of the element in any notation; by default the one of its class.
@@ -151,7 +144,7 @@ class MjcfModel {
   /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
   /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
-  const BodyPoint& SiteNamed(const XmlValue& value) const {
+  const MjcfSite& SiteNamed(const XmlValue& value) const {
     return Named(sites, value, "the name of a site");
   }
   MjcfJoint& JointNamed(const XmlValue& value) {

@@ -207,13 +207,13 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
   for (const MjcfPlaced& site : sites) {
     const MjcfElement element = model->defaults.Of(site.element, site.childclass);
     const auto given = site.element.Attribute("name");
-    const Eigen::Vector3d at = site.X.At(model->PlacementOf(element).p);
+    const Placement X = site.X * model->PlacementOf(element);
     if (!given) continue;
     const std::string name = given->Name();
-    if (!model->sites.emplace(name, BodyPoint{body, at}).second) {
+    if (!model->sites.emplace(name, MjcfSite{{body, X.p}, X.q}).second) {
       given->Fail("a name that no other site has");
     }
-    model->draft->description.bodies[body].points.emplace(name, at);
+    model->draft->description.bodies[body].points.emplace(name, X.p);
   }
 }
 

@@ -1,8 +1,4 @@
-// Joints of MuJoCo: single ones, and several on a body as one Loopbench joint.
-//
-// MuJoCo's joints of a body act in sequence, each in axes moved by the previous joints. With
-// X_i(q_i) the motion of joint i in body axes, the pose of the body in its parent is X_PB X_1 ..
-// X_n. The set of reachable poses determines the Loopbench joint type.
+// Joints and actuators of MuJoCo: the joints of a body act in series, as one Loopbench joint.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,10 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Tolerance for parallel, perpendicular and intersecting axes: rounding in a file with nine
-/// digits.
-constexpr double kAligned = 1e-9;
-
 void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
   const XmlElement& own = joint.element.own();
   model.DropNonzero(joint.element, "armature", kNoRotors);
@@ -32,125 +24,6 @@ void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
       (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
     model.draft->Drop(own, "actuatorgravcomp", "gravcomp acts whatever actuators may do");
   }
-}
-
-/// Returns the intersection of the axes of hinges; nothing if there is none.
-std::optional<Vector3d> MeetingPoint(const std::vector<MjcfJoint>& hinges) {
-  const auto at_first = [&](const MjcfJoint& hinge) {
-    return hinge.position == hinges[0].position;
-  };
-  if (std::ranges::all_of(hinges, at_first)) return hinges[0].position;
-  // least-squares point of the distances to all axes
-  MatrixX<double> A = MatrixX<double>::Zero(3, 3), U(3, 3);
-  VectorX<double> lambda(3);
-  Vector3d b = Vector3d::Zero();
-  double arms = 1.0;
-  for (const MjcfJoint& hinge : hinges) {
-    const Eigen::Matrix3d across =
-        Eigen::Matrix3d::Identity() - hinge.axis * hinge.axis.transpose();
-    A += across;
-    b += across * hinge.position;
-    arms += hinge.position.norm();
-  }
-  SymmetricEigen<double>(A, U, lambda);
-  // axes 2e-7 rad apart have an eigenvalue of 2e-14; parallel axes have round-off
-  const double least = 16.0 * std::numeric_limits<double>::epsilon() * lambda[2];
-  Vector3d point = Vector3d::Zero();
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    const Vector3d u = U.col(k);
-    if (lambda[k] > least) point += u.dot(b) / lambda[k] * u;
-  }
-  for (const MjcfJoint& hinge : hinges) {
-    const Vector3d way = point - hinge.position;
-    if (!((way - way.dot(hinge.axis) * hinge.axis).norm() <= kAligned * arms)) return std::nullopt;
-  }
-  return point;
-}
-
-bool Parallel(const Vector3d& a, const Vector3d& b) { return a.cross(b).norm() <= kAligned; }
-bool Perpendicular(const Vector3d& a, const Vector3d& b) { return std::abs(a.dot(b)) <= kAligned; }
-
-/// Returns axes x, y, z from two axes that are perpendicular up to rounding.
-Eigen::Quaterniond Axes(const Vector3d& x, const Vector3d& z_near) {
-  const Vector3d z = (z_near - x.dot(z_near) * x).normalized();
-  Eigen::Matrix3d R;
-  R << x, z.cross(x), z;
-  return Eigen::Quaterniond(R);
-}
-
-struct Composed {
-  JointType type;
-  Placement X_BJ;
-  bool from_is_child = false;
-};
-
-bool Independent(const std::vector<MjcfJoint>& joints) {
-  Eigen::Matrix3d axes;
-  axes << joints[0].axis, joints[1].axis, joints[2].axis;
-  return std::abs(axes.determinant()) > kAligned;
-}
-
-/// Returns the joint that several joints form; `all`: in their order, by kind.
-std::optional<Composed> Together(const std::vector<MjcfJoint>& joints,
-                                 const std::map<MjcfKind, std::vector<MjcfJoint>>& all) {
-  const auto of = [&](MjcfKind kind) {
-    const auto found = all.find(kind);
-    return found == all.end() ? std::vector<MjcfJoint>() : found->second;
-  };
-  const std::vector<MjcfJoint> hinges = of(MjcfKind::kHinge), slides = of(MjcfKind::kSlide),
-                               balls = of(MjcfKind::kBall);
-  if (joints.size() == 2 && hinges.size() == 2) {
-    const Vector3d &a = hinges[0].axis, &b = hinges[1].axis;
-    const auto point = Perpendicular(a, b) ? MeetingPoint(hinges) : std::nullopt;
-    // about x of F, then about y of M
-    if (point) return Composed{JointType::kUniversal, {Axes(a, a.cross(b)), *point}};
-  }
-  if (joints.size() == 2 && hinges.size() == 1 && slides.size() == 1) {
-    const Vector3d &turn = hinges[0].axis, &slide = slides[0].axis, &at = hinges[0].position;
-    if (Parallel(turn, slide)) return Composed{JointType::kCylindrical, {TurnOfZ(turn), at}};
-    // the slot is on the parent when the slide comes first, else on the child
-    const bool from_is_child = joints[0].kind == MjcfKind::kHinge;
-    if (Perpendicular(turn, slide)) {
-      return Composed{JointType::kPinInSlot, {Axes(slide, turn), at}, from_is_child};
-    }
-  }
-  if (slides.size() == 2 && hinges.size() == 1) {
-    const Vector3d &z = hinges[0].axis, &a = slides[0].axis, &b = slides[1].axis;
-    if (Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b)) {
-      return Composed{JointType::kPlanar, {Axes(a, z), hinges[0].position}};
-    }
-  }
-  std::optional<Vector3d> centre;
-  if (balls.size() == 1 && hinges.empty()) centre = balls[0].position;
-  if (balls.empty() && hinges.size() == 3 && Independent(hinges)) centre = MeetingPoint(hinges);
-  if (centre && slides.empty()) return Composed{JointType::kSpherical, Placement(*centre)};
-  if (centre && slides.size() == 3 && Independent(slides)) {
-    return Composed{JointType::kFree, Placement(*centre)};
-  }
-  return std::nullopt;
-}
-
-Composed Compose(const XmlElement& body, const std::vector<MjcfJoint>& joints) {
-  if (joints.size() == 1) {
-    constexpr JointType kTypes[] = {JointType::kRevolute, JointType::kPrismatic,
-                                    JointType::kSpherical, JointType::kFree};
-    return {kTypes[static_cast<int>(joints[0].kind)], Placement(joints[0].position)};
-  }
-  std::map<MjcfKind, std::vector<MjcfJoint>> all;
-  std::vector<std::string> words;
-  for (const MjcfJoint& joint : joints) {
-    constexpr const char* kWords[] = {"hinge", "slide", "ball", "free"};
-    all[joint.kind].push_back(joint);
-    words.emplace_back(kWords[static_cast<int>(joint.kind)]);
-  }
-  const bool has_free = all.contains(MjcfKind::kFree);
-  if (!has_free) {
-    if (const auto composed = Together(joints, all)) return *composed;
-  }
-  body.Fail(fmt::format("{} joints on one body ({}) that are none of ours together", joints.size(),
-                        has_free ? "one of them free" : fmt::format("{}", fmt::join(words, ", "))),
-            "a body with mass between them, or axes of a universal, cylindrical, planar, spherical "
-            "or free joint or a pin in a slot");
 }
 
 /// Adds springs and dampers of a joint that is a whole Loopbench joint; drops others.
@@ -174,29 +47,29 @@ MjcfJoint ReadJoint(const MjcfModel& model, const MjcfPlaced& placed) {
   MjcfJoint joint(model.defaults.Of(element, childclass));
   if (const auto name = element.Attribute("name")) joint.name = name->Name();
   if (element.tag() == "freejoint") {
-    joint.kind = MjcfKind::kFree;
+    joint.kind = SerialKind::kFree;
     return joint;
   }
   if (const auto type = joint.element.Attribute("type")) {
-    joint.kind = type->Choice<MjcfKind>({{"hinge", MjcfKind::kHinge},
-                                         {"slide", MjcfKind::kSlide},
-                                         {"ball", MjcfKind::kBall},
-                                         {"free", MjcfKind::kFree}});
+    joint.kind = type->Choice<SerialKind>({{"hinge", SerialKind::kHinge},
+                                           {"slide", SerialKind::kSlide},
+                                           {"ball", SerialKind::kBall},
+                                           {"free", SerialKind::kFree}});
   }
   const auto position = joint.element.Attribute("pos");
-  if (joint.kind != MjcfKind::kFree) {
+  if (joint.kind != SerialKind::kFree) {
     joint.position = X.At(position ? position->Vector() : Vector3d::Zero());
   }
   if (const auto axis = joint.element.Attribute("axis")) {
     joint.axis = model.draft->Vector(*axis, "d");
-    const bool matters = joint.kind == MjcfKind::kHinge || joint.kind == MjcfKind::kSlide;
+    const bool matters = joint.kind == SerialKind::kHinge || joint.kind == SerialKind::kSlide;
     if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
     if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
   }
   joint.axis = X.q * joint.axis;
   const auto angle_or_length = [&](const char* name) {
     const double value = joint.element.Number(name, 0.0);
-    return joint.kind == MjcfKind::kHinge ? model.settings.Angle(value) : value;
+    return joint.kind == SerialKind::kHinge ? model.settings.Angle(value) : value;
   };
   joint.reference = angle_or_length("ref");
   joint.spring_reference = angle_or_length("springref");
@@ -207,7 +80,14 @@ MjcfJoint ReadJoint(const MjcfModel& model, const MjcfPlaced& placed) {
 /// Adds the Loopbench joint of the joints of a body and sets its frame on the child.
 void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints, ImportDraft* draft,
                  MjcfChain* chain) {
-  const Composed composed = Compose(body, joints);
+  const auto composed = Compose({joints.begin(), joints.end()});
+  if (!composed) {
+    const bool has_free = std::ranges::count(joints, SerialKind::kFree, &MjcfJoint::kind) > 0;
+    const std::string words = WordsOf({joints.begin(), joints.end()});
+    body.Fail(fmt::format("{} joints on one body ({}) that are none of ours together",
+                          joints.size(), has_free ? "one of them free" : words),
+              fmt::format("a body with mass between them, or {}", kAxesOfOneJoint));
+  }
   std::vector<std::string> names;
   for (const MjcfJoint& joint : joints) {
     if (!joint.name.empty()) names.push_back(joint.name);
@@ -215,28 +95,24 @@ void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints, I
   const std::string name =
       names.empty() ? draft->NameLater(draft->description.bodies[chain->child].name)
                     : draft->NewJointName(body, fmt::format("{}", fmt::join(names, "+")));
-  const bool is_free = joints[0].kind == MjcfKind::kFree;
+  const bool is_free = joints[0].kind == SerialKind::kFree;
   if (is_free && chain->parent != kGround) {
     joints[0].element.own().Fail("a free joint of a body within another",
                                  "a free joint in a body of <worldbody>");
   }
-  chain->X_BJ = composed.X_BJ;
-  chain->from_is_child = composed.from_is_child;
-  const Placement X_PF = is_free ? Placement() : chain->X_PB * chain->X_BJ;
-  JointDescription& made =
-      chain->from_is_child
-          ? draft->AddJoint(name, composed.type, chain->child, chain->X_BJ, chain->parent, X_PF)
-          : draft->AddJoint(name, composed.type, chain->parent, X_PF, chain->child, chain->X_BJ);
+  chain->composed = *composed;
+  const Placement X_PF = is_free ? Placement() : chain->X_PB * composed->X_BJ;
+  JointDescription& made = draft->AddComposed(name, *composed, chain->parent, X_PF, chain->child);
   chain->joint = draft->last_joint();
-  if (composed.type == JointType::kFree) {
+  if (composed->type == JointType::kFree) {
     const Placement X = is_free ? chain->X_PB : Placement();
     draft->description.initial.coordinates.push_back({chain->joint, X.AsCoordinates()});
   }
   if (joints.size() > 1) {
     draft->Note(body,
-                fmt::format("{} joints are one here: {}", joints.size(), ToString(composed.type)));
+                fmt::format("{} joints are one here: {}", joints.size(), ToString(composed->type)));
   } else if (joints[0].num_q() == 1) {
-    const bool turns = joints[0].kind == MjcfKind::kHinge;
+    const bool turns = joints[0].kind == SerialKind::kHinge;
     const Vector3d own = turns ? Vector3d::UnitZ() : Vector3d::UnitX();
     if (joints[0].axis != own) made.axis = joints[0].axis;
   }

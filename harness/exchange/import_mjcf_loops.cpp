@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "harness/exchange/import_mjcf.h"
-#include "mechanism/model/joint.h"
 
 namespace loopbench::harness {
 
@@ -29,8 +28,8 @@ std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equal
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
   if (!site1) return std::nullopt;
   if (!site2) equality.own().Fail("no \"site2\"", "a site of the other body");
-  const BodyPoint &a = model.SiteNamed(*site1), &b = model.SiteNamed(*site2);
-  return Ends{a.body, b.body, Placement(a.at), Placement(b.at)};
+  const MjcfSite &a = model.SiteNamed(*site1), &b = model.SiteNamed(*site2);
+  return Ends{a.body, b.body, {a.q, a.at}, {b.q, b.at}};
 }
 
 Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
@@ -63,26 +62,33 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
     ends->X_second.p = AtRestOn(*model, ends->first, ends->X_first, ends->second).p;
   }
   RequireTwoBodies(equality, *ends);
+  ends->X_first.q.setIdentity();
+  ends->X_second.q.setIdentity();
   AddLoopJoint(equality, JointType::kSpherical, *ends, model->draft);
 }
 
-/// Adds a weld. `relpose`: pose of the second body in the first, from the anchor on the second.
-void AddWeld(const MjcfElement& equality, MjcfModel* model) {
-  if (equality.Attribute("site1")) {
-    equality.own().Fail("a weld of sites", "a weld of bodies (body1, body2)");
-  }
-  Ends ends = EndsOnBodies(*model, equality);
-  RequireTwoBodies(equality, ends);
-  ends.X_first = AtRestOn(*model, ends.second, {}, ends.first);
+/// Returns the ends of a weld of bodies. `relpose`: pose of the second body in the first, from the
+/// anchor on the second.
+Ends EndsOfBodies(const MjcfElement& equality, const MjcfModel& model) {
+  Ends ends = EndsOnBodies(model, equality);
+  ends.X_first = AtRestOn(model, ends.second, {}, ends.first);
   if (const auto pose = equality.Attribute("relpose")) {
-    const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
+    const std::vector<double> p = model.draft->Numbers(*pose, "nnnq");
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
     // a zero quaternion selects the drawn poses
     if (q.norm() > 0.0) ends.X_first = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
   }
-  equality.Attribute("anchor");  // point of the weld; irrelevant, since a weld holds everywhere
-  equality.Attribute("torquescale");
-  AddLoopJoint(equality, JointType::kWeld, ends, model->draft);
+  return ends;
+}
+
+/// Adds a weld of two bodies, or of two sites, whose frames coincide.
+void AddWeld(const MjcfElement& equality, MjcfModel* model) {
+  auto ends = EndsAtSites(*model, equality);
+  if (!ends) ends = EndsOfBodies(equality, *model);
+  RequireTwoBodies(equality, *ends);
+  // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
+  for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
+  AddLoopJoint(equality, JointType::kWeld, *ends, model->draft);
 }
 
 /// Returns the constant coefficient of `polycoef`.
@@ -225,91 +231,30 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-/// Motion of a chain of joints at its coordinates, in drawn body axes.
-struct ChainMotion {
-  Placement X;                    ///< the product of their motions
-  Vector3d w = Vector3d::Zero();  ///< angular velocity
-  Vector3d v = Vector3d::Zero();  ///< velocity of the point `at` in the moved body
-};
-
-Placement MotionOf(const MjcfJoint& joint, const double* q) {
-  if (joint.kind == MjcfKind::kSlide) return Placement((q[0] - joint.reference) * joint.axis);
-  Placement X;
-  X.q = joint.kind == MjcfKind::kBall
-            ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
-            : Quaterniond(Eigen::AngleAxisd(q[0] - joint.reference, joint.axis));
-  X.p = joint.position - X.q * joint.position;
-  return X;
-}
-
-ChainMotion Move(const MjcfModel& model, const MjcfChain& chain, const double* q, const double* u) {
-  std::vector<Placement> before;
-  ChainMotion motion;
-  const double* position = q;
-  for (const std::size_t part : chain.parts) {
-    before.push_back(motion.X);
-    motion.X = motion.X * MotionOf(model.joints[part], position);
-    position += model.joints[part].num_q();
-  }
-  const Vector3d Mo = motion.X.At(chain.X_BJ.p);
-  for (std::size_t i = 0; i < chain.parts.size(); ++i) {
-    const MjcfJoint& joint = model.joints[chain.parts[i]];
-    const Placement& after = i + 1 < before.size() ? before[i + 1] : motion.X;
-    if (joint.kind == MjcfKind::kSlide) {
-      motion.v += before[i].q * joint.axis * u[0];
-    } else {
-      const Vector3d w = joint.kind == MjcfKind::kBall ? after.q * Vector3d(u[0], u[1], u[2])
-                                                       : before[i].q * joint.axis * u[0];
-      motion.w += w;
-      motion.v += w.cross(Mo - before[i].At(joint.position));
-    }
-    u += joint.num_u();
-  }
-  return motion;
-}
-
-/// Converts several joints to one: coordinates from their common pose, speeds from the velocity
-/// along the free directions, which contain it completely.
-void SetComposed(const MjcfModel& model, const MjcfChain& chain, JointType type, const double* q,
-                 const double* u, std::vector<double>* coordinates, std::vector<double>* speeds) {
-  const ChainMotion motion = Move(model, chain, q, u);
-  const JointKind<Spatial, double>& kind = KindOf<Spatial, double>(type);
-  Placement X_FM = chain.X_BJ.Inverse() * motion.X * chain.X_BJ;
-  Vector3d w = chain.X_BJ.q.conjugate() * motion.w, v = chain.X_BJ.q.conjugate() * motion.v;
-  if (chain.from_is_child) {
-    // reversed: velocity of the origin of the parent's frame, in axes of the child's frame
-    const Placement X_MF = X_FM.Inverse();
-    v = X_MF.q * Vector3d(-(v + w.cross(-X_FM.p)));
-    w = X_MF.q * Vector3d(-w);
-    X_FM = X_MF;
-  }
-  Pose<Spatial, double> pose;
-  pose.R = X_FM.q.toRotationMatrix();
-  pose.p = X_FM.p;
-  coordinates->resize(static_cast<std::size_t>(kind.num_q));
-  kind.coordinates(pose, coordinates->data(), 0.0);
-  speeds->resize(static_cast<std::size_t>(kind.num_u));
-  Basis<Spatial, double> basis;
-  if (kind.basis != nullptr) kind.basis(pose, basis, 0.0);
-  for (int i = 0; i < kind.num_u; ++i) {
-    double& speed = (*speeds)[i];
-    if (kind.basis != nullptr) {
-      const auto column = basis[i];
-      speed = 0.0;
-      for (int k = 0; k < 3; ++k) speed += column.angular[k] * w[k] + column.linear[k] * v[k];
-    } else {
-      const int axis = kind.axes[i];
-      speed = axis < 3 ? w[axis] : v[axis - 3];
-    }
-  }
-}
-
 void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const double* q) {
   for (const MjcfJoint& joint : model.joints) {
-    const double* turn = q + (joint.kind == MjcfKind::kFree ? 3 : 0);
+    const double* turn = q + (joint.kind == SerialKind::kFree ? 3 : 0);
     if (joint.num_q() > 1) UnitQuaternion(qpos, {turn[0], turn[1], turn[2], turn[3]});
     q += joint.num_q();
   }
+}
+
+/// Returns the coordinates in the drawn position: qpos0 of MuJoCo.
+std::vector<double> DrawnCoordinates(const MjcfModel& model) {
+  std::vector<double> qpos;
+  for (const MjcfChain& chain : model.chains) {
+    for (const std::size_t part : chain.parts) {
+      const MjcfJoint& joint = model.joints[part];
+      const Vector3d& p = chain.X_PB.p;
+      const Quaterniond& q = chain.X_PB.q;
+      if (joint.num_q() == 1) qpos.push_back(joint.reference);
+      if (joint.kind == SerialKind::kBall) qpos.insert(qpos.end(), {1.0, 0.0, 0.0, 0.0});
+      if (joint.kind == SerialKind::kFree) {
+        qpos.insert(qpos.end(), {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
+      }
+    }
+  }
+  return qpos;
 }
 
 /// Sets coordinates, and speeds if given, of the Loopbench joints from MuJoCo's.
@@ -323,7 +268,7 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
     const MjcfJoint& first = model->joints[chain.parts[0]];
     const JointDescription& ours = model->draft->description.joints[chain.joint];
     std::vector<double> coordinates, speeds;
-    if (first.alone && first.kind == MjcfKind::kFree) {
+    if (first.alone && first.kind == SerialKind::kFree) {
       // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
       const Vector3d w =
@@ -333,14 +278,18 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
       coordinates = {q[0] - first.reference};
       speeds = {u[0]};
     } else {
-      SetComposed(*model, chain, ours.type, q, u, &coordinates, &speeds);
+      std::vector<SerialJoint> series;
+      for (const std::size_t part : chain.parts) series.push_back(model->joints[part]);
+      SetComposed(series, chain.composed, q, u, &coordinates, &speeds);
     }
     if (!ours.motions.empty()) {
       // a start that contradicts an <equality>
       const double held = std::get<Polynomial>(ours.motions[0].value).coefficients[0];
       const std::string reason =
           fmt::format("of joint \"{}\" dropped: an <equality> holds it at {:.6g}", ours.name, held);
-      if (coordinates[0] != held) model->draft->Note(key, "qpos", reason, true);
+      if (key.Attribute("qpos") && coordinates[0] != held) {
+        model->draft->Note(key, "qpos", reason, true);
+      }
       if (speeds[0] != 0.0) model->draft->Note(key, "qvel", reason, true);
     } else {
       initial.coordinates.push_back({chain.joint, coordinates});
@@ -372,20 +321,18 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
   const std::vector<XmlElement> keys = root.InSections("keyframe", "key");
   std::optional<XmlValue> controls;
   if (!keys.empty()) {
-    std::vector<double> qpos, qvel;
+    std::vector<double> qpos = DrawnCoordinates(*model), qvel;
     for (const MjcfJoint& joint : model->joints) {
-      qpos.insert(qpos.end(), static_cast<std::size_t>(joint.num_q()), 0.0);
       qvel.insert(qvel.end(), static_cast<std::size_t>(joint.num_u()), 0.0);
     }
     const auto positions = keys[0].Attribute("qpos");
     const auto speeds = keys[0].Attribute("qvel");
-    if (speeds && !positions) keys[0].Fail("qvel without qpos", "both");
     if (speeds) qvel = speeds->Numbers(qvel.size(), qvel.size());
     if (positions) {
       qpos = positions->Numbers(qpos.size(), qpos.size());
       RefuseZeroQuaternions(*model, *positions, qpos.data());
-      SetMjcfStart(model, keys[0], qpos, qvel, speeds.has_value());
     }
+    if (positions || speeds) SetMjcfStart(model, keys[0], qpos, qvel, speeds.has_value());
     controls = keys[0].Attribute("ctrl");
     keys[0].Attribute("name");
     keys[0].Attribute("time");

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <deque>
+#include <set>
+#include <unordered_map>
 #include <unordered_set>
 
 #include "harness/text/files.h"
@@ -13,11 +16,45 @@
 
 namespace loopbench::harness {
 
-/// Parsed text; `read` contains elements and attributes.
+namespace {
+
+std::vector<const tinyxml2::XMLElement*> ChildrenIn(const tinyxml2::XMLElement& element) {
+  std::vector<const tinyxml2::XMLElement*> children;
+  for (const auto* child = element.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    children.push_back(child);
+  }
+  return children;
+}
+
+}  // namespace
+
+/// Parsed files; `read` contains elements and attributes.
 struct XmlDocument {
-  tinyxml2::XMLDocument xml;
-  std::string file;
+  struct File {
+    tinyxml2::XMLDocument xml;  ///< its user data points to `name`
+    std::string name;           ///< in messages
+  };
+  std::deque<File> files;  ///< the main file first
+  std::unordered_map<const tinyxml2::XMLElement*, const tinyxml2::XMLElement*>
+      included;  ///< the root element of the file in place of an <include>
   std::unordered_set<const void*> read;
+
+  const tinyxml2::XMLElement* root() const { return files.front().xml.RootElement(); }
+  /// Returns the children of an element, with those of included files.
+  std::vector<const tinyxml2::XMLElement*> ChildrenOf(const tinyxml2::XMLElement& element) const {
+    if (included.empty()) return ChildrenIn(element);
+    std::vector<const tinyxml2::XMLElement*> children;
+    for (const auto* child : ChildrenIn(element)) {
+      const auto found = included.find(child);
+      if (found == included.end()) {
+        children.push_back(child);
+      } else {
+        std::ranges::copy(ChildrenOf(*found->second), std::back_inserter(children));
+      }
+    }
+    return children;
+  }
 };
 
 namespace {
@@ -45,12 +82,12 @@ std::vector<std::string_view> Words(std::string_view text) {
   return words;
 }
 
-void RefuseDocumentTypes(const XmlDocument& document) {
+void RefuseDocumentTypes(const XmlDocument::File& document) {
   for (const auto* node = document.xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
     if (node->ToUnknown() == nullptr) continue;
     throw ConfigError(fmt::format(
         "{}:{}: found a document type or declaration of entities, expected none: they are not read",
-        document.file, node->GetLineNum()));
+        document.name, node->GetLineNum()));
   }
 }
 
@@ -79,15 +116,6 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
   }
 }
 
-std::vector<const tinyxml2::XMLElement*> ChildrenIn(const tinyxml2::XMLElement& element) {
-  std::vector<const tinyxml2::XMLElement*> children;
-  for (const auto* child = element.FirstChildElement(); child != nullptr;
-       child = child->NextSiblingElement()) {
-    children.push_back(child);
-  }
-  return children;
-}
-
 std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const tinyxml2::XMLElement& element) {
   std::vector<const tinyxml2::XMLAttribute*> attributes;
   for (const auto* one = element.FirstAttribute(); one != nullptr; one = one->Next()) {
@@ -96,11 +124,12 @@ std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const tinyxml2::XMLEleme
   return attributes;
 }
 
-const tinyxml2::XMLElement* FirstWithin(const tinyxml2::XMLElement& element,
+const tinyxml2::XMLElement* FirstWithin(const XmlDocument& document,
+                                        const tinyxml2::XMLElement& element,
                                         const std::vector<std::string_view>& tags) {
-  for (const auto* child : ChildrenIn(element)) {
+  for (const auto* child : document.ChildrenOf(element)) {
     if (std::ranges::find(tags, child->Name()) != tags.end()) return child;
-    if (const auto* within = FirstWithin(*child, tags)) return within;
+    if (const auto* within = FirstWithin(document, *child, tags)) return within;
   }
   return nullptr;
 }
@@ -165,6 +194,9 @@ XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XM
 
 std::string XmlElement::tag() const { return element_->Name(); }
 int XmlElement::line() const { return element_->GetLineNum(); }
+const std::string& XmlElement::file() const {
+  return *static_cast<const std::string*>(element_->GetDocument()->GetUserData());
+}
 
 std::string XmlElement::Shown() const {
   const char* name = element_->Attribute("name");
@@ -176,8 +208,8 @@ std::string XmlElement::Shown() const {
 void XmlElement::FailAt(const std::string& attribute, std::string_view found,
                         std::string_view expected) const {
   const std::string where = attribute.empty() ? "" : " " + Abbreviated(attribute);
-  throw ConfigError(Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", document_->file,
-                                          line(), Shown(), where, found, expected)));
+  throw ConfigError(Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", file(), line(),
+                                          Shown(), where, found, expected)));
 }
 
 void XmlElement::Fail(std::string_view found, std::string_view expected) const {
@@ -186,7 +218,7 @@ void XmlElement::Fail(std::string_view found, std::string_view expected) const {
 
 std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> children;
-  for (const auto* child : ChildrenIn(*element_)) {
+  for (const auto* child : document_->ChildrenOf(*element_)) {
     if (tags.empty() || std::ranges::find(tags, child->Name()) != tags.end()) {
       children.emplace_back(document_, child);
     }
@@ -209,7 +241,7 @@ std::vector<XmlElement> XmlElement::InSections(const char* section, const char* 
 }
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
-  const auto* found = FirstWithin(*element_, tags);
+  const auto* found = FirstWithin(*document_, *element_, tags);
   if (found == nullptr) return std::nullopt;
   return XmlElement(document_, found);
 }
@@ -266,35 +298,123 @@ void XmlElement::Ignore() const {
   for (const XmlElement& child : Children()) child.Ignore();
 }
 
-XmlFile::XmlFile(std::string_view text, const std::string& file)
-    : document_(std::make_shared<XmlDocument>()) {
+namespace {
+
+/// Adds a parsed file and returns its root element.
+const tinyxml2::XMLElement* Parse(std::string_view text, const std::string& file,
+                                  XmlDocument* document) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  document_->file = file;
+  XmlDocument::File& parsed = document->files.emplace_back();
+  parsed.name = file;
+  parsed.xml.SetUserData(&parsed.name);
   if (const std::string fault = EncodingFault(text); !fault.empty()) {
     throw ConfigError(file + ":" + fault);
   }
   RefuseManyAttributes(text, file);
-  const auto error = document_->xml.Parse(text.data(), text.size());
+  const auto error = parsed.xml.Parse(text.data(), text.size());
   if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
     throw ConfigError(
         fmt::format("{}:{}: found more than {} elements within each other, expected "
                     "fewer",
-                    file, document_->xml.ErrorLineNum(), TINYXML2_MAX_ELEMENT_DEPTH));
+                    file, parsed.xml.ErrorLineNum(), TINYXML2_MAX_ELEMENT_DEPTH));
   }
   if (error != tinyxml2::XML_SUCCESS) {
     throw ConfigError(fmt::format("{}:{}: found a fault of syntax ({}), expected well-formed XML",
-                                  file, std::max(1, document_->xml.ErrorLineNum()),
+                                  file, std::max(1, parsed.xml.ErrorLineNum()),
                                   tinyxml2::XMLDocument::ErrorIDToName(error)));
   }
-  RefuseDocumentTypes(*document_);
-  if (document_->xml.RootElement() == nullptr) {
+  RefuseDocumentTypes(parsed);
+  if (parsed.xml.RootElement() == nullptr) {
     throw ConfigError(file + ":1: found no element, expected <mujoco>, <robot> or <sdf>");
   }
+  return parsed.xml.RootElement();
 }
 
-XmlElement XmlFile::root() const { return XmlElement(document_, document_->xml.RootElement()); }
-const std::string& XmlFile::name() const { return document_->file; }
+namespace fs = std::filesystem;
+
+/// Resolves the <include> elements of MJCF.
+class Includer {
+ public:
+  Includer(const std::shared_ptr<XmlDocument>& document, const fs::path& main)
+      : document_(document), folder_(main.parent_path()), open_{CanonicalOf(main)} {
+    std::error_code error;
+    base_ = fs::canonical(folder_.empty() ? "." : folder_, error);
+    known_.insert(open_[0]);
+  }
+
+  void Resolve(const tinyxml2::XMLElement& element, const fs::path& folder) {
+    for (const auto* child : ChildrenIn(element)) {
+      if (std::string_view(child->Name()) == "include") {
+        Include(child, folder);
+      } else {
+        Resolve(*child, folder);
+      }
+    }
+  }
+
+ private:
+  static fs::path CanonicalOf(const fs::path& path) {
+    std::error_code error;
+    return fs::canonical(path, error);
+  }
+
+  /// Reads a file, named from the folder of the main file or of the file that contains `element`.
+  void Include(const tinyxml2::XMLElement* element, const fs::path& folder) {
+    constexpr std::size_t kMaxDepth = 16;
+    const XmlValue name =
+        XmlElement(document_, element).Required("file", "a file below the folder of the main file");
+    fs::path shown = folder_ / name.Name(), path = CanonicalOf(shown);
+    if (path.empty()) path = CanonicalOf(shown = folder / name.Name());
+    std::error_code error;
+    if (!path.empty() && !IsBelowBase(path)) {
+      name.Fail("a file below the folder of the main file");
+    }
+    if (path.empty() || !fs::is_regular_file(path, error)) {
+      name.Fail(fmt::format("a file that exists, from the folder {}", base_.string()));
+    }
+    if (const auto cycle = std::ranges::find(open_, path); cycle != open_.end()) {
+      std::string names;
+      for (auto at = cycle; at != open_.end(); ++at) names += at->filename().string() + " > ";
+      name.Fail(fmt::format("no cycle of files ({}{})", names, path.filename().string()));
+    }
+    if (!known_.insert(path).second) name.Fail("each file once");
+    if (open_.size() > kMaxDepth) name.Fail(fmt::format("at most {} nested files", kMaxDepth));
+    bytes_ += fs::file_size(path, error);
+    if (error || bytes_ > kMaxConfigBytes) {
+      name.Fail(fmt::format("files of at most {} MiB in all", kMaxConfigBytes >> 20));
+    }
+    const auto* root = Parse(ReadTextFile(path), shown.string(), document_.get());
+    document_->included.emplace(element, root);
+    open_.push_back(path);
+    Resolve(*root, shown.parent_path());
+    open_.pop_back();
+  }
+
+  bool IsBelowBase(const fs::path& path) const {
+    return std::ranges::mismatch(base_, path).in1 == base_.end();
+  }
+
+  std::shared_ptr<XmlDocument> document_;
+  fs::path folder_, base_;      ///< of the main file, as given and without links
+  std::vector<fs::path> open_;  ///< the files around the element, the main file first
+  std::set<fs::path> known_;
+  std::uintmax_t bytes_ = 0;
+};
+
+}  // namespace
+
+XmlFile::XmlFile(std::string_view text, const std::string& file)
+    : document_(std::make_shared<XmlDocument>()) {
+  Parse(text, file, document_.get());
+}
+
+void XmlFile::Include(const fs::path& main) {
+  Includer(document_, main).Resolve(*document_->root(), main.parent_path());
+}
+
+XmlElement XmlFile::root() const { return XmlElement(document_, document_->root()); }
+const std::string& XmlFile::name() const { return document_->files.front().name; }
 
 namespace {
 
@@ -310,14 +430,14 @@ void AddUnread(const std::shared_ptr<XmlDocument>& document, const tinyxml2::XML
     if (document->read.contains(one)) continue;
     parts->emplace_back(XmlElement(document, element), IsText(one->Name()) ? one->Name() : "?");
   }
-  for (const auto* child : ChildrenIn(*element)) AddUnread(document, child, parts);
+  for (const auto* child : document->ChildrenOf(*element)) AddUnread(document, child, parts);
 }
 
 }  // namespace
 
 Parts XmlFile::Unread() const {
   Parts parts;
-  AddUnread(document_, document_->xml.RootElement(), &parts);
+  AddUnread(document_, document_->root(), &parts);
   return parts;
 }
 

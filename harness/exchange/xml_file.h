@@ -5,9 +5,13 @@
 // ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...". Rejected files: larger
 // than kMaxConfigBytes, nested deeper than the parser's limit, invalid UTF-8, or with a document
 // type, the only place for entity declarations (no entity is expanded).
+//
+// A file may contain others (Include()): their elements are read in place of <include>, with their
+// own file names and lines in messages.
 #pragma once
 
 #include <Eigen/Core>
+#include <filesystem>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -33,6 +37,8 @@ class XmlElement {
 
   std::string tag() const;
   int line() const;
+  /// Returns the name of its file.
+  const std::string& file() const;
   /// Returns <tag name="...">, for messages and notes.
   std::string Shown() const;
 
@@ -126,6 +132,10 @@ class XmlFile {
  public:
   /// `file` is the name in messages.
   XmlFile(std::string_view text, const std::string& file);
+
+  /// Replaces all <include file="..."> by the children of the root elements of these files. Reads
+  /// only files below the folder of `main`, each once, and at most kMaxConfigBytes in all.
+  void Include(const std::filesystem::path& main);
 
   XmlElement root() const;
   const std::string& name() const;

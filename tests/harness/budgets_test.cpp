@@ -68,7 +68,7 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3668,  17,   6},  2700},
     {"harness/figures",         { 2970,  12,   7},  1900},
     {"harness/view",            { 2422,  10,   8},  2050},
-    {"harness/exchange",        { 6855,  29,  10},  5000},
+    {"harness/exchange",        { 7280,  30,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 1963,  10,   7},  1500},
     {"harness/cli",             { 8075,  25,  29},  3600},

@@ -245,5 +245,137 @@ TEST(ImportHostile, ManyThingsWithoutNamesHaveShortOnes) {
   EXPECT_EQ(names.size(), 3002u);
 }
 
+/// A folder "model" with the main file, beside a file that is not below it.
+class ImportIncludes : public testing::Test {
+ protected:
+  ImportIncludes() {
+    fs::remove_all(top_);
+    fs::create_directories(top_ / "model" / "parts");
+    fs::create_directories(top_ / "model-2");
+    for (const char* secret : {"secret.xml", "model-2/secret.xml"}) {
+      WriteFileAtomically(top_ / secret, "<x><worldbody/></x>");
+    }
+  }
+  ~ImportIncludes() override { fs::remove_all(top_); }
+
+  void Write(const std::string& name, const std::string& text) const {
+    WriteFileAtomically(top_ / "model" / name, text);
+  }
+  Imported Read() const { return ImportMechanism(top_ / "model" / "main.xml"); }
+  void ExpectMessage(const std::vector<std::string>& words) const {
+    std::string message;
+    try {
+      Read();
+    } catch (const ConfigError& error) {
+      message = error.what();
+    }
+    for (const std::string& word : words) {
+      EXPECT_NE(message.find(word), std::string::npos) << "no <" << word << "> in " << message;
+    }
+  }
+  /// Expects this message where the main file includes `name` in its second line.
+  void ExpectRefused(const std::string& name, const std::vector<std::string>& words) const {
+    Write("main.xml", "<mujoco>\n<include file=\"" + name + "\"/></mujoco>");
+    std::vector<std::string> all = words;
+    all.push_back("model/main.xml:2: <include> file: found \"" + name + "\", expected ");
+    ExpectMessage(all);
+  }
+
+  const fs::path top_ = fs::path(testing::TempDir()) / "loopbench-includes";
+};
+
+const std::string kBodyStart = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
+
+TEST_F(ImportIncludes, ElementsOfIncludedFilesStandInPlace) {
+  const auto main = [](const std::string& defaults, const std::string& arm) {
+    return "<mujoco model=\"m\">" + defaults + "<worldbody><body name=\"a\"><joint name=\"j\"/>" +
+           kBodyStart + arm + "<body name=\"z\"><joint/>" + kBodyStart +
+           "</body></body></worldbody></mujoco>";
+  };
+  const auto arm = [](const std::string& tip) {
+    return "<body name=\"b\"><joint name=\"k\"/>" + kBodyStart + tip + "</body><site name=\"s\"/>";
+  };
+  const std::string defaults = "<default><joint damping=\"2\" axis=\"0 1 0\"/></default>",
+                    tip =
+                        "<body name=\"c\" pos=\"1 0 0\"><joint/>\n" + kBodyStart + "<geom/></body>";
+  Write("main.xml", main("<include file=\"defaults.xml\"/>", "<include file=\"parts/arm.xml\"/>"));
+  Write("defaults.xml", "\xEF\xBB\xBF<mujocoinclude>" + defaults + "</mujocoinclude>");
+  Write("parts/arm.xml", "<mujoco>" + arm("<include file=\"tip.xml\"/>") + "</mujoco>");
+  Write("parts/tip.xml", "<x>" + tip + "</x>");  // beside the file that includes it
+  const Imported parts = Read(), whole = ImportText(main(defaults, arm(tip)), "file.xml");
+  EXPECT_EQ(MechanismText(parts.description, parts.observe),
+            MechanismText(whole.description, whole.observe));
+  EXPECT_EQ(parts.description.bodies.size(), 5u);
+  ASSERT_EQ(parts.notes.size(), 1u);
+  EXPECT_EQ(parts.notes[0].file, (top_ / "model" / "parts" / "tip.xml").string());
+  EXPECT_EQ(parts.notes[0].line, 2);
+  EXPECT_EQ(parts.notes[0].element, "<geom>");
+  // messages name the file and the line there
+  Write("parts/tip.xml", "<x>\n<body name=\"c\" pos=\"1 0\"/></x>");
+  ExpectMessage(
+      {"model/parts/tip.xml:2: <body name=\"c\"> pos: found \"1 0\", expected 3 numbers"});
+  Write("parts/tip.xml", "<x>\n<body></x>");
+  ExpectMessage({"model/parts/tip.xml:2: found a fault of syntax"});
+  // names from the folder of the main file come first
+  Write("tip.xml", "<x/>");
+  EXPECT_EQ(Read().description.bodies.size(), 4u);
+}
+
+TEST_F(ImportIncludes, FilesBelowTheFolderAreReadAndNoOthers) {
+  const std::string expected = "a file below the folder of the main file";
+  fs::create_symlink(top_ / "secret.xml", top_ / "model" / "link.xml");
+  fs::create_directory_symlink(top_, top_ / "model" / "up");
+  for (const std::string& name :
+       {std::string("../secret.xml"), std::string("../model-2/secret.xml"),
+        std::string("parts/../../secret.xml"), std::string("link.xml"),
+        std::string("up/secret.xml"), (top_ / "secret.xml").string(), std::string("/dev/zero"),
+        std::string("/etc/passwd")}) {
+    ExpectRefused(name, {expected});
+  }
+  for (const std::string& name : {std::string("none.xml"), std::string("parts"), std::string("."),
+                                  std::string("none/../main.xml"), std::string(5000, 'a')}) {
+    Write("main.xml", "<mujoco>\n<include file=\"" + name + "\"/></mujoco>");
+    ExpectMessage({"model/main.xml:2: <include> file: found ", "a file that exists"});
+  }
+  ExpectRefused("", {"a name that is not empty"});
+  Write("main.xml", "<mujoco>\n<include/></mujoco>");
+  ExpectMessage({"model/main.xml:2: <include>: found no \"file\"", expected});
+  // a way out and back, and a link within the folder, stay below it
+  Write("world.xml", "<x><worldbody><body><joint/>" + kBodyStart + "</body></worldbody></x>");
+  fs::create_symlink("world.xml", top_ / "model" / "near.xml");
+  for (const char* name : {"../model/world.xml", "near.xml", "parts/../world.xml"}) {
+    Write("main.xml", "<mujoco><include file=\"" + std::string(name) + "\"/></mujoco>");
+    EXPECT_EQ(Read().description.bodies.size(), 2u);
+  }
+}
+
+TEST_F(ImportIncludes, CyclesBombsAndHugeFilesAreRefused) {
+  const auto include = [](const std::string& name, int times = 1) {
+    return "<x>" + Repeated("\n<include file=\"" + name + "\"/>", times) + "</x>";
+  };
+  ExpectRefused("main.xml", {"no cycle of files (main.xml > main.xml)"});
+  Write("a.xml", include("parts/b.xml"));
+  Write("parts/b.xml", include("main.xml"));
+  Write("main.xml", "<mujoco><include file=\"a.xml\"/></mujoco>");
+  ExpectMessage({"model/parts/b.xml:2: <include> file: found \"main.xml\"",
+                 "no cycle of files (main.xml > a.xml > b.xml > main.xml)"});
+  // each file twice in the one before
+  for (int i = 0; i < 12; ++i) {
+    Write("bomb" + std::to_string(i) + ".xml", include("bomb" + std::to_string(i + 1) + ".xml", 2));
+  }
+  Write("bomb12.xml", "<x/>");
+  Write("main.xml", "<mujoco><include file=\"bomb0.xml\"/></mujoco>");
+  ExpectMessage({"model/bomb11.xml:3: <include> file: found \"bomb12.xml\"", "each file once"});
+  for (int i = 0; i < 17; ++i) {
+    Write("deep" + std::to_string(i) + ".xml", include("deep" + std::to_string(i + 1) + ".xml"));
+  }
+  Write("main.xml", "<mujoco><include file=\"deep0.xml\"/></mujoco>");
+  ExpectMessage({"model/deep15.xml:2: <include> file: found \"deep16.xml\"", "at most 16 nested"});
+  Write("half.xml", "<x>" + std::string(kMaxConfigBytes / 2, ' ') + "</x>");
+  Write("half2.xml", "<x>" + std::string(kMaxConfigBytes / 2, ' ') + "</x>");
+  Write("main.xml", "<mujoco><include file=\"half.xml\"/>\n<include file=\"half2.xml\"/></mujoco>");
+  ExpectMessage({"model/main.xml:2: <include> file: found \"half2.xml\"", "16 MiB in all"});
+}
+
 }  // namespace import_hostile_test
 }  // namespace loopbench::harness

@@ -39,6 +39,38 @@ TEST(ImportMjcf, EqualitiesCloseLoopsWhereTheFileDrawsThem) {
   EXPECT_EQ(off.description.joints.size(), 2u);
 }
 
+TEST(ImportMjcf, WeldsOfSitesMakeTheirFramesCoincide) {
+  const auto model = [](const std::string& equality) {
+    return "<mujoco><worldbody><site name=\"s0\" pos=\"0 0 3\"/><body name=\"a\" pos=\"1 0 "
+           "0\"><joint/>" +
+           std::string(kInertial) +
+           "<frame pos=\"0 1 0\" euler=\"0 0 90\"><site name=\"s1\" pos=\"1 0 0\"/></frame></body>"
+           "<body name=\"b\"><joint/>" +
+           kInertial + "<site name=\"s2\" euler=\"90 0 0\"/></body></worldbody><equality>\n" +
+           equality + "</equality></mujoco>";
+  };
+  const Imported weld =
+      ImportText(model("<weld name=\"w\" site1=\"s1\" site2=\"s2\"/>"), "file.xml");
+  const JointDescription& joint = weld.description.joints.back();
+  EXPECT_EQ(joint.type, JointType::kWeld);
+  EXPECT_TRUE(joint.cut);
+  EXPECT_EQ(joint.name, "w");
+  EXPECT_EQ(joint.from.body, 1);
+  EXPECT_EQ(joint.to.body, 2);
+  EXPECT_LE((joint.from.position - Eigen::Vector3d(0, 2, 0)).norm(), kEps);
+  EXPECT_LE((joint.from.rotation - Eigen::Vector3d(0, 0, kPi / 2)).norm(), kEps);
+  EXPECT_TRUE(joint.to.position.isZero(0.0));
+  EXPECT_LE((joint.to.rotation - Eigen::Vector3d(kPi / 2, 0, 0)).norm(), kEps);
+  ExpectNote(weld, "<weld name=\"w\">", "imposed exactly");
+  // a connect holds the points alone
+  const Imported connect = ImportText(model("<connect site1=\"s1\" site2=\"s2\"/>"), "file.xml");
+  EXPECT_TRUE(connect.description.joints.back().to.rotation.isZero(0.0));
+  const std::string place = "file.xml:2: <weld>";
+  ExpectRefusal(model("<weld site1=\"s1\"/>"), {place + ": found no \"site2\""});
+  ExpectRefusal(model("<weld site1=\"s1\" site2=\"s1\"/>"), {place + ": found one body twice"});
+  ExpectRefusal(model("<weld site1=\"s1\" site2=\"x\"/>"), {place + " site2: found \"x\""});
+}
+
 TEST(ImportMjcf, TendonsBetweenTwoSitesAreSpringsOrRods) {
   const std::string sites = "<site site=\"s1\"/><site site=\"s2\"/>";
   const Imported spring =

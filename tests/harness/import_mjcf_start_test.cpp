@@ -52,6 +52,38 @@ TEST(ImportMjcf, KeysBecomeTheStartOfJointsOfOurs) {
   EXPECT_NEAR(universal.speeds[0].values[1], 3.0, 10 * kEps);
 }
 
+/// MuJoCo's default of qpos is qpos0, the drawn position.
+TEST(ImportMjcf, KeysOfSpeedsAloneStartWhereTheFileDrawsTheModel) {
+  const auto same = [](const std::string& joints, const std::string& drawn,
+                       const std::string& speeds, const std::string& attributes = "") {
+    const auto start = [&](const std::string& key) {
+      return Read(joints, "", "<keyframe><key " + key + "/></keyframe>", attributes)
+          .description.initial;
+    };
+    const auto alone = start("qvel=\"" + speeds + "\""),
+               both = start("qpos=\"" + drawn + "\" qvel=\"" + speeds + "\"");
+    ASSERT_EQ(alone.coordinates.size(), 1u);
+    ASSERT_EQ(alone.speeds.size(), 1u);
+    EXPECT_EQ(alone.coordinates[0].values, both.coordinates[0].values) << joints;
+    EXPECT_EQ(alone.speeds[0].values, both.speeds[0].values) << joints;
+  };
+  same("<joint type=\"slide\" ref=\"0.25\"/>", "0.25", "3");
+  same("<joint type=\"ball\"/>", "1 0 0 0", "1 2 3");
+  same("<freejoint/>", "1 2 3 0 1 0 0", "4 5 6 7 8 9", "pos=\"1 2 3\" quat=\"0 1 0 0\"");
+  same("<joint axis=\"1 0 0\" ref=\"90\"/><joint axis=\"0 1 0\"/>", "1.5707963267948966 0", "2 3");
+  const auto hinge = Start("<joint ref=\"0.25\"/>", "qvel=\"1.5\"");
+  EXPECT_EQ(hinge.coordinates[0].values[0], 0.0);
+  EXPECT_EQ(hinge.speeds[0].values[0], 1.5);
+  ExpectRefusal(Model("<joint/>", "", "\n<keyframe><key qvel=\"1 2\"/></keyframe>"),
+                {"file.xml:2: <key> qvel: found \"1 2\"", "1 number"});
+  // an <equality> holds the joint: only the speed contradicts it
+  const Imported held =
+      Two("<equality><joint joint1=\"j\" polycoef=\"0.5 0 0 0 0\"/></equality>"
+          "<keyframe><key qvel=\"3 4\"/></keyframe>");
+  EXPECT_FALSE(HasNote(held, "<key> qpos", ""));
+  ExpectNote(held, "<key> qvel", "\"j\" dropped");
+}
+
 TEST(ImportMjcf, JointsThatAnEqualityHoldsStartWhereItHoldsThem) {
   const std::string held = "<equality><joint joint1=\"j\" polycoef=\"0.5 0 0 0 0\"/></equality>";
   const Imported away = Two(held + "<keyframe><key qpos=\"1 2\" qvel=\"3 4\"/></keyframe>");

@@ -1,0 +1,229 @@
+// Joints in series through links without mass: the joint that they form, its frames and its start.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "harness/text/files.h"
+#include "tests/harness/import_texts.h"
+
+namespace loopbench::harness {
+namespace import_chain_test {
+
+using Eigen::AngleAxisd;
+using Eigen::Vector3d;
+
+constexpr double kEps = 1e-15;  // some units of rounding for lengths and angles of order one
+
+const std::string kRodMass =
+    "<inertial><mass value=\"2\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial>";
+
+/// A joint of URDF: type, origin, axis, and other contents.
+struct Step {
+  std::string name, type, xyz, axis, inside = "";
+};
+
+/// A robot whose joints lead in series from the world through links without mass to "rod".
+std::string Series(const std::vector<Step>& steps, const std::string& last = kRodMass) {
+  std::string text = "<robot name=\"r\"><link name=\"world\"/>\n";
+  std::string from = "world";
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const Step& step = steps[i];
+    const bool is_last = i + 1 == steps.size();
+    const std::string to = is_last ? "rod" : "cross_" + std::to_string(i + 1);
+    text += "<link name=\"" + to + "\">" + (is_last ? last : "") + "</link>\n<joint name=\"" +
+            step.name + "\" type=\"" + step.type + "\"><parent link=\"" + from +
+            "\"/><child link=\"" + to + "\"/><origin xyz=\"" + step.xyz + "\"/><axis xyz=\"" +
+            step.axis + "\"/>" + step.inside + "</joint>\n";
+    from = to;
+  }
+  return text + "</robot>";
+}
+
+/// A body of MuJoCo at a place, with several joints.
+Imported Mujoco(const std::string& pos, const std::string& joints) {
+  return ImportText("<mujoco><worldbody><body name=\"rod\" pos=\"" + pos +
+                        "\"><inertial pos=\"0 0 0\" mass=\"2\" diaginertia=\"1 1 1\"/>" + joints +
+                        "</body></worldbody></mujoco>",
+                    "file.xml");
+}
+
+/// Imports with a sidecar of this text.
+Imported WithSidecar(const std::string& text, const std::string& json) {
+  ImportOptions options;
+  options.sidecar = std::filesystem::path(testing::TempDir()) / "loopbench-chain.json";
+  WriteFileAtomically(options.sidecar, json);
+  return ImportText(text, "file.xml", options);
+}
+
+std::string MessageOf(const std::string& text, const std::string& json) {
+  try {
+    WithSidecar(text, json);
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+const Step kX = {"rx", "continuous", "0 0 2", "1 0 0"}, kY = {"ry", "continuous", "0 0 0", "0 1 0"},
+           kZ = {"rz", "continuous", "0 0 -0.25", "0 0 1"};
+
+TEST(ImportChain, SeriesFormTheJointOfAnEqualBodyOfMujoco) {
+  const Step slide_x = {"x", "prismatic", "0 0 2", "1 0 0"},
+             slide_y = {"y", "prismatic", "0 0 0", "0 1 0"},
+             slide_z = {"z", "prismatic", "0 0 0", "0 0 1"};
+  struct Case {
+    std::vector<Step> steps;
+    std::string type, pos, joints;
+  };
+  const Case cases[] = {
+      {{kX, kY, kZ},
+       "spherical",
+       "0 0 1.75",
+       "<joint axis=\"1 0 0\" pos=\"0 0 0.25\"/><joint axis=\"0 1 0\" pos=\"0 0 0.25\"/>"
+       "<joint axis=\"0 0 1\"/>"},
+      {{kX, kY}, "universal", "0 0 2", "<joint axis=\"1 0 0\"/><joint axis=\"0 1 0\"/>"},
+      {{slide_x, kX},
+       "cylindrical",
+       "0 0 4",
+       "<joint type=\"slide\" axis=\"1 0 0\"/><joint axis=\"1 0 0\"/>"},
+      {{kX, slide_y},
+       "pin-in-slot",
+       "0 0 2",
+       "<joint axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/>"},
+      {{slide_x, slide_y, kZ},
+       "planar",
+       "0 0 1.75",
+       "<joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/><joint "
+       "axis=\"0 0 1\"/>"},
+      {{slide_x, slide_y, slide_z, kY, kX, kZ}, "", "", ""},
+      {{slide_x, slide_y, slide_z, kY, {"rx", "continuous", "0 0 0", "1 0 0"}, kZ},
+       "free",
+       "0 0 1.75",
+       "<joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/><joint "
+       "type=\"slide\" axis=\"0 0 1\"/><joint axis=\"0 1 0\" pos=\"0 0 0.25\"/><joint "
+       "axis=\"1 0 0\" pos=\"0 0 0.25\"/><joint axis=\"0 0 1\"/>"}};
+  for (const Case& one : cases) {
+    const std::string text = Series(one.steps);
+    if (one.type.empty()) {  // the axes of the hinges do not meet
+      EXPECT_NE(Refusal(text), "");
+      continue;
+    }
+    const Imported chain = ImportText(text, "file.xml"), body = Mujoco(one.pos, one.joints);
+    ASSERT_EQ(chain.description.bodies.size(), 2u);
+    ASSERT_EQ(chain.description.joints.size(), 1u);
+    const JointDescription &is = chain.description.joints[0], &of = body.description.joints[0];
+    EXPECT_EQ(ToString(is.type), one.type);
+    EXPECT_EQ(is.type, of.type);
+    for (const auto& side : {&JointDescription::from, &JointDescription::to}) {
+      EXPECT_EQ((is.*side).body, (of.*side).body) << one.type;
+      EXPECT_LE(((is.*side).position - (of.*side).position).norm(), kEps) << one.type;
+      EXPECT_LE(((is.*side).rotation - (of.*side).rotation).norm(), kEps) << one.type;
+    }
+    EXPECT_EQ(is.axis, of.axis);
+    ExpectNote(chain, "<link name=\"rod\">",
+               "through links without mass are one here: " + one.type);
+  }
+  // the point where the axes meet, by hand
+  const Imported ball = ImportText(Series({kX, kY, kZ}), "file.xml");
+  const JointDescription& joint = ball.description.joints[0];
+  EXPECT_EQ(joint.name, "rx+ry+rz");
+  EXPECT_LE((joint.from.position - Vector3d(0, 0, 2)).norm(), kEps);
+  EXPECT_LE((joint.to.position - Vector3d(0, 0, 0.25)).norm(), kEps);
+}
+
+TEST(ImportChain, TheStartIsThatOfTheJointsInSeries) {
+  const std::string ball = Series({kX, kY, kZ});
+  const InitialDescription start =
+      WithSidecar(ball, R"({"initial": {"coordinates": {"rx": 0.3, "ry": 0.4, "rz": 0.5},
+                             "speeds": {"rx": 1, "ry": 2, "rz": 3}, "fixed": ["rx", "ry", "rz"]}})")
+          .description.initial;
+  const Eigen::Quaterniond x(AngleAxisd(0.3, Vector3d::UnitX())),
+      y(AngleAxisd(0.4, Vector3d::UnitY())), z(AngleAxisd(0.5, Vector3d::UnitZ())), q = x * y * z;
+  ASSERT_EQ(start.coordinates.size(), 1u);
+  const std::vector<double>& given = start.coordinates[0].values;
+  EXPECT_LE((Eigen::Vector4d(given.data()) - Eigen::Vector4d(q.w(), q.x(), q.y(), q.z())).norm(),
+            kEps);
+  ASSERT_EQ(start.speeds.size(), 1u);
+  const Vector3d w =
+      1.0 * Vector3d::UnitX() + 2.0 * (x * Vector3d::UnitY()) + 3.0 * (x * y * Vector3d::UnitZ());
+  EXPECT_LE((Vector3d(start.speeds[0].values.data()) - w).norm(), 10 * kEps);
+  EXPECT_EQ(start.held, std::vector<int>{0});
+  // coordinates are guesses, 0 where none is given
+  const auto part = WithSidecar(ball, R"({"initial": {"coordinates": {"ry": 0.4}}})");
+  EXPECT_NEAR(part.description.initial.coordinates[0].values[2], std::sin(0.2), kEps);
+  EXPECT_TRUE(part.description.initial.speeds.empty());
+  for (const char* some : {R"("speeds": {"ry": 1})", R"("fixed": ["ry"])"}) {
+    const std::string message =
+        MessageOf(ball, R"({"initial": {"coordinates": {"ry": 0.4}, )" + std::string(some) + "}}");
+    EXPECT_NE(message.find("of 1 of the joints rx+ry+rz, which are one here"), std::string::npos)
+        << message;
+  }
+  const auto planar = WithSidecar(Series({{"x", "prismatic", "0 0 0", "1 0 0"},
+                                          {"y", "prismatic", "0 0 0", "0 1 0"},
+                                          {"yaw", "continuous", "0 0 0", "0 0 1"}}),
+                                  R"({"initial": {"coordinates": {"x": 1, "y": 2, "yaw": 0.5}}})");
+  const std::vector<double>& p = planar.description.initial.coordinates[0].values;
+  EXPECT_NEAR(p[0], 0.5, kEps);
+  EXPECT_NEAR(p[1], 1.0, kEps);
+  EXPECT_NEAR(p[2], 2.0, kEps);
+}
+
+/// The cross of a universal joint as the child of both joints: the second one leads back.
+TEST(ImportChain, JointsThatLeadBackTurnTheOtherWay) {
+  const auto link = [](const char* name, const char* mass) {
+    return "<link name=\"" + std::string(name) + "\"><inertial><mass>" + mass +
+           "</mass><inertia><ixx>" + mass + "</ixx><iyy>" + mass + "</iyy><izz>" + mass +
+           "</izz></inertia></inertial></link>";
+  };
+  const auto joint = [](const char* name, const char* parent, const char* axis, const char* start) {
+    return "<joint name=\"" + std::string(name) + "\" type=\"revolute\"><parent>" + parent +
+           "</parent><child>cross</child><axis><xyz>" + axis + "</xyz><initial_position>" + start +
+           "</initial_position></axis></joint>";
+  };
+  const Imported imported =
+      ImportText("<sdf version=\"1.9\"><model name=\"m\">" + link("cross", "0") + link("rod", "1") +
+                     joint("a", "world", "1 0 0", "0.5") + joint("b", "rod", "0 1 0", "0.25") +
+                     "</model></sdf>",
+                 "file.sdf");
+  ASSERT_EQ(imported.description.joints.size(), 1u);
+  EXPECT_EQ(imported.description.joints[0].type, JointType::kUniversal);
+  EXPECT_EQ(imported.description.bodies[1].name, "rod");
+  // the cross turns by 0.25 about y of the rod, hence the rod by -0.25 about y of the cross
+  const std::vector<double>& angles = imported.description.initial.coordinates[0].values;
+  const Eigen::Matrix3d F = PoseOf(imported.description.joints[0].from).R;
+  EXPECT_NEAR(angles[0] * F(0, 0), 0.5, kEps);
+  EXPECT_NEAR(angles[1] * F(1, 1), -0.25, kEps);
+}
+
+TEST(ImportChain, ForcesOfJointsInSeriesAreDroppedWithANote) {
+  Step damped = kY;
+  damped.inside = "<dynamics damping=\"0.5\"/>";
+  const Imported imported = ImportText(Series({kX, damped, kZ}), "file.xml");
+  EXPECT_TRUE(imported.description.forces.empty());
+  ExpectNote(imported, "<link name=\"rod\">", "joint_damper of joint \"ry\" dropped: only joints");
+}
+
+TEST(ImportChain, OtherLinksWithoutMassAreRefused) {
+  const std::string found = "found a body without mass that moves";
+  // a leaf, parallel axes, axes that miss each other, four hinges, a floating joint
+  ExpectRefusal(Series({kX, kY}, ""), {"<link name=\"cross_1\">: " + found});
+  ExpectRefusal(Series({kX}, ""), {"<link name=\"rod\">: " + found});
+  ExpectRefusal(Series({kX, {"again", "continuous", "0 0 0", "1 0 0"}}),
+                {"file.xml:2: <link name=\"cross_1\">: " + found,
+                 "between joints (revolute, revolute)", "axes of a universal"});
+  ExpectRefusal(Series({kX, {"ry", "continuous", "0 0 0.04", "0 1 0"}}), {found});
+  ExpectRefusal(Series({kX, kY, kZ, {"again", "continuous", "0 0 0", "1 0 0"}}),
+                {"between joints (revolute, revolute, revolute, revo"});
+  ExpectRefusal(Series({{"f", "floating", "0 0 0", "1 0 0"}, kX}), {"joints (free, revolute)"});
+  // a link that a force or a third joint needs
+  for (
+      const char* use :
+      {R"("loops": [{"name": "l", "type": "spherical", "from": "cross_1", "to": "ground", "at": [0, 0, 0]}])",
+       R"("forces": [{"type": "point_force", "body": "cross_1", "force": [1, 0, 0]}])"}) {
+    const std::string message = MessageOf(Series({kX, kY}), "{" + std::string(use) + "}");
+    EXPECT_NE(message.find("<link name=\"cross_1\">: " + found), std::string::npos) << message;
+  }
+}
+
+}  // namespace import_chain_test
+}  // namespace loopbench::harness

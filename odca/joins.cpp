@@ -176,7 +176,7 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
 
 /// Rows of C on one body. D at Mo becomes c at the centre of mass, so that c^T A is the D^T A of
 /// the paper's handles, which removes udot (12, 37-38, 57-58). That c_P and c_Q have opposite signs
-/// is Newton's third law (51-52). Rows of one joint after those of another make the block-diagonal
+/// is Newton's third law (51-52). Rows of one joint after rows of another make the block-diagonal
 /// D (69).
 template <class Space, class S>
 template <class Rows>
@@ -342,7 +342,7 @@ template <class Rows, class Width, class Numbers>
 }
 
 /// Y = C Z on every handle, and X = Y C^T, both triangles. At a handle with the rows of a joint,
-/// the rows of C are those of the identity. Y is the paper's D^T zeta (67) except for the sign of
+/// the rows of C are rows of the identity. Y is the paper's D^T zeta (67) except for the sign of
 /// c_P. X is D^T [zeta + zeta] D of a series join (16), the left side of (15). It is chi at the
 /// closing of base and terminal joint (42), with the block rows (40) and (41). In a coupled loop it
 /// has the block rows (61) and (63); the paper writes X for its inverse (66).

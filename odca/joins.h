@@ -79,7 +79,7 @@ template <class Space, class Width>
 bool IsBody(const Handle& handle, Width) {
   return kIsKnown<Width> ? kKnownSize<Width> == Space::kDim : handle.is_body();
 }
-/// Calls `call` with the numbers of a handle, given those of each handle of its node.
+/// Calls `call` with the numbers of a handle; `width`: the numbers of each handle of its node.
 template <class Space, class Width, class Call>
 [[gnu::always_inline]] inline auto WithWidth(const Handle& handle, Width width, const Call& call) {
   if constexpr (kIsKnown<Width>) {
@@ -99,7 +99,7 @@ template <class Size, class Call>
     for (int i = 0; i < n; ++i) call(i);
   }
 }
-/// Returns the numbers of a block, a constant if those of both of its sides are.
+/// Returns the numbers of a block, a constant if both of its sides are constants.
 template <class Rows, class Columns>
 auto Product(Rows rows, Columns columns) {
   if constexpr (kIsKnown<Rows> && kIsKnown<Columns>) {
@@ -177,7 +177,7 @@ class Joins {
  private:
   /// Storage of a node's numbers.
   struct Place {
-    /// First number of Z, `size` x `size`, both triangles, in blocks of handles: that of e and f
+    /// First number of Z, `size` x `size`, both triangles, in blocks of handles: block (e, f)
     /// at size * f.place + f.width * e.place, by columns.
     int z = 0;
     int size = 0;   ///< of the boundary

@@ -237,7 +237,7 @@ class Planner {
   std::vector<Draft> drafts_;
 };
 
-/// Multiply-adds of a join of `rows` rows that keeps so many numbers, without those of JointWork().
+/// Multiply-adds of a join of `rows` rows that keeps so many numbers, without JointWork().
 long JoinWork(long rows, long kept) {
   long sum = rows * rows * rows / 6 + rows;   // factor of X
   sum += rows * (rows + 1) / 2 * kept;        // V

@@ -143,7 +143,7 @@ bool Matches(const EnsembleRule& rule, const Case& one) {
 namespace {
 
 /// Returns cases without ensembles. `horizon`: the only one of each problem (0: its shortest);
-/// nothing for all. `integrator`: the only one; "" for those of each method.
+/// nothing for all. `integrator`: the only one; "": the integrators of each method.
 std::vector<Case> ExpandRuns(const Experiment& experiment, const std::vector<Method>& methods,
                              const std::vector<StepChoice>& choices,
                              std::optional<double> horizon = std::nullopt,

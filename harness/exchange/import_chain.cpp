@@ -340,7 +340,7 @@ std::vector<double> TakeValues(const MasslessChain& chain, std::vector<JointValu
 
 }  // namespace
 
-/// Puts one joint in the place of the first of a chain; the others hold nothing any more.
+/// Replaces the first joint of a chain by the joint that the chain forms; the others become welds.
 void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed) {
   const XmlElement& element = elements_[chain.child];
   std::vector<std::string> names;

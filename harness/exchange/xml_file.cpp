@@ -41,7 +41,7 @@ struct XmlDocument {
   std::unordered_set<const void*> read;
 
   const tinyxml2::XMLElement* root() const { return files.front().xml.RootElement(); }
-  /// Returns the children of an element, with those of included files.
+  /// Returns the children of an element, including children from included files.
   std::vector<const tinyxml2::XMLElement*> ChildrenOf(const tinyxml2::XMLElement& element) const {
     if (included.empty()) return ChildrenIn(element);
     std::vector<const tinyxml2::XMLElement*> children;

@@ -28,7 +28,7 @@ const std::vector<PlanOptions> kAllOptions = {{Grounding::kEager, Closing::kToge
                                               {Grounding::kAtRoot, Closing::kTogether},
                                               {Grounding::kAtRoot, Closing::kOneByOne}};
 
-/// The same with the cheapest numbers on each boundary.
+/// All options, with bodies and with the cheapest basis on each boundary.
 std::vector<PlanOptions> OptionsOfBothBases() {
   std::vector<PlanOptions> all = kAllOptions;
   for (PlanOptions options : kAllOptions) {

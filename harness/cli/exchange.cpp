@@ -225,6 +225,8 @@ void AddImport(Commands& commands) {
        {"--floating", "Free root link instead of a fixed one (URDF)", &options.floats},
        {"--keep-digits", "Keep rounded angles and directions (1.5708) as written",
         &options.keeps_digits},
+       {"--balance-inertia", "Replace moments of inertia that no body has by their mean",
+        &options.balances_inertia},
        {"--gravity", "Gravity x,y,z [m/s^2] instead of the file's", &gravity},
        {"--json", "One JSON document instead (docs/exchange.md has its keys)", &command.json},
        CpuOption(&command.limits),

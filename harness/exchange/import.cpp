@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <tuple>
 
 #include "harness/config/mechanism_sections.h"
@@ -23,10 +24,10 @@ const std::vector<std::string>& ImportFormats() {
 
 namespace {
 
-/// Reads a text. `path`: its file, beside which it may include others; nothing without one.
+/// Reads a text. `path`: its file, beside which others may be; nothing without one.
 Imported Import(std::string_view text, const std::string& file,
                 const std::optional<std::filesystem::path>& path, const ImportOptions& options) {
-  XmlFile xml(text, file);
+  XmlFile xml(text, file, path);
   const XmlElement root = xml.root();
   const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
                                                : tag == "robot" ? "urdf"
@@ -41,7 +42,7 @@ Imported Import(std::string_view text, const std::string& file,
   }
   ImportDraft draft(xml, options);
   draft.description.name = std::filesystem::path(file).stem().string();
-  if (format == "mjcf" && path) xml.Include(*path);
+  if (format == "mjcf") xml.Include();
   if (format == "mjcf") ReadMjcf(root, &draft);
   if (format == "urdf") ReadUrdf(root, options, &draft);
   if (format == "sdf") ReadSdf(root, &draft);
@@ -85,7 +86,10 @@ MassFault MassFaultOf(const BodyDescription& body) {
                   moments[0], moments[1], moments[2]);
   if (!(moments[0] > kRoundOff * moments[2])) return {shown, "three that are > 0"};
   if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
-    return {shown, "none larger than the sum of the other two, as no body's is"};
+    return {
+        shown,
+        "none larger than the sum of the other two, as no body's is (--balance-inertia replaces "
+        "them by their mean)"};
   }
   return {};
 }
@@ -136,12 +140,12 @@ std::function<Cluster(int)> ClusterFinder(const MechanismDescription& d,
 
 }  // namespace
 
-void ImportDraft::CheckUnreadMasses() const {
-  if (without_mass_.empty()) return;
+void ImportDraft::ReadLateMasses() const {
+  if (late_masses_.empty()) return;
   const std::vector<bool> sound(description.bodies.size(), true);
   const Cluster fixed = ClusterFinder(description, sound, true)(kGround);
-  for (const auto& [body, value] : without_mass_) {
-    if (!fixed.poses.contains(body)) value.Fail("false: masses are not found from shapes");
+  for (const auto& [body, read] : late_masses_) {
+    if (!fixed.poses.contains(body)) read();
   }
 }
 
@@ -197,8 +201,54 @@ void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
   at_rest.resize(description.bodies.size());
 }
 
-void ImportDraft::CheckMasses() const {
+void ImportDraft::FixMasslessEnds() {
+  for (bool found = true; found;) {
+    found = false;
+    std::set<int> loaded;
+    for (ForceDescription force : description.forces) {
+      for (const BodyPoint* point : PartsOf(force).points) loaded.insert(point->body);
+    }
+    std::vector<std::vector<int>> joints(description.bodies.size());
+    for (int j = 0; j <= last_joint(); ++j) {
+      for (const auto& side : {description.joints[j].from, description.joints[j].to}) {
+        joints[side.body].push_back(j);
+      }
+    }
+    std::vector<Attachment> attachments(description.bodies.size());
+    for (std::size_t i = 1; i < joints.size(); ++i) {
+      const int body = static_cast<int>(i);
+      const bool has_mass =
+          description.bodies[i].mass > 0.0 || !description.bodies[i].inertia.isZero(0.0);
+      if (has_mass || loaded.contains(body) || joints[i].size() != 1) continue;
+      const JointDescription& joint = description.joints[joints[i][0]];
+      const int carrier = joint.from.body == body ? joint.to.body : joint.from.body;
+      if (carrier == kGround || attachments[carrier].attached) continue;
+      attachments[i] = {.carrier = carrier,
+                        .X = (at_rest[carrier].Inverse() * at_rest[i]).AsFrame(),
+                        .attached = true};
+      Note(elements_[i], "without mass at the end of a chain: fixed where it is drawn");
+      found = true;
+    }
+    if (found) Attach(attachments);
+  }
+}
+
+bool Balance(Eigen::Matrix3d* inertia) {
+  const Eigen::Vector3d moments = SymmetricEigenvalues(*inertia);
+  if (!(moments[0] + moments[1] < moments[2])) return false;
+  *inertia = moments.mean() * Eigen::Matrix3d::Identity();
+  return true;
+}
+
+void ImportDraft::CheckMasses() {
   for (std::size_t i = 1; i < description.bodies.size(); ++i) {
+    BodyDescription& body = description.bodies[i];
+    if (options_.balances_inertia && Balance(&body.inertia)) {
+      Note(elements_[i],
+           fmt::format("no body has such moments of inertia: their mean, {:.4g} kg m^2",
+                       body.inertia(0, 0)),
+           true);
+    }
     const MassFault fault = MassFaultOf(description.bodies[i]);
     if (!fault.found.empty()) elements_[i].Fail(fault.found, fault.expected);
   }
@@ -343,6 +393,7 @@ Imported ImportDraft::Finish(const std::string& format) {
                                         -description.gravity.z()));
   }
   if (options_.gravity) description.gravity = *options_.gravity;
+  ReadLateMasses();
   for (const auto& [body, share] : lifts_) {
     const BodyDescription& lifted = description.bodies[body];
     if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;
@@ -354,8 +405,8 @@ Imported ImportDraft::Finish(const std::string& format) {
         "; values with rounded angles or directions: {} (--keep-digits keeps them)", rounded_);
   }
   HoldFloatingParts();
-  CheckUnreadMasses();
   MergeFixed(false);
+  FixMasslessEnds();
   ComposeChains();
   MergeFixed(true);
   CheckMasses();

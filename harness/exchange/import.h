@@ -38,6 +38,7 @@ struct ImportOptions {
   std::filesystem::path sidecar;           ///< file with loops, forces and a start; "": none
   bool planar = false;                     ///< import as a planar mechanism; rejects others
   bool floats = false;                     ///< URDF: the root link is free, not fixed to the ground
+  bool balances_inertia = false;           ///< replace impossible moments by their mean
   bool keeps_digits = false;               ///< keep rounded angles and directions as written
   std::optional<Eigen::Vector3d> gravity;  ///< overrides the file's or format's [m/s^2]
 };

@@ -68,6 +68,10 @@ Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d&
 /// Returns the symmetric matrix with elements xx, yy, zz, xy, xz, yz.
 Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz, double yz);
 
+/// Returns true, after replacing all three principal moments by their mean, if one is larger than
+/// the sum of the others; as MuJoCo's balanceinertia.
+bool Balance(Eigen::Matrix3d* inertia);
+
 /// Returns the inertia from its elements. `get`: returns the element of a name, "ixx" to "iyz", and
 /// of a kind, true for moments.
 template <class Get>
@@ -176,8 +180,10 @@ class ImportDraft {
   void AddSpringAndDamper(double stiffness, double rest, double damping);
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
-  /// Records that the mass is in a file that is not read: `value` is rejected if the body moves.
-  void LeaveMass(int body, const XmlValue& value) { without_mass_.emplace_back(body, value); }
+  /// Calls `read` at the end, unless the body is fixed to the ground: its mass then has no effect.
+  void ReadMassLater(int body, std::function<void()> read) {
+    late_masses_.emplace_back(body, std::move(read));
+  }
   /// Adds an upward force of `share` times its weight: gravity compensation.
   void AddLift(int body, double share) { lifts_.emplace_back(body, share); }
 
@@ -208,7 +214,7 @@ class ImportDraft {
  private:
   void NameJoints();
   void HoldFloatingParts();
-  void CheckUnreadMasses() const;
+  void ReadLateMasses() const;
   /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
   /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);
@@ -218,8 +224,12 @@ class ImportDraft {
   void ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed);
   /// Removes attached bodies (one entry per body) and the joints within their carriers.
   void Attach(const std::vector<Attachment>& attachments);
-  /// Rejects invalid masses and inertias of moving bodies, including their merged bodies.
-  void CheckMasses() const;
+  /// Fixes bodies without mass at the ends of chains where they are drawn: their motion has no
+  /// effect.
+  void FixMasslessEnds();
+  /// Rejects invalid masses and inertias of moving bodies, including their merged bodies; inertias
+  /// that no body has are replaced if the options permit it.
+  void CheckMasses();
   void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
@@ -232,7 +242,7 @@ class ImportDraft {
   std::vector<ImportNote> notes_;
   std::size_t rounded_ = 0, rounded_note_ = 0;  ///< number of rounded values; note of the first
   std::vector<std::pair<int, double>> lifts_;
-  std::vector<std::pair<int, XmlValue>> without_mass_;
+  std::vector<std::pair<int, std::function<void()>>> late_masses_;
   std::optional<XmlElement> assumed_gravity_;  ///< element that lacks the gravity
 };
 

@@ -12,7 +12,6 @@ namespace {
 constexpr const char* kNoMedium = "there is no medium";
 
 constexpr DroppedReason kMjcfReasons[] = {
-    {"asset", "meshes, textures and materials do not move anything"},
     {"contact", "there is no contact"},
     {"sensor", "there are no sensors"},
     {"extension", "there are no plugins", true},
@@ -37,8 +36,8 @@ constexpr DroppedReason kMjcfReasons[] = {
      "option@o_solimp option@o_friction option@collision option@sdf_iterations "
      "option@sdf_initpoints @warmstart @filterparent @multiccd @island @eulerdamp @energy "
      "@fwdinv @override @sensor @midphase @nativeccd @autoreset @invdiscrete @sensornoise "
-     "@refsafe @frictionloss @limit compiler@strippath compiler@meshdir compiler@texturedir "
-     "compiler@assetdir compiler@discardvisual compiler@usethread compiler@convexhull "
+     "@refsafe @frictionloss @limit compiler@strippath compiler@texturedir "
+     "compiler@discardvisual compiler@usethread compiler@convexhull "
      "compiler@exactmeshinertia compiler@fitaabb compiler@saveinertial compiler@alignfree",
      ""}};
 
@@ -88,6 +87,9 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
     settings->first_group = static_cast<int>(std::clamp(groups[0], -1e6, 1e6));
     settings->last_group = static_cast<int>(std::clamp(groups[1], -1e6, 1e6));
   }
+  for (const char* folder : {"assetdir", "meshdir"}) {
+    if (const auto given = element.Attribute(folder)) settings->mesh_folder = given->text();
+  }
   flag("balanceinertia", &settings->balances_inertia);
   flag("autolimits", &settings->limits_by_range);
   number("boundmass", &settings->least_mass, kNotNegative);
@@ -133,6 +135,24 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
   }
 }
 
+/// Keeps meshes for the masses of geoms; the name of a mesh is by default its file's without
+/// ending.
+void ReadAssets(const XmlElement& root, MjcfModel* model) {
+  for (const XmlElement& assets : root.Children("asset")) {
+    for (const XmlElement& mesh : assets.Children("mesh")) {
+      const MjcfElement element = model->defaults.Of(mesh, "");
+      const auto name = mesh.Attribute("name"), file = element.Attribute("file");
+      if (!name && !file) continue;
+      const std::string known =
+          name ? name->Name() : std::filesystem::path(file->Name()).stem().string();
+      if (!model->meshes.emplace(known, element).second) {
+        (name ? *name : *file).Fail("a name that no other mesh has");
+      }
+    }
+    model->draft->DropWhole(assets, "only masses of meshes matter");
+  }
+}
+
 }  // namespace
 
 void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
@@ -145,6 +165,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   }
   for (const XmlElement& element : root.Children("option")) ReadOption(element, &model);
   for (const XmlElement& element : root.Children("default")) model.defaults.Read(element, "");
+  ReadAssets(root, &model);
   const std::vector<XmlElement> worlds = root.Children("worldbody");
   if (worlds.empty()) root.Fail("no <worldbody>", "one");
   for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);

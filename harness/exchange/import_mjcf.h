@@ -3,6 +3,7 @@
 // Internal to import_mjcf*.cpp.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <set>
@@ -79,7 +80,8 @@ struct MjcfSettings {
   int first_group = 0, last_group = 5;
   bool has_contact = true, has_equality = true, has_springs = true, has_dampers = true;
   bool has_actuation = true, clamps_controls = true;
-  std::set<int> silent_groups;  ///< groups of disabled actuators
+  std::set<int> silent_groups;        ///< groups of disabled actuators
+  std::filesystem::path mesh_folder;  ///< from the main file's folder
 
   /// True if springs or dampers act; gravity compensation acts only with them.
   bool has_passive() const { return has_springs || has_dampers; }
@@ -127,6 +129,7 @@ class MjcfModel {
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
   std::vector<MjcfChain> chains;  ///< of all bodies, in the order of the file
   std::map<std::string, MjcfSite> sites;
+  std::map<std::string, MjcfElement> meshes;
   std::map<std::string, std::size_t> joint_names;
 
   /// Returns the orientation of the element in any notation; by default the one of its class.

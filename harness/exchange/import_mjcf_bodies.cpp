@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "harness/exchange/import_mjcf.h"
+#include "harness/exchange/solids.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
@@ -19,38 +19,10 @@ struct MjcfGeom {
 
 // Masses of MuJoCo shapes.
 
-using std::numbers::pi;
-
 constexpr double kDensity = 1000.0;  // [kg/m^3], MuJoCo's default
 /// Smaller volumes [m^3] ignore a given mass, and smaller masses [kg] are ignored: mjEPS in
 /// MuJoCo's src/user/user_objects.cc.
 constexpr double kLeast = 1e-14;
-
-/// Volume [m^3], and moments of inertia per mass [m^2] about its own axes; z is its symmetry axis.
-struct Shape {
-  double volume = 0.0;
-  Eigen::Vector3d moments = Eigen::Vector3d::Zero();
-};
-
-Eigen::Vector3d SumsOfOthers(const Eigen::Vector3d& v) {
-  return {v.y() + v.z(), v.x() + v.z(), v.x() + v.y()};
-}
-
-Shape CylinderOf(double radius, double half) {
-  const double across = radius * radius / 4.0 + half * half / 3.0;
-  return {2.0 * pi * radius * radius * half, {across, across, radius * radius / 2.0}};
-}
-
-/// Returns a cylinder with two hemispheres; their centres of mass are 3/8 radius beyond its ends.
-Shape CapsuleOf(double radius, double half) {
-  const Shape middle = CylinderOf(radius, half);
-  const double ends = 4.0 / 3.0 * pi * radius * radius * radius;
-  const double volume = middle.volume + ends;
-  const double about_axis = 0.4 * radius * radius;
-  const double across = about_axis + half * half + 0.75 * radius * half;
-  const Eigen::Vector3d of_ends(across, across, about_axis);
-  return {volume, (middle.volume * middle.moments + ends * of_ends) / volume};
-}
 
 /// Types of geoms; the first ones have a mass.
 enum Type { kSphere, kCapsule, kCylinder, kBox, kEllipsoid, kWithoutMass, kOfMesh };
@@ -79,87 +51,117 @@ Eigen::Vector3d PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, Ty
   return {sizes[0], sizes[0], 0.5 * length};
 }
 
-Shape ShapeOf(Type type, const Eigen::Vector3d& size) {
+Solid ShapeOf(Type type, const Eigen::Vector3d& size) {
   if (type == kCapsule) return CapsuleOf(size[0], size[1]);
   if (type == kCylinder) return CylinderOf(size[0], size[1]);
-  const Eigen::Vector3d sizes = type == kSphere ? Eigen::Vector3d(size[0], size[0], size[0]) : size;
-  const Eigen::Vector3d sums = SumsOfOthers(sizes.cwiseAbs2());
-  if (type == kBox) return {8.0 * sizes.prod(), sums / 3.0};
-  return {4.0 / 3.0 * pi * sizes.prod(), sums / 5.0};  // an ellipsoid
+  if (type == kBox) return BoxOf(size);
+  return EllipsoidOf(type == kSphere ? Eigen::Vector3d(size[0], size[0], size[0]) : size);
+}
+
+/// Returns a mesh of <asset> as a solid in its own frame.
+Solid MeshSolid(const MjcfModel& model, const XmlValue& name) {
+  const MjcfElement& asset = Named(model.meshes, name, "the name of a mesh");
+  const auto file = asset.Attribute("file");
+  if (!file) {
+    asset.own().Fail("a mesh without a file", "\"file\", an .stl or .obj with triangles");
+  }
+  const auto inertia = asset.Attribute("inertia");
+  const MeshRule rule = inertia ? inertia->Choice<MeshRule>({{"legacy", MeshRule::kPositive},
+                                                             {"exact", MeshRule::kSigned},
+                                                             {"shell", MeshRule::kShell}})
+                                : MeshRule::kPositive;
+  const auto vector = [&](const char* attribute, const Eigen::Vector3d& otherwise) {
+    const auto given = asset.Attribute(attribute);
+    return given ? given->Vector() : otherwise;
+  };
+  const Eigen::Vector3d scale = vector("scale", Eigen::Vector3d::Ones());
+  const Eigen::Vector3d origin = vector("refpos", Eigen::Vector3d::Zero());
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  if (const auto given = asset.Attribute("refquat")) {
+    const std::vector<double> q = given->Numbers(4, 4);
+    turn = UnitQuaternion(*given, {q[0], q[1], q[2], q[3]});
+  }
+  TriangleMesh mesh = ReadMesh(file->File(model.settings.mesh_folder));
+  for (Eigen::Vector3d& point : mesh.points) {
+    point = scale.cwiseProduct(turn.conjugate() * (point - origin));
+  }
+  if (scale.prod() < 0.0) {
+    for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
+  }
+  const Solid solid = SolidOf(mesh, rule);
+  if (!(solid.volume > 0.0)) {
+    file->element().Fail(fmt::format("a mesh of {:.3g} m^3", solid.volume),
+                         "a volume > 0, with triangles counter-clockwise from outside");
+  }
+  const std::size_t open = NumOpenEdges(mesh);
+  if (open > 0 && rule == MeshRule::kSigned) {
+    file->Fail(fmt::format("a closed mesh: {} edges have a triangle on one side only", open));
+  }
+  if (open > 0 && rule == MeshRule::kPositive) {
+    model.draft->Note(asset.own(), "file",
+                      fmt::format("not closed at {} edges: mass by MuJoCo's legacy rule", open));
+  }
+  return solid;
 }
 
 /// Reads a geom; returns false if it has no mass.
-bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes,
-              BodyDescription* read, Placement* X) {
+bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, PlacedSolid* read) {
   const MjcfElement& element = geom.element;
   const auto given = element.Attribute("type");
   const auto mesh = element.Attribute("mesh");
-  const Type type = given ? given->Choice<Type>({{"sphere", kSphere},
-                                                 {"capsule", kCapsule},
-                                                 {"cylinder", kCylinder},
-                                                 {"box", kBox},
-                                                 {"ellipsoid", kEllipsoid},
-                                                 {"plane", kWithoutMass},
-                                                 {"hfield", kWithoutMass},
-                                                 {"mesh", kOfMesh},
-                                                 {"sdf", kOfMesh}})
-                          : kSphere;
+  const Type type = given  ? given->Choice<Type>({{"sphere", kSphere},
+                                                  {"capsule", kCapsule},
+                                                  {"cylinder", kCylinder},
+                                                  {"box", kBox},
+                                                  {"ellipsoid", kEllipsoid},
+                                                  {"plane", kWithoutMass},
+                                                  {"hfield", kWithoutMass},
+                                                  {"mesh", kOfMesh},
+                                                  {"sdf", kOfMesh}})
+                    : mesh ? kOfMesh
+                           : kSphere;
   const double kg = element.Number("mass", -1.0, kNotNegative);
   const double density = element.Number("density", kDensity, kNotNegative);
   const double group = element.Number("group", 0.0);
   if (group < model.settings.first_group || group > model.settings.last_group) return false;
   if (kg == 0.0 || (kg < 0.0 && density == 0.0)) return false;
-  if (mesh || type == kOfMesh) {
-    if (drops_meshes) return false;
-    element.own().Fail("the mass of a mesh, whose file is not read",
-                       "an <inertial> in the body, or another shape");
-  }
-  if (type == kWithoutMass) return false;
+  if (type == kWithoutMass || (drops_meshes && (mesh || type == kOfMesh))) return false;
   if (const auto shell = element.Attribute("shellinertia"); BoolOr(shell)) {
     shell->Fail("false: the inertia of shells is not known here");
   }
-  const Eigen::Vector3d size = PlaceAndSize(model, element, type, X);
-  for (std::size_t i = 0; i < kSizes[type]; ++i) {
-    if (!(size[i] > 0.0)) element.own().Fail("a size that is not > 0", "sizes > 0");
+  if (mesh && type != kOfMesh) mesh->Fail("no mesh: a shape is not fitted to it");
+  if (type == kOfMesh) {
+    read->solid = MeshSolid(model, element.Required("mesh", "the name of a mesh"));
+    read->X = model.PlacementOf(element);
+  } else {
+    const Eigen::Vector3d size = PlaceAndSize(model, element, type, &read->X);
+    for (std::size_t i = 0; i < kSizes[type]; ++i) {
+      if (!(size[i] > 0.0)) element.own().Fail("a size that is not > 0", "sizes > 0");
+    }
+    read->solid = ShapeOf(type, size);
   }
-  const Shape shape = ShapeOf(type, size);
-  if (kg > 0.0 && !(shape.volume > kLeast)) {
+  if (kg > 0.0 && !(read->solid.volume > kLeast)) {
     model.draft->Note(element.own(), "mass",
                       fmt::format("dropped, as in MuJoCo: its shape has {:.2g} m^3, not more than "
                                   "{:.0e}",
-                                  shape.volume, kLeast),
+                                  read->solid.volume, kLeast),
                       true);
     return false;
   }
-  read->mass = kg > 0.0 ? kg : density * shape.volume;
-  if (!(read->mass > kLeast)) return false;
-  read->inertia = (read->mass * shape.moments).asDiagonal();
-  return true;
+  read->mass = kg > 0.0 ? kg : density * read->solid.volume;
+  read->X = geom.X * read->X;
+  return read->mass > kLeast;
 }
 
-/// Computes mass, centre of mass and inertia in body axes. Rejects meshes, whose files are not
-/// read, unless they are ignored.
+/// Computes mass, centre of mass and inertia in body axes; meshes may be ignored.
 BodyDescription MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
                             bool drops_meshes) {
-  std::vector<std::pair<BodyDescription, Placement>> all;
-  BodyDescription sum;
+  std::vector<PlacedSolid> parts;
   for (const MjcfGeom& geom : geoms) {
-    BodyDescription part;
-    Placement X;
-    if (!ReadGeom(model, geom, drops_meshes, &part, &X)) continue;
-    X = geom.X * X;
-    sum.mass += part.mass;
-    sum.com += part.mass * X.p;
-    all.emplace_back(part, X);
+    PlacedSolid part;
+    if (ReadGeom(model, geom, drops_meshes, &part)) parts.push_back(part);
   }
-  if (!(sum.mass > 0.0)) return {};
-  sum.com /= sum.mass;
-  for (const auto& [part, X] : all) {
-    const Eigen::Vector3d r = X.p - sum.com;
-    sum.inertia += InTurnedAxes(X.q, part.inertia) +
-                   part.mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
-  }
-  return sum;
+  return SumOf(parts);
 }
 
 /// Marks a geom and its classes as read, with a note.
@@ -285,14 +287,6 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   }
   AddMjcfChain(model, element, parent, body, X_PB, contents.joints);
   for (const MjcfPlaced& child : contents.bodies) ReadBody(child, body, is_fixed, model);
-}
-
-/// Enforces A + B >= C as MuJoCo's compiler: replaces all three moments by their mean.
-void Balance(Eigen::Matrix3d* inertia) {
-  const Eigen::Vector3d moments = SymmetricEigenvalues(*inertia);
-  if (moments[0] + moments[1] < moments[2]) {
-    *inertia = moments.mean() * Eigen::Matrix3d::Identity();
-  }
 }
 
 void BoundBelow(double least, Eigen::Matrix3d* inertia) {

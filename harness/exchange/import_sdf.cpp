@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "harness/exchange/import_draft.h"
+#include "harness/exchange/solids.h"
 
 namespace loopbench::harness {
 
@@ -18,7 +19,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kFirstVersion = 4, kLastVersion = 12;
-constexpr double kSdfGravity = 9.8;  // [m/s^2]
+constexpr double kSdfGravity = 9.8;     // [m/s^2]
+constexpr double kSdfDensity = 1000.0;  // [kg/m^3]
 
 constexpr DroppedReason kSdfReasons[] = {
     {"visual", "shapes do not move anything"},
@@ -367,10 +369,14 @@ class SdfReader {
       if (inertial) inertial->Ignore();
       return;  // merged with the ground
     }
-    const auto automatic = inertial ? inertial->Attribute("auto") : std::nullopt;
-    if (BoolOr(automatic)) {
-      draft_->LeaveMass(index, *automatic);
+    if (inertial && BoolOr(inertial->Attribute("auto"))) {
+      draft_->ReadMassLater(index, [reader = *this, element, inertial = *inertial, index] {
+        reader.ReadShapes(element, inertial, index);
+      });
       inertial->Ignore();
+      for (const XmlElement& collision : element.Children("collision")) {
+        draft_->DropWhole(collision, "only its mass matters");
+      }
       return;
     }
     BodyDescription& body = draft_->description.bodies[index];
@@ -392,6 +398,74 @@ class SdfReader {
     }
     body.com = pose.raw.p;
     body.inertia = InTurnedAxes(pose.raw.q, body.inertia);
+  }
+
+  /// Computes the mass of a link from its collision shapes.
+  void ReadShapes(const XmlElement& element, const XmlElement& inertial, int index) const {
+    const double density = NumberOr(inertial.Content("density"), kSdfDensity, kPositive);
+    std::vector<PlacedSolid> parts;
+    for (const XmlElement& collision : element.Children("collision")) {
+      const XmlElement geometry = collision.RequiredChild("geometry");
+      PlacedSolid part;
+      part.solid = ShapeIn(geometry);
+      const SdfFrame pose = ReadPose(collision);
+      if (!pose.relative_to.empty() && pose.relative_to != element.RequiredName()) {
+        collision.RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
+      }
+      part.X = pose.raw;
+      part.mass = part.solid.volume * NumberOr(collision.Content("density"), density, kPositive);
+      parts.push_back(part);
+    }
+    const BodyDescription sum = SumOf(parts);
+    if (!(sum.mass > 0.0)) inertial.Fail("auto without a <collision>", "one with a volume");
+    BodyDescription& body = draft_->description.bodies[index];
+    body.mass = sum.mass;
+    body.com = sum.com;
+    body.inertia = sum.inertia;
+  }
+
+  static Solid ShapeIn(const XmlElement& geometry) {
+    const auto number = [](const XmlElement& shape, const char* name) {
+      return shape.RequiredChild(name).Content().Number(kPositive);
+    };
+    const auto sizes = [](const XmlElement& shape, const char* name) {
+      const XmlValue value = shape.RequiredChild(name).Content();
+      const Vector3d read = value.Vector();
+      if (!(read.minCoeff() > 0.0)) value.Fail("sizes > 0");
+      return read;
+    };
+    for (const XmlElement& shape : geometry.Children()) {
+      const std::string tag = shape.tag();
+      if (tag == "box") return BoxOf(0.5 * sizes(shape, "size"));
+      if (tag == "ellipsoid") return EllipsoidOf(sizes(shape, "radii"));
+      if (tag == "sphere") return EllipsoidOf(Vector3d::Constant(number(shape, "radius")));
+      if (tag == "cylinder" || tag == "capsule") {
+        const double radius = number(shape, "radius"), half = 0.5 * number(shape, "length");
+        return tag == "capsule" ? CapsuleOf(radius, half) : CylinderOf(radius, half);
+      }
+      if (tag == "mesh") return MeshIn(shape);
+    }
+    geometry.Fail("a shape whose volume is not known here",
+                  "box, sphere, ellipsoid, cylinder, capsule or mesh");
+  }
+
+  static Solid MeshIn(const XmlElement& shape) {
+    const XmlValue uri = shape.RequiredChild("uri").Content();
+    TriangleMesh mesh = ReadMesh(uri.File());
+    if (const auto scale = shape.Content("scale")) {
+      const Vector3d factors = scale->Vector();
+      if (!(factors.minCoeff() > 0.0)) scale->Fail("factors > 0");
+      for (Vector3d& point : mesh.points) point = factors.cwiseProduct(point);
+    }
+    const std::size_t open = NumOpenEdges(mesh);
+    const Solid solid = SolidOf(mesh, MeshRule::kSigned);
+    if (open > 0 || !(solid.volume > 0.0)) {
+      uri.Fail(
+          fmt::format("a closed mesh with triangles counter-clockwise from outside: {} edges "
+                      "are open, the volume is {:.3g} m^3",
+                      open, solid.volume));
+    }
+    return solid;
   }
 
   void ReadJoints(const SdfScope& scope) const {

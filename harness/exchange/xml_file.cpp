@@ -16,6 +16,8 @@
 
 namespace loopbench::harness {
 
+namespace fs = std::filesystem;
+
 namespace {
 
 std::vector<const tinyxml2::XMLElement*> ChildrenIn(const tinyxml2::XMLElement& element) {
@@ -35,7 +37,8 @@ struct XmlDocument {
     tinyxml2::XMLDocument xml;  ///< its user data points to `name`
     std::string name;           ///< in messages
   };
-  std::deque<File> files;  ///< the main file first
+  std::deque<File> files;        ///< the main file first
+  std::optional<fs::path> path;  ///< of the main file
   std::unordered_map<const tinyxml2::XMLElement*, const tinyxml2::XMLElement*>
       included;  ///< the root element of the file in place of an <include>
   std::unordered_set<const void*> read;
@@ -58,6 +61,12 @@ struct XmlDocument {
 };
 
 namespace {
+
+/// Returns "" for files that do not exist.
+fs::path CanonicalOf(const fs::path& path) {
+  std::error_code error;
+  return fs::canonical(path, error);
+}
 
 std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '"'; }
 
@@ -176,6 +185,22 @@ std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const
 }
 
 Eigen::Vector3d XmlValue::Vector() const { return Eigen::Vector3d(Numbers(3, 3).data()); }
+
+fs::path XmlValue::File(const fs::path& subfolder, const fs::path& otherwise) const {
+  const auto& main = element_.document_->path;
+  if (!main) Fail("nothing: a text has no other files");
+  std::error_code error;
+  const fs::path folder = main->parent_path(), base = fs::canonical(folder / ".", error);
+  fs::path shown = folder / subfolder / Name(), path = CanonicalOf(shown);
+  if (path.empty() && !otherwise.empty()) path = CanonicalOf(shown = otherwise / Name());
+  if (!path.empty() && std::ranges::mismatch(base, path).in1 != base.end()) {
+    Fail("a file below the folder of the main file");
+  }
+  if (path.empty() || !fs::is_regular_file(path, error)) {
+    Fail(fmt::format("a file that exists, from the folder {}", (base / subfolder).string()));
+  }
+  return shown;
+}
 
 bool XmlValue::Bool() const {
   if (text_ == "true" || text_ == "1") return true;
@@ -331,15 +356,11 @@ const tinyxml2::XMLElement* Parse(std::string_view text, const std::string& file
   return parsed.xml.RootElement();
 }
 
-namespace fs = std::filesystem;
-
 /// Resolves the <include> elements of MJCF.
 class Includer {
  public:
-  Includer(const std::shared_ptr<XmlDocument>& document, const fs::path& main)
-      : document_(document), folder_(main.parent_path()), open_{CanonicalOf(main)} {
-    std::error_code error;
-    base_ = fs::canonical(folder_.empty() ? "." : folder_, error);
+  explicit Includer(const std::shared_ptr<XmlDocument>& document)
+      : document_(document), open_{CanonicalOf(*document->path)} {
     known_.insert(open_[0]);
   }
 
@@ -354,25 +375,12 @@ class Includer {
   }
 
  private:
-  static fs::path CanonicalOf(const fs::path& path) {
-    std::error_code error;
-    return fs::canonical(path, error);
-  }
-
   /// Reads a file, named from the folder of the main file or of the file that contains `element`.
   void Include(const tinyxml2::XMLElement* element, const fs::path& folder) {
     constexpr std::size_t kMaxDepth = 16;
     const XmlValue name =
         XmlElement(document_, element).Required("file", "a file below the folder of the main file");
-    fs::path shown = folder_ / name.Name(), path = CanonicalOf(shown);
-    if (path.empty()) path = CanonicalOf(shown = folder / name.Name());
-    std::error_code error;
-    if (!path.empty() && !IsBelowBase(path)) {
-      name.Fail("a file below the folder of the main file");
-    }
-    if (path.empty() || !fs::is_regular_file(path, error)) {
-      name.Fail(fmt::format("a file that exists, from the folder {}", base_.string()));
-    }
+    const fs::path shown = name.File({}, folder), path = CanonicalOf(shown);
     if (const auto cycle = std::ranges::find(open_, path); cycle != open_.end()) {
       std::string names;
       for (auto at = cycle; at != open_.end(); ++at) names += at->filename().string() + " > ";
@@ -380,6 +388,7 @@ class Includer {
     }
     if (!known_.insert(path).second) name.Fail("each file once");
     if (open_.size() > kMaxDepth) name.Fail(fmt::format("at most {} nested files", kMaxDepth));
+    std::error_code error;
     bytes_ += fs::file_size(path, error);
     if (error || bytes_ > kMaxConfigBytes) {
       name.Fail(fmt::format("files of at most {} MiB in all", kMaxConfigBytes >> 20));
@@ -391,12 +400,7 @@ class Includer {
     open_.pop_back();
   }
 
-  bool IsBelowBase(const fs::path& path) const {
-    return std::ranges::mismatch(base_, path).in1 == base_.end();
-  }
-
   std::shared_ptr<XmlDocument> document_;
-  fs::path folder_, base_;      ///< of the main file, as given and without links
   std::vector<fs::path> open_;  ///< the files around the element, the main file first
   std::set<fs::path> known_;
   std::uintmax_t bytes_ = 0;
@@ -404,13 +408,17 @@ class Includer {
 
 }  // namespace
 
-XmlFile::XmlFile(std::string_view text, const std::string& file)
+XmlFile::XmlFile(std::string_view text, const std::string& file,
+                 const std::optional<fs::path>& path)
     : document_(std::make_shared<XmlDocument>()) {
+  document_->path = path;
   Parse(text, file, document_.get());
 }
 
-void XmlFile::Include(const fs::path& main) {
-  Includer(document_, main).Resolve(*document_->root(), main.parent_path());
+void XmlFile::Include() {
+  if (document_->path) {
+    Includer(document_).Resolve(*document_->root(), document_->path->parent_path());
+  }
 }
 
 XmlElement XmlFile::root() const { return XmlElement(document_, document_->root()); }

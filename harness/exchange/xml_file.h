@@ -97,6 +97,10 @@ class XmlValue {
   /// Returns `least` to `most` numbers separated by blanks.
   std::vector<double> Numbers(std::size_t least, std::size_t most) const;
   Eigen::Vector3d Vector() const;
+  /// Returns the regular file that the text names, from `subfolder` of the main file's folder, else
+  /// from `otherwise`. Rejects files that are not below the main file's folder.
+  std::filesystem::path File(const std::filesystem::path& subfolder = {},
+                             const std::filesystem::path& otherwise = {}) const;
   /// Accepts true, false, 1 or 0.
   bool Bool() const;
   /// Returns the value of the row with this word.
@@ -130,12 +134,13 @@ inline bool BoolOr(const std::optional<XmlValue>& value, bool otherwise = false)
 
 class XmlFile {
  public:
-  /// `file` is the name in messages.
-  XmlFile(std::string_view text, const std::string& file);
+  /// `file` is the name in messages; `path` its place, without which it has no other files.
+  XmlFile(std::string_view text, const std::string& file,
+          const std::optional<std::filesystem::path>& path = {});
 
-  /// Replaces all <include file="..."> by the children of the root elements of these files. Reads
-  /// only files below the folder of `main`, each once, and at most kMaxConfigBytes in all.
-  void Include(const std::filesystem::path& main);
+  /// Replaces all <include file="..."> by the children of the root elements of these files, each
+  /// read once, and at most kMaxConfigBytes in all.
+  void Include();
 
   XmlElement root() const;
   const std::string& name() const;

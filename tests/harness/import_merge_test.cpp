@@ -162,7 +162,41 @@ TEST(ImportMerge, MassesOfShapesOfWhatIsFixedToTheWorldAreNotRead) {
   const Imported imported = Read(model("fixed"));
   EXPECT_EQ(imported.description.bodies.back().name, "arm");
   ExpectNote(imported, "<link name=\"mesh\">", "without mass and fixed");
-  ExpectRefusal(model("revolute"), {"<inertial> auto: found \"true\"", "not found from shapes"});
+  ExpectRefusal(model("revolute"), {"<inertial>: found auto without a <collision>"});
+}
+
+TEST(ImportMerge, LinksWithoutMassAtTheEndAreFixed) {
+  const std::string chain = Link("wrist") + Link("tool") +
+                            Joint("w", "continuous", "arm", "wrist", "0 0 -1") +
+                            Joint("t", "prismatic", "wrist", "tool", "0.1 0 0");
+  const Imported imported = Read(Arm(chain));
+  ExpectBody(Only(imported), 2, {0, 0, -0.5}, {0.2, 0.2, 0.01});
+  ASSERT_EQ(imported.description.joints.size(), 1u);
+  ExpectNote(imported, "<link name=\"tool\">", "without mass at the end of a chain");
+  ExpectNote(imported, "<link name=\"wrist\">", "joint \"w\" dropped");
+  // with mass behind it, or on the ground, a link without mass is refused
+  ExpectRefusal(Arm(Link("wrist") + Link("tool", Inertial(1, "1 1 1")) +
+                    Joint("w", "continuous", "arm", "wrist", "0 0 -1") +
+                    Joint("t", "continuous", "wrist", "tool", "0.1 0 0")),
+                {"<link name=\"wrist\">: found a body without mass that moves"});
+  ExpectRefusal(Arm(Link("flag") + Joint("f", "continuous", "world", "flag")),
+                {"<link name=\"flag\">: found a body without mass that moves"});
+}
+
+TEST(ImportMerge, MomentsThatNoBodyHasAreBalancedOnRequest) {
+  const std::string hand =
+      Link("hand", Inertial(1, "0.1 0.2 0.6")) + Joint("wrist", "continuous", "arm", "hand");
+  ExpectRefusal(Arm(hand), {"<link name=\"hand\">: found principal moments 0.1, 0.2, 0.6",
+                            "--balance-inertia"});
+  ImportOptions options;
+  options.balances_inertia = true;
+  const Imported imported = ImportText(Arm(hand), "file.xml", options);
+  const BodyDescription& body = imported.description.bodies.back();
+  EXPECT_LE((body.inertia - 0.3 * Matrix3d::Identity()).norm(), kRounding);
+  EXPECT_EQ(imported.description.bodies[1].inertia.diagonal(), Vector3d(0.2, 0.2, 0.01));
+  ExpectNote(imported, "<link name=\"hand\">", "no body has such moments of inertia");
+  ExpectRefusal(Arm(Link("hand", Inertial(1, "0 0 0")) + Joint("w", "continuous", "arm", "hand")),
+                {"three that are > 0"}, options);
 }
 
 TEST(ImportMerge, JointsBetweenPartsOfTheGroundHaveTheirNote) {

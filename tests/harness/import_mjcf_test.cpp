@@ -94,7 +94,7 @@ TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<option> timestep", "their own steps");
   ExpectNote(imported, "<option> density", "no medium");
   ExpectNote(imported, "<option> integrator", "their own integrator");
-  ExpectNote(imported, "<asset>", "meshes");
+  ExpectNote(imported, "<asset>", "only masses of meshes");
   ExpectNote(imported, "<geom name=\"floor\">", "no contact");
   ExpectNote(imported, "<body name=\"b\"> mocap", "stays where");
   ExpectNote(imported, "<body name=\"b\"> strange", "not known");
@@ -141,7 +141,7 @@ TEST(ImportMjcf, WhatCannotBeSaidIsRefusedWithItsLine) {
   ExpectRefusal(
       "<mujoco><worldbody><body><joint/><geom type=\"mesh\" "
       "mesh=\"m\"/></body></worldbody></mujoco>",
-      {"mass of a mesh"});
+      {"mesh: found \"m\"", "the name of a mesh"});
   for (const char* number : {"nan", "inf", "1e999", "1,0", "0x10", "1e", "", "1 2"}) {
     ExpectRefusal(Model("<joint damping=\"" + std::string(number) + "\"/>"), {"damping: found"});
   }

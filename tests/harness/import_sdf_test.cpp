@@ -288,7 +288,7 @@ TEST(ImportSdf, WhatCannotBeSaidIsRefusedWithItsLine) {
   ExpectRefusal(Sdf("<link name=\"a\"><inertial><mass>-1</mass></inertial></link>"),
                 {"<mass>: found \"-1\"", ">= 0"});
   ExpectRefusal(Sdf("<link name=\"a\"><inertial auto=\"true\"/></link>"),
-                {"not found from shapes"});
+                {"<inertial>: found auto without a <collision>"});
   ExpectRefusal(Sdf(a + "<link name=\"b\"><inertial><pose relative_to=\"a\"/></inertial></link>"),
                 {"<pose> relative_to: found \"a\"", "its own link"});
   ExpectRefusal(Sdf(a + Joint("j", "ball", "a", "world", "")),

@@ -1,0 +1,305 @@
+#include "harness/exchange/solids.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <tuple>
+
+#include "harness/text/files.h"
+
+namespace loopbench::harness {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using std::numbers::pi;
+
+Solid FromMoments(double volume, const Vector3d& moments) {
+  return {volume, Vector3d::Zero(), moments.asDiagonal()};
+}
+
+Vector3d SumsOfOthers(const Vector3d& v) { return {v.y() + v.z(), v.x() + v.z(), v.x() + v.y()}; }
+
+}  // namespace
+
+Solid BoxOf(const Vector3d& half_sizes) {
+  return FromMoments(8.0 * half_sizes.prod(), SumsOfOthers(half_sizes.cwiseAbs2()) / 3.0);
+}
+
+Solid EllipsoidOf(const Vector3d& semi_axes) {
+  return FromMoments(4.0 / 3.0 * pi * semi_axes.prod(), SumsOfOthers(semi_axes.cwiseAbs2()) / 5.0);
+}
+
+Solid CylinderOf(double radius, double half) {
+  const double across = radius * radius / 4.0 + half * half / 3.0;
+  return FromMoments(2.0 * pi * radius * radius * half, {across, across, radius * radius / 2.0});
+}
+
+/// A cylinder with two hemispheres; their centres of mass are 3/8 radius beyond its ends.
+Solid CapsuleOf(double radius, double half) {
+  const Solid middle = CylinderOf(radius, half);
+  const double ends = 4.0 / 3.0 * pi * radius * radius * radius;
+  const double volume = middle.volume + ends;
+  const double about_axis = 0.4 * radius * radius;
+  const double across = about_axis + half * half + 0.75 * radius * half;
+  const Vector3d of_ends(across, across, about_axis);
+  return FromMoments(volume, (middle.volume * middle.inertia.diagonal() + ends * of_ends) / volume);
+}
+
+BodyDescription SumOf(const std::vector<PlacedSolid>& parts) {
+  BodyDescription sum;
+  const auto centre = [](const PlacedSolid& part) -> Vector3d {
+    return part.X.p + part.X.q * part.solid.centre;
+  };
+  for (const PlacedSolid& part : parts) {
+    sum.mass += part.mass;
+    sum.com += part.mass * centre(part);
+  }
+  if (!(sum.mass > 0.0)) return {};
+  sum.com /= sum.mass;
+  for (const PlacedSolid& part : parts) {
+    const Vector3d r = centre(part) - sum.com;
+    sum.inertia += InTurnedAxes(part.X.q, part.mass * part.solid.inertia) +
+                   part.mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
+  }
+  return sum;
+}
+
+// Meshes.
+
+std::size_t NumOpenEdges(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, int> sides;  // triangles on one side less those on the other
+  for (const auto& [a, b, c] : mesh.triangles) {
+    for (const auto& [from, to] : {std::pair{a, b}, {b, c}, {c, a}}) {
+      sides[std::minmax(from, to)] += from < to ? 1 : -1;
+    }
+  }
+  return static_cast<std::size_t>(
+      std::ranges::count_if(sides, [](const auto& side) { return side.second != 0; }));
+}
+
+/// Sums pyramids from an apex over the triangles, first about the centroid of the surface, then
+/// about the centre of mass, as in MuJoCo: kPositive depends on the apex.
+Solid SolidOf(const TriangleMesh& mesh, MeshRule rule) {
+  /// Corners of a triangle from an origin.
+  struct Corners {
+    Vector3d a, b, c;
+    double Area() const { return 0.5 * (b - a).cross(c - a).norm(); }
+    Vector3d Middle() const { return (a + b + c) / 3.0; }
+  };
+  const auto corners = [&](const std::array<int, 3>& triangle, const Vector3d& origin) {
+    return Corners{mesh.points[triangle[0]] - origin, mesh.points[triangle[1]] - origin,
+                   mesh.points[triangle[2]] - origin};
+  };
+  const auto weight = [&](const Corners& at) {
+    if (rule == MeshRule::kShell) return at.Area();
+    const double volume = at.a.dot(at.b.cross(at.c)) / 6.0;
+    return rule == MeshRule::kPositive ? std::abs(volume) : volume;
+  };
+  const auto middle_of = [&](const Vector3d& origin, double share, const auto& weight_of) {
+    Vector3d sum = Vector3d::Zero();
+    double total = 0.0;
+    for (const auto& triangle : mesh.triangles) {
+      const Corners at = corners(triangle, origin);
+      sum += weight_of(at) * share * at.Middle();
+      total += weight_of(at);
+    }
+    return total != 0.0 ? Vector3d(origin + sum / total) : origin;
+  };
+  if (mesh.points.empty()) return {};
+  const Vector3d centroid =
+      middle_of(mesh.points[0], 1.0, [](const Corners& at) { return at.Area(); });
+  Solid solid;
+  solid.centre = rule == MeshRule::kShell ? centroid : middle_of(centroid, 0.75, weight);
+  // integral of r r^T over a pyramid of volume V: V/20 (aa^T + bb^T + cc^T + ss^T), s = a + b + c;
+  // over a triangle A/12 (...)
+  const double share = rule == MeshRule::kShell ? 12.0 : 20.0;
+  Matrix3d products = Matrix3d::Zero();
+  for (const auto& triangle : mesh.triangles) {
+    const Corners at = corners(triangle, solid.centre);
+    const Vector3d s = at.a + at.b + at.c;
+    solid.volume += weight(at);
+    products += weight(at) / share *
+                (at.a * at.a.transpose() + at.b * at.b.transpose() + at.c * at.c.transpose() +
+                 s * s.transpose());
+  }
+  if (solid.volume != 0.0) {
+    solid.inertia = (products.trace() * Matrix3d::Identity() - products) / solid.volume;
+  }
+  return solid;
+}
+
+namespace {
+
+[[noreturn]] void Fail(const std::filesystem::path& path, std::size_t line, std::string_view found,
+                       std::string_view expected) {
+  const std::string place = line == 0 ? "" : fmt::format(":{}", line);
+  throw ConfigError(
+      fmt::format("{}{}: found {}, expected {}", path.string(), place, found, expected));
+}
+
+std::string ReadBytes(const std::filesystem::path& path) {
+  constexpr std::uintmax_t kMost = 64 << 20;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || !std::filesystem::is_regular_file(path)) Fail(path, 0, "no such file", "a mesh");
+  if (size > kMost) Fail(path, 0, fmt::format("{} bytes", size), "at most 64 MiB");
+  std::string bytes(size, '\0');
+  std::ifstream in(path, std::ios::binary);
+  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    Fail(path, 0, "a file that cannot be read", "a mesh");
+  }
+  return bytes;
+}
+
+/// A mesh from triangles with corners of their own; equal points become one.
+class MeshFromCorners {
+ public:
+  void Add(const Vector3d& point) {
+    const auto [at, is_new] = known_.try_emplace({point.x(), point.y(), point.z()},
+                                                 static_cast<int>(mesh_.points.size()));
+    if (is_new) mesh_.points.push_back(point);
+    triangle_[corner_++] = at->second;
+    if (corner_ < 3) return;
+    mesh_.triangles.push_back(triangle_);
+    corner_ = 0;
+  }
+  bool is_complete() const { return corner_ == 0; }
+  TriangleMesh mesh() && { return std::move(mesh_); }
+
+ private:
+  TriangleMesh mesh_;
+  std::map<std::tuple<double, double, double>, int> known_;
+  std::array<int, 3> triangle_ = {};
+  std::size_t corner_ = 0;
+};
+
+/// 80 bytes, the number of triangles, and for each the normal, three corners and two bytes.
+TriangleMesh ReadBinaryStl(const std::filesystem::path& path, std::string_view bytes) {
+  constexpr std::size_t kHeader = 84, kTriangle = 50;
+  std::uint32_t count = 0;
+  if (bytes.size() >= kHeader) std::memcpy(&count, bytes.data() + kHeader - 4, 4);
+  if (bytes.size() != kHeader + kTriangle * count) {
+    Fail(path, 0, fmt::format("{} bytes", bytes.size()),
+         fmt::format("{} for {} triangles", kHeader + kTriangle * count, count));
+  }
+  MeshFromCorners corners;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::array<float, 9> values;
+    std::memcpy(values.data(), bytes.data() + kHeader + kTriangle * i + 12, sizeof values);
+    for (const float value : values) {
+      if (!std::isfinite(value)) {
+        Fail(path, 0, fmt::format("a corner that is not finite in triangle {}", i), "numbers");
+      }
+    }
+    for (std::size_t k = 0; k < 9; k += 3) corners.Add({values[k], values[k + 1], values[k + 2]});
+  }
+  return std::move(corners).mesh();
+}
+
+std::vector<std::string_view> WordsOf(std::string_view line) {
+  std::vector<std::string_view> words;
+  constexpr std::string_view kBlanks = " \t\r";
+  while (true) {
+    const std::size_t start = line.find_first_not_of(kBlanks);
+    if (start == std::string_view::npos) return words;
+    const std::size_t end = std::min(line.find_first_of(kBlanks, start), line.size());
+    words.push_back(line.substr(start, end - start));
+    line.remove_prefix(end);
+  }
+}
+
+template <class Number>
+bool ReadNumber(std::string_view word, Number* number) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), *number);
+  return error == std::errc() && end == word.data() + word.size();
+}
+
+/// Calls `read` with the words and the number of each line.
+template <class Read>
+void ForEachLine(std::string_view text, const Read& read) {
+  for (std::size_t line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::vector<std::string_view> words = WordsOf(text.substr(0, end));
+    if (!words.empty()) read(words, line);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+}
+
+Vector3d PointOf(const std::filesystem::path& path, std::size_t line,
+                 const std::vector<std::string_view>& words) {
+  Vector3d point;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (words.size() <= k + 1 || !ReadNumber(words[k + 1], &point[k]) || !std::isfinite(point[k])) {
+      Fail(path, line, "a point without three numbers", "\"x y z\"");
+    }
+  }
+  return point;
+}
+
+TriangleMesh ReadTextStl(const std::filesystem::path& path, std::string_view text) {
+  MeshFromCorners corners;
+  ForEachLine(text, [&](const auto& words, std::size_t line) {
+    if (words[0] == "vertex") corners.Add(PointOf(path, line, words));
+    if (words[0] == "endloop" && !corners.is_complete()) {
+      Fail(path, line, "a facet that is no triangle", "three points");
+    }
+  });
+  return std::move(corners).mesh();
+}
+
+/// Points "v x y z" and polygons "f i j k ..." of point numbers from 1, or from -1 backwards, each
+/// with further numbers after a slash. Polygons are fans of triangles from their first corner.
+TriangleMesh ReadObj(const std::filesystem::path& path, std::string_view text) {
+  TriangleMesh mesh;
+  ForEachLine(text, [&](const auto& words, std::size_t line) {
+    if (words[0] == "v") mesh.points.push_back(PointOf(path, line, words));
+    if (words[0] != "f") return;
+    const int count = static_cast<int>(mesh.points.size());
+    std::vector<int> corners;
+    for (std::size_t k = 1; k < words.size(); ++k) {
+      int number = 0;
+      const bool is_number = ReadNumber(words[k].substr(0, words[k].find('/')), &number);
+      if (!is_number || number == 0 || number > count || number < -count) {
+        Fail(path, line, fmt::format("the corner \"{:.20}\"", words[k]),
+             fmt::format("numbers of points, 1 to {} above this line", count));
+      }
+      corners.push_back(number > 0 ? number - 1 : count + number);
+    }
+    if (corners.size() < 3) Fail(path, line, "a face with fewer than 3 corners", "3 or more");
+    for (std::size_t k = 2; k < corners.size(); ++k) {
+      mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+    }
+  });
+  return mesh;
+}
+
+}  // namespace
+
+TriangleMesh ReadMesh(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (ending != ".stl" && ending != ".obj") {
+    Fail(path, 0, fmt::format("a mesh of type \"{}\"", ending), ".stl or .obj");
+  }
+  const std::string bytes = ReadBytes(path);
+  const bool is_text = bytes.starts_with("solid") && bytes.find('\0') == std::string::npos;
+  const TriangleMesh mesh = ending == ".obj" ? ReadObj(path, bytes)
+                            : is_text        ? ReadTextStl(path, bytes)
+                                             : ReadBinaryStl(path, bytes);
+  if (mesh.triangles.empty()) Fail(path, 0, "no triangles", "a closed surface");
+  return mesh;
+}
+
+}  // namespace loopbench::harness

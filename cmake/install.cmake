@@ -5,6 +5,7 @@
 #   lib/                   static libraries
 #   lib/cmake/loopbench/   the package: find_package(loopbench) gives the target loopbench::loopbench
 #   share/loopbench/       schema/ and mechanisms/
+#   lib/python3/dist-packages/loopbench.py
 #   share/man/man1/        loopbench.1
 #   share/bash-completion/completions/, share/zsh/site-functions/, share/fish/vendor_completions.d/
 if(LOOPBENCH_SANITIZE)
@@ -83,6 +84,7 @@ if(LOOPBENCH_REPORT)
   install(FILES ${CMAKE_BINARY_DIR}/web/node_modules/uplot/LICENSE
     DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/loopbench RENAME LICENSE.uPlot COMPONENT runtime)
 endif()
+install(FILES python/loopbench.py DESTINATION lib/python3/dist-packages COMPONENT runtime)
 install(DIRECTORY configs/schema configs/mechanisms DESTINATION ${CMAKE_INSTALL_DATADIR}/loopbench COMPONENT runtime)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT runtime)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/loopbench-dev RENAME copyright)

@@ -15,7 +15,7 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME loopbench)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "gnuplot-nox")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "gnuplot-nox, python3-pandas")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "git, valgrind, loopbench-dev")
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
   "Runs mechanisms with closed loops by three formulations under one integrator, and

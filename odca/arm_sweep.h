@@ -90,7 +90,7 @@ class ArmSweep final : public ShortCut<Spatial> {
   void LayClosings(const Arms& arms);
   /// Returns true if Evaluate() accepts some position, even one far from closed. It accepts none if
   /// axes of loops are parallel or meet in a point, which reduces rank everywhere.
-  bool Serves();
+  bool IsUsable();
 
   /// Angles and speeds by place. False for angles beyond kLargestAngle.
   bool TakeIn(std::span<const double> q, std::span<const double> u);

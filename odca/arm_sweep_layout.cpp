@@ -60,10 +60,10 @@ std::unique_ptr<ArmSweep> ArmSweep::Make(const Mechanism<Spatial, double>& mecha
   sweep->Lay(arms, bodies_of_group);
   const int useful = static_cast<int>(sweep->groups_.size());
   sweep->pool_ = std::make_unique<WorkerPool>(std::clamp(useful, 1, std::max(1, threads)));
-  return sweep->Serves() ? std::move(sweep) : nullptr;
+  return sweep->IsUsable() ? std::move(sweep) : nullptr;
 }
 
-bool ArmSweep::Serves() {
+bool ArmSweep::IsUsable() {
   constexpr int kTrials = 3;
   constexpr double kGoldenAngle = 2.399963229728653;
   if (closings_.empty()) return true;

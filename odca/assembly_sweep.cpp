@@ -30,7 +30,7 @@ double Dot(const double* a, const double* b, int n) {
 
 }  // namespace
 
-template <AssemblySweep::Gaps kGaps>
+template <AssemblySweep::GapKind kGap>
 bool AssemblySweep::Turn() {
   const int places = static_cast<int>(angle_.size());
   if (!SinesAndCosines(angle_.data(), places, sine_.data(), cosine_.data())) return false;
@@ -42,12 +42,12 @@ bool AssemblySweep::Turn() {
       arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
     }
   }
-  if (!cuts_.empty()) Close<kGaps>();
+  if (!cuts_.empty()) Close<kGap>();
   return true;
 }
 
 /// A cut joint is imposed at a point of Q; there the arm of P ends (two_handle.h).
-template <AssemblySweep::Gaps kGaps>
+template <AssemblySweep::GapKind kGap>
 void AssemblySweep::Close() {
   const auto leads = [&](int body, int handle) {
     const Vector r = Scaled(bodies_[body].link.radius, arm_[handle]);
@@ -63,7 +63,7 @@ void AssemblySweep::Close() {
     };
     const Point<double> gap = at(cut.body_Q, cut.Q) - at(cut.body_P, cut.P);
     cut.w_P = cut.body_P < 0 ? 0.0 : speed_[cut.body_P];
-    cut.v = kGaps == Gaps::kSpeeds ? RelativeVelocity(cut.w_P, gap) : gap.p;
+    cut.v = kGap == GapKind::kSpeeds ? RelativeVelocity(cut.w_P, gap) : gap.p;
     if (cut.body_P >= 0) {
       arm_[cut.P] = arm_[cut.P] + Scaled(1.0 / bodies_[cut.body_P].link.radius, gap.p);
     }
@@ -344,7 +344,7 @@ bool AssemblySweep::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kine
   using Numbers = Eigen::Map<const VectorX<double>>;
   operations_ = 0;
   tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  if (!Turn<Gaps::kSpeeds>() || !Assemble()) return false;
+  if (!Turn<GapKind::kSpeeds>() || !Assemble()) return false;
   const auto take_forces = [&] {
     if (applied_.empty()) return;
     kinematics->UpdatePosition(Numbers(q.data(), std::ssize(q)));
@@ -365,12 +365,12 @@ bool AssemblySweep::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kine
   return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
 }
 
-bool AssemblySweep::Serves(const Kinematics<Planar, double>& kinematics) {
+bool AssemblySweep::IsUsable(const Kinematics<Planar, double>& kinematics) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     angle_[i] = kinematics.poses()[i + 1].angle;
     speed_[i] = 0.0;
   }
-  return Turn<Gaps::kSpeeds>() && Assemble();
+  return Turn<GapKind::kSpeeds>() && Assemble();
 }
 
 bool AssemblySweep::FindChange() {

@@ -43,7 +43,7 @@ class AssemblySweep final : public ShortCut<Planar> {
                 std::span<double> udot) override;
   std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
                                             double goal) override;
-  bool Serves(const Kinematics<Planar, double>& kinematics) override;
+  bool IsUsable(const Kinematics<Planar, double>& kinematics) override;
   long operations() const override { return operations_; }
 
  private:
@@ -106,15 +106,15 @@ class AssemblySweep final : public ShortCut<Planar> {
   };
 
   /// Type of the violation in CutJoint::v, as in path_sweep.h.
-  enum class Gaps { kSpeeds, kPositions };
+  enum class GapKind { kSpeeds, kPositions };
 
   AssemblySweep() = default;
   struct Layout;
 
   /// Bodies at moved angles. False for angles beyond kLargestAngle.
-  template <Gaps kGaps>
+  template <GapKind kGap>
   bool Turn();
-  template <Gaps kGaps>
+  template <GapKind kGap>
   void Close();
   /// Matrices of all assemblies. False near a degenerate position.
   bool Assemble();

@@ -127,7 +127,7 @@ std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<
 template <class Space, class S>
 void Odca<Space, S>::Start([[maybe_unused]] const Kinematics<Space, S>& kinematics) {
   if constexpr (std::is_same_v<S, double>) {
-    tries_short_cut_ = short_cut_ != nullptr && short_cut_->Serves(kinematics);
+    tries_short_cut_ = short_cut_ != nullptr && short_cut_->IsUsable(kinematics);
   }
 }
 

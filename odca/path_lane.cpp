@@ -27,10 +27,10 @@ void Scatter(const std::vector<Lanes>& all, int lane, std::span<double> one) {
 }  // namespace
 
 /// All lanes of mechanisms of one shape. Unused lanes keep stale data; their results are discarded.
-class PathLane::All final : public Together {
+class PathLane::All final : public SharedWork {
  public:
   explicit All(const PathSweep& one)
-      : sweep_(PathSweepOf<Lanes>::Beside(one)), q_(one.num_u()), u_(q_), qdot_(q_), udot_(q_) {}
+      : sweep_(PathSweepOf<Lanes>::InLanes(one)), q_(one.num_u()), u_(q_), qdot_(q_), udot_(q_) {}
   bool HasLanes() const { return sweep_ != nullptr; }
 
   /// Returns -1 if no lane is free or the mechanism differs.
@@ -82,7 +82,7 @@ std::unique_ptr<PathLane> PathLane::Take(SideBySide& beside, const PathSweep& ow
     const int lane = all.Take(own);
     return lane < 0 ? nullptr : std::unique_ptr<PathLane>(new PathLane(beside, all, lane));
   };
-  for (const std::unique_ptr<Together>& work : beside.works) {
+  for (const std::unique_ptr<SharedWork>& work : beside.works) {
     auto* all = dynamic_cast<All*>(work.get());
     if (all == nullptr) continue;
     if (auto lane = take(*all)) return lane;

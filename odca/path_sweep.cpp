@@ -139,7 +139,7 @@ TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double
                                     std::span<T> udot) {
   operations_ = 0;
   tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  TruthOf<T> good = Turn<Gaps::kSpeeds>();
+  TruthOf<T> good = Turn<GapKind::kSpeeds>();
   if (!Any(good)) return good;
   if (speeds == SpeedsUsed::kGiven) {
     good &= Sweep<Pass::kAccelerations>();

@@ -56,7 +56,7 @@ class PathSweepOf final
                                            int threads = 1, int bodies_of_group = kBodiesOfGroup);
   /// Returns a sweep for lanes of mechanisms like `one`, whose constants are in every lane; null if
   /// its own pieces fill the lanes.
-  static std::unique_ptr<PathSweepOf> Beside(const PathSweepOf<double>& one);
+  static std::unique_ptr<PathSweepOf> InLanes(const PathSweepOf<double>& one);
   /// For lanes: copies the constants of `one` into a lane. Returns false, without change, if its
   /// shape differs.
   bool SetMechanism(int lane, const PathSweepOf<double>& one);
@@ -108,7 +108,7 @@ class PathSweepOf final
     Point<Lanes> ends;            ///< of its pieces (TurnPacks())
     TwoHandle<Lanes> assemblies;  ///< they are joined to these
     double room = 0.0, slack = 0.0;
-    double largest = 0.0;   ///< square of the largest gap in it, of Gaps::kPositions
+    double largest = 0.0;   ///< square of the largest gap in it, of GapKind::kPositions
     Vector2<Lanes> F1, F2;  ///< on these
   };
   template <class>
@@ -121,28 +121,28 @@ class PathSweepOf final
 
   /// Type of the violation of cut joints in gap_v, which Pass::kSpeeds removes: in each case J
   /// belongs to the current poses.
-  enum class Gaps { kSpeeds, kPositions };
+  enum class GapKind { kSpeeds, kPositions };
 
   /// Computes the bodies at their angles, with the terms from violations of cut joints. Returns
   /// false for angles beyond kLargestAngle.
-  template <Gaps kGaps>
+  template <GapKind kGap>
   TruthOf<T> Turn();
   /// Computes the end point of each piece, relative to its start unless it has its own pin.
-  template <bool kLoops, Gaps kGaps>
+  template <bool kLoops, GapKind kGap>
   void TurnPacks(Group& group);
   /// Computes the following bodies; returns the remainder up to kLargestAngle.
   T TurnSingles(const PathPlaces& path);
-  template <Gaps kGaps>
+  template <GapKind kGap>
   void CloseLoops(PathPlaces& path);
   /// Closes loops along the pieces of a group at their first bodies: `at_2` leads from the body
   /// before the group to its last one.
-  template <Gaps kGaps>
+  template <GapKind kGap>
   void CloseStarts(Group& group, Point<double>& at_2);
   struct At;
   At Body(const PathPlaces& path, int k) const;
   void Set(const PathPlaces& path, int k, const TurnedLink<T>& turned);
   /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
-  template <Gaps kGaps>
+  template <GapKind kGap>
   void Close(PathPlaces& path, int k, bool here, const Point<T>& gap);
   friend PinProjection;
   bool FindChange() { return Sweep<Pass::kSpeeds>(); }

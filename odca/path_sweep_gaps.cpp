@@ -15,7 +15,7 @@ bool Says(const Lanes& truth) { return truth[0] > 0.0; }
 }  // namespace
 
 template <class T>
-template <bool kLoops, typename PathSweepOf<T>::Gaps kGaps>
+template <bool kLoops, typename PathSweepOf<T>::GapKind kGap>
 void PathSweepOf<T>::TurnPacks(Group& group) {
   const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
@@ -36,7 +36,7 @@ void PathSweepOf<T>::TurnPacks(Group& group) {
                                  at_pin.v + Scaled(closure.follows, gap.v)};
       at_2 = Across(link, at, speed, at_1);
       at.r1 = at.r1 + Scaled(closure.cut_here * closure.inverse_radius, gap.p);
-      if constexpr (kGaps == Gaps::kSpeeds) {
+      if constexpr (kGap == GapKind::kSpeeds) {
         at.gap_w = closure.cut_here * speed + closure.cut_before * speed_before;
         at.gap_v = Scaled(closure.cut_here + closure.cut_before, RelativeVelocity(at.gap_w, gap));
       } else {
@@ -88,7 +88,7 @@ void PathSweepOf<T>::Set(const PathPlaces& path, int k, const TurnedLink<T>& tur
 }
 
 template <class T>
-template <typename PathSweepOf<T>::Gaps kGaps>
+template <typename PathSweepOf<T>::GapKind kGap>
 void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& gap) {
   const int P = here ? k : k - 1;
   At at_P = Body(path, P);
@@ -99,7 +99,7 @@ void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& g
     at_P.turned.r2 = at_P.turned.r2 - to_Q;
   }
   Set(path, P, at_P.turned);
-  const Vector2<T> gap_v = kGaps == Gaps::kSpeeds ? RelativeVelocity(at_P.speed, gap) : gap.p;
+  const Vector2<T> gap_v = kGap == GapKind::kSpeeds ? RelativeVelocity(at_P.speed, gap) : gap.p;
   largest_ = Max<T>(largest_, gap_v.x * gap_v.x + gap_v.y * gap_v.y);
   if (k == path.bodies) {
     path.gap_v = gap_v;
@@ -127,7 +127,7 @@ T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
 /// Closes loops like TurnPacks() in between, except that the body before each first one is one lane
 /// before it, in the last pack, or ends the previous group.
 template <class T>
-template <typename PathSweepOf<T>::Gaps kGaps>
+template <typename PathSweepOf<T>::GapKind kGap>
 void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
   const Closure<Lanes>& starts = group.starts;
   TurnedLink<Lanes>& turned = turned_packs_[group.pack];
@@ -154,7 +154,7 @@ void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
   const int last = group.pack + path.packs - 1;
   const Point<Lanes> gap = reached - at_pin;
   turned.r1 = turned.r1 + Scaled(starts.cut_here * starts.inverse_radius, gap.p);
-  if constexpr (kGaps == Gaps::kSpeeds) {
+  if constexpr (kGap == GapKind::kSpeeds) {
     const Lanes speed_before =
         LaneAfter(Load<Lanes>(&speed_[group.place + (path.packs - 1) * kLanes]),
                   is_first ? 0.0 : speed_[group.place - 1]);
@@ -177,7 +177,7 @@ void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
 }
 
 template <class T>
-template <typename PathSweepOf<T>::Gaps kGaps>
+template <typename PathSweepOf<T>::GapKind kGap>
 void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
   Point<T> at_2 = {};
   const auto start = [&](int k, const Closure<T>& closure) {
@@ -185,12 +185,12 @@ void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
     const At at = Body(path, k);
     const Point<T> at_pin = AtPin(at.link, at.turned, at.speed, closure);
     const bool cut_here = Says(closure.cut_here);
-    if (cut_here || Says(closure.cut_before)) Close<kGaps>(path, k, cut_here, at_2 - at_pin);
+    if (cut_here || Says(closure.cut_before)) Close<kGap>(path, k, cut_here, at_2 - at_pin);
     return at_pin;
   };
   if constexpr (kIsOne) {
     for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
-      CloseStarts<kGaps>(groups_[g], at_2);
+      CloseStarts<kGap>(groups_[g], at_2);
     }
   }
   for (int k = path.packed; k < path.bodies; ++k) {
@@ -201,20 +201,20 @@ void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
   }
   if (!path.ends_at_ground) return;
   const Point<T> gap = {at_2.p - path.end, at_2.v};
-  if (!path.ground_is_P) return Close<kGaps>(path, path.bodies, false, gap);
-  path.gap_v = kGaps == Gaps::kSpeeds ? gap.v : gap.p;
+  if (!path.ground_is_P) return Close<kGap>(path, path.bodies, false, gap);
+  path.gap_v = kGap == GapKind::kSpeeds ? gap.v : gap.p;
   largest_ = Max<T>(largest_, gap.p.x * gap.p.x + gap.p.y * gap.p.y);
 }
 
 template <class T>
-template <typename PathSweepOf<T>::Gaps kGaps>
+template <typename PathSweepOf<T>::GapKind kGap>
 TruthOf<T> PathSweepOf<T>::Turn() {
   if constexpr (kIsOne) {
     pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
       if (paths_[groups_[i].path].loops_in_lanes) {
-        TurnPacks<true, kGaps>(groups_[i]);
+        TurnPacks<true, kGap>(groups_[i]);
       } else {
-        TurnPacks<false, kGaps>(groups_[i]);
+        TurnPacks<false, kGap>(groups_[i]);
       }
     });
     for (const Group& group : groups_) {
@@ -226,13 +226,13 @@ TruthOf<T> PathSweepOf<T>::Turn() {
   for (PathPlaces& path : paths_) {
     good &= TurnSingles(path) >= 0.0;
     if (!Any(good)) break;
-    if (path.has_loops) CloseLoops<kGaps>(path);
+    if (path.has_loops) CloseLoops<kGap>(path);
   }
   return good;
 }
 
-template bool PathSweep::Turn<PathSweep::Gaps::kSpeeds>();
-template bool PathSweep::Turn<PathSweep::Gaps::kPositions>();
-template LaneBits PathSweepOf<Lanes>::Turn<PathSweepOf<Lanes>::Gaps::kSpeeds>();
+template bool PathSweep::Turn<PathSweep::GapKind::kSpeeds>();
+template bool PathSweep::Turn<PathSweep::GapKind::kPositions>();
+template LaneBits PathSweepOf<Lanes>::Turn<PathSweepOf<Lanes>::GapKind::kSpeeds>();
 
 }  // namespace loopbench::odca::pins

@@ -107,7 +107,7 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, dou
 }
 
 template <class T>
-std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Beside(const PathSweepOf<double>& one) {
+std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::InLanes(const PathSweepOf<double>& one) {
   if (!one.groups_.empty()) return nullptr;
   std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
   for (const auto& path : one.paths_) {
@@ -230,7 +230,7 @@ void PathSweepOf<T>::AddPacks(const PathPlaces& path, const PathLinks& links) {
 }
 
 template std::unique_ptr<PathSweep> PathSweep::Make(const Mechanism<Planar, double>&, int, int);
-template std::unique_ptr<PathSweepOf<Lanes>> PathSweepOf<Lanes>::Beside(const PathSweep&);
+template std::unique_ptr<PathSweepOf<Lanes>> PathSweepOf<Lanes>::InLanes(const PathSweep&);
 template bool PathSweepOf<Lanes>::SetMechanism(int, const PathSweep&);
 
 }  // namespace loopbench::odca::pins

@@ -15,7 +15,7 @@ struct PinProjection {
   template <class Sweep>
   static std::optional<Correction<double>> Of(Sweep& sweep, std::span<double> q,
                                               std::span<double> u, double goal) {
-    using Gaps = typename Sweep::Gaps;
+    using GapKind = typename Sweep::GapKind;
     sweep.operations_ = 0;
     auto &moved = sweep.moved_, &speeds = sweep.speeds_;
     std::ranges::copy(q, moved.begin());
@@ -36,7 +36,7 @@ struct PinProjection {
       moved = sweep.back_;  // round-off: as it was
       break;
     }
-    if (!TurnTo<Gaps::kSpeeds>(sweep) || !sweep.FindChange()) return std::nullopt;
+    if (!TurnTo<GapKind::kSpeeds>(sweep) || !sweep.FindChange()) return std::nullopt;
     if (!AddChange(sweep, speeds, speeds)) return std::nullopt;
     std::ranges::copy(moved, q.begin());
     std::ranges::copy(speeds, u.begin());
@@ -44,16 +44,16 @@ struct PinProjection {
   }
 
  private:
-  template <auto kGaps, class Sweep>
+  template <auto kGap, class Sweep>
   static bool TurnTo(Sweep& sweep) {
     sweep.tree_.ToBodies(sweep.moved_, sweep.speeds_, sweep.angle_.data(), sweep.speed_.data(),
                          *sweep.pool_);
-    return sweep.template Turn<kGaps>();
+    return sweep.template Turn<kGap>();
   }
   /// The largest gap of a cut joint at the positions moved [m], or nothing.
   template <class Sweep>
   static std::optional<double> GapOf(Sweep& sweep) {
-    if (!TurnTo<Sweep::Gaps::kPositions>(sweep)) return std::nullopt;
+    if (!TurnTo<Sweep::GapKind::kPositions>(sweep)) return std::nullopt;
     return sweep.LargestGap();
   }
   template <class Sweep>

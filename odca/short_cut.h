@@ -23,7 +23,7 @@ class ShortCut {
                                                     double goal) = 0;
   /// Returns true if Evaluate() should be tried in a run that starts at these positions. It would
   /// fail each time if constraints are redundant everywhere.
-  virtual bool Serves(const Kinematics<Space, double>& /*kinematics*/) { return true; }
+  virtual bool IsUsable(const Kinematics<Space, double>& /*kinematics*/) { return true; }
   /// Returns the multiply-adds of the last evaluation, or of its completed part.
   virtual long operations() const = 0;
 };

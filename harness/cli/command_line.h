@@ -144,7 +144,7 @@ void AddAdvise(Commands& commands);
 void AddView(Commands& commands);
 void AddResults(Commands& commands);
 void AddVerdicts(Commands& commands);
-void AddTradeoff(Commands& commands);
+void AddWorkPrecision(Commands& commands);
 void AddTrajectory(Commands& commands);
 void AddImport(Commands& commands);
 void AddConvert(Commands& commands);

@@ -65,7 +65,7 @@ const std::pair<const char*, std::vector<void (*)(Commands&)>> kGroups[] = {
     {"Experiments", {AddRun, AddList, AddPlan, AddAdvise, AddMerge}},
     {"Mechanisms",
      {AddCheck, AddExplain, AddView, AddSimplify, AddImport, AddConvert, AddGenerate, AddCount}},
-    {"Results", {AddResults, AddTrajectory, AddTradeoff, AddVerdicts}},
+    {"Results", {AddResults, AddTrajectory, AddWorkPrecision, AddVerdicts}},
     {"Regressions", {AddComparison, AddBaseline, AddHistory}},
     {"Clusters", {AddCluster}},
     {"Shell", {AddSchema, AddMigrate}}};

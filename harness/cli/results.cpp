@@ -368,8 +368,8 @@ std::filesystem::path FolderOf(const WorkPrecisionCommand& command) {
   return is_file ? command.store.parent_path() : command.store;
 }
 
-void WriteTradeoff(const WorkPrecision& work_precision, const std::filesystem::path& folder,
-                   const std::string& typed) {
+void WriteWorkPrecision(const WorkPrecision& work_precision, const std::filesystem::path& folder,
+                        const std::string& typed) {
   const std::string stem = (folder / "work-precision").string();
   Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
   Table cheapest = CheapestTable(work_precision);
@@ -391,18 +391,18 @@ void PrintForPeople(const WorkPrecision& work_precision, const WorkPrecisionComm
   PrintText(ToScreen(overview) + "\n");
 }
 
-/// Prints fronts, overview and fairness statement; writes tradeoff.csv, tradeoff-overview.csv,
-/// tradeoff.md and the figures.
-int PrintTradeoff(const WorkPrecisionCommand& command, const std::string& typed) {
+/// Prints fronts, overview and fairness statement; writes work-precision.csv,
+/// work-precision-overview.csv, work-precision.md and the figures.
+int PrintWorkPrecision(const WorkPrecisionCommand& command, const std::string& typed) {
   const std::vector<Record> records = LoadRecords(command.store, command.options.where);
   if (records.empty()) {
     PrintError("{}: no records\n", command.store.string());
     return 2;
   }
   RequireOneContent(records, command.store, "work-precision");
-  const WorkPrecision work_precision = MakeTradeoff(records, command.options);
+  const WorkPrecision work_precision = MakeWorkPrecision(records, command.options);
   const std::filesystem::path folder = FolderOf(command);
-  WriteTradeoff(work_precision, folder, typed);
+  WriteWorkPrecision(work_precision, folder, typed);
   if (command.format == "text") {
     PrintForPeople(work_precision, command, typed);
     const std::string stem = (folder / "work-precision").string();
@@ -421,12 +421,12 @@ int PrintTradeoff(const WorkPrecisionCommand& command, const std::string& typed)
 
 }  // namespace
 
-void AddTradeoff(Commands& commands) {
+void AddWorkPrecision(Commands& commands) {
   auto& command = commands.Keep<WorkPrecisionCommand>();
   WorkPrecisionOptions& options = command.options;
   commands.Add(
       "work-precision", "Compute work-precision tables and Pareto fronts",
-      [&](const Typed& typed) { return PrintTradeoff(command, typed.line); },
+      [&](const Typed& typed) { return PrintWorkPrecision(command, typed.line); },
       {StoreArgument(&command.store),
        {"--error-key", "Key of the error (default: error_position_max, or an error in the store)",
         &options.error},

@@ -43,7 +43,7 @@ std::vector<double> Inputs(const MotionState& state) {
 }
 
 /// Returns true if a branch covers a state: comparisons agree and the result is finite.
-bool Serves(const RecordedFunction& branch, const MotionState& state) {
+bool Covers(const RecordedFunction& branch, const MotionState& state) {
   const std::vector<double> values = branch.graph.Values(Inputs(state));
   return branch.graph.Holds(values) &&
          std::ranges::all_of(branch.outputs, [&](int node) { return std::isfinite(values[node]); });
@@ -71,7 +71,7 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
     return recorded;
   };
   for (const MotionState& state : request.motion) {
-    const auto serves = [&](const RecordedFunction& branch) { return Serves(branch, state); };
+    const auto covers = [&](const RecordedFunction& branch) { return Covers(branch, state); };
     if (std::ranges::any_of(branches.recorded, serves)) continue;
     if (std::ssize(branches.recorded) >= kMaxCodeBranches) {
       ++branches.missed;
@@ -83,7 +83,7 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
     near.t += generate::ShiftOf(near.y.size());
     try {
       branches.recorded.push_back(record(near));
-      if (!serves(branches.recorded.back())) branches.recorded.push_back(record(state));
+      if (!covers(branches.recorded.back())) branches.recorded.push_back(record(state));
     } catch (const generate::NotCovered&) {
       if (branches.recorded.empty()) throw;
       ++branches.missed;
@@ -100,7 +100,7 @@ Branches JacobianOf(const Branches& derivative, const CodeRequest& request) {
     std::vector<double> values;
     for (const MotionState& state : request.motion) {
       values = branch.graph.Values(Inputs(state));
-      if (Serves(branch, state)) break;
+      if (Covers(branch, state)) break;
     }
     branch.outputs = generate::Differentiate(
         branch.graph, branch.outputs, {branch.inputs.begin() + 1, branch.inputs.end()}, values);

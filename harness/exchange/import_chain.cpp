@@ -76,8 +76,8 @@ bool Independent(const std::vector<SerialJoint>& joints) {
 }
 
 /// Returns the joint that several joints form; `all`: in their order, by kind.
-std::optional<ComposedJoint> Together(const std::vector<SerialJoint>& joints,
-                                      const std::map<SerialKind, std::vector<SerialJoint>>& all) {
+std::optional<ComposedJoint> JointOf(const std::vector<SerialJoint>& joints,
+                                     const std::map<SerialKind, std::vector<SerialJoint>>& all) {
   const auto of = [&](SerialKind kind) {
     const auto found = all.find(kind);
     return found == all.end() ? std::vector<SerialJoint>() : found->second;
@@ -125,7 +125,7 @@ std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints) {
   }
   std::map<SerialKind, std::vector<SerialJoint>> all;
   for (const SerialJoint& joint : joints) all[joint.kind].push_back(joint);
-  return all.contains(SerialKind::kFree) ? std::nullopt : Together(joints, all);
+  return all.contains(SerialKind::kFree) ? std::nullopt : JointOf(joints, all);
 }
 
 std::string WordsOf(const std::vector<SerialJoint>& joints) {

@@ -35,10 +35,10 @@ class Timer {
 };
 
 /// Calls of compiled functions by runs of one thread, kLanes runs at once.
-class LaneCalls final : public Together {
+class LaneCalls final : public SharedWork {
  public:
   static LaneCalls& Of(SideBySide& beside) {
-    for (const std::unique_ptr<Together>& work : beside.works) {
+    for (const std::unique_ptr<SharedWork>& work : beside.works) {
       if (auto* calls = dynamic_cast<LaneCalls*>(work.get())) return *calls;
     }
     auto calls = std::make_unique<LaneCalls>();

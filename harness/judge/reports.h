@@ -59,11 +59,11 @@ Table WorkPrecisionTable(const WorkPrecision& work_precision, const WorkPrecisio
 Table OverviewTable(const WorkPrecision& work_precision);
 
 /// Returns one row per problem, error limit and formulation with the method, error and cost:
-/// tradeoff-overview.csv.
+/// work-precision-overview.csv.
 Table CheapestTable(const WorkPrecision& work_precision);
 
-/// Returns tradeoff.md: overview, fairness statement, the cheapest methods, and all rows of all
-/// problems. `notes` (provenance) are at the end.
+/// Returns work-precision.md: overview, fairness statement, the cheapest methods, and all rows of
+/// all problems. `notes` (provenance) are at the end.
 std::string WorkPrecisionMarkdown(const WorkPrecision& work_precision,
                                   const std::vector<std::string>& notes);
 

@@ -222,7 +222,8 @@ bool IsErrorOfPositions(const std::string& key) {
   return key.starts_with("error_position") || key == "error_path_max";
 }
 
-WorkPrecision MakeTradeoff(std::span<const Record> records, const WorkPrecisionOptions& options) {
+WorkPrecision MakeWorkPrecision(std::span<const Record> records,
+                                const WorkPrecisionOptions& options) {
   for (const std::string& key : options.per) RequireKey("--per", key, records);
   RequireConditions("--where", options.where, records);
   WorkPrecision work_precision;
@@ -244,7 +245,7 @@ WorkPrecision MakeTradeoff(std::span<const Record> records, const WorkPrecisionO
     work_precision.problems[place->second].rows.push_back(std::move(row));
   }
   if (work_precision.problems.empty()) {
-    throw ConfigError(fmt::format("tradeoff: no accuracy record{}{}",
+    throw ConfigError(fmt::format("work-precision: no accuracy record{}{}",
                                   options.where.empty() ? "" : " matches ", ToText(options.where)));
   }
   for (WorkPrecisionProblem& problem : work_precision.problems) {

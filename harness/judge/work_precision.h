@@ -77,7 +77,8 @@ struct WorkPrecision {
 
 /// @throws ConfigError if no accuracy record passes `where`, no record has the error or the cost,
 /// or an option names a key that no record has.
-WorkPrecision MakeTradeoff(std::span<const Record> records, const WorkPrecisionOptions& options);
+WorkPrecision MakeWorkPrecision(std::span<const Record> records,
+                                const WorkPrecisionOptions& options);
 
 // Fairness of the comparison: settings that were equal and different among the compared rows, read
 // from the records.

@@ -392,7 +392,7 @@ std::vector<ReportCost> MakeCosts(const std::vector<Record>& records, const std:
       if (other == "config_hash") options.per.push_back(other);
     }
     try {
-      ReportCost cost{.work_precision = MakeTradeoff(records, options)};
+      ReportCost cost{.work_precision = MakeWorkPrecision(records, options)};
       cost.error = ColumnOf(key, records).header;
       cost.cost = ColumnOf(cost.work_precision.cost, records).header;
       cost.fairness = FairnessStatement(cost.work_precision);

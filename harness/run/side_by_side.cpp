@@ -108,7 +108,7 @@ class Places final : public SideBySide {
 
  private:
   void DoAll() {
-    for (const std::unique_ptr<Together>& work : works) work->Do();
+    for (const std::unique_ptr<SharedWork>& work : works) work->Do();
   }
 
   std::vector<std::unique_ptr<Place>> places_;

@@ -103,9 +103,10 @@ void RequireKeys(const std::vector<Experiment>& experiments, const Selection& fi
     const bool is_measured = FindMeasure(condition.key) != nullptr;
     throw ConfigError(fmt::format(
         "--filter {}: no such key{}; cases have {}", condition.key,
-        is_measured ? " before a run, which measures it (table, plot and tradeoff choose by it: "
-                      "--where)"
-                    : "",
+        is_measured
+            ? " before a run, which measures it (table, plot and work-precision choose by it: "
+              "--where)"
+            : "",
         fmt::join(known, ", ")));
   }
 }

@@ -76,22 +76,22 @@ S Passage<Space, S>::LeastEigenvalue() {
 }
 
 template <class Space, class S>
-Beside Passage<Space, S>::Judge(const Kinematics<Space, S>& at, S least, S step) {
+Nearby Passage<Space, S>::Judge(const Kinematics<Space, S>& at, S least, S step) {
   curve_.setZero();
   const bool may_pass = least > S(kPassed * kRegularization);
-  if (!Move(at, -step)) return Beside::kUnknown;
+  if (!Move(at, -step)) return Nearby::kUnknown;
   moved_ = state_.q() - there_;
   const S before = may_pass ? LeastEigenvalue() : S(0);
-  if (!Move(at, step)) return Beside::kUnknown;
+  if (!Move(at, step)) return Nearby::kUnknown;
   curve_ = state_.q() - there_;
-  if ((curve_ - moved_).norm() > S(2 * kTurned) * step * rates_.norm()) return Beside::kRegular;
+  if ((curve_ - moved_).norm() > S(2 * kTurned) * step * rates_.norm()) return Nearby::kRegular;
   curve_ = (curve_ + moved_) / (S(2) * step * step);
-  if (!may_pass) return Beside::kOneBranch;
+  if (!may_pass) return Nearby::kOneBranch;
   const S after = LeastEigenvalue();
   // the lowest value of the parabola through the three
   const S bend = (before + after) / S(2) - least, slope = (after - before) / S(2);
   const S lowest = bend > S(0) ? least - slope * slope / (S(4) * bend) : least;
-  return lowest > S(kPassed * kRegularization) ? Beside::kRegular : Beside::kOneBranch;
+  return lowest > S(kPassed * kRegularization) ? Nearby::kRegular : Nearby::kOneBranch;
 }
 
 /// M udot + h of the accelerations there.
@@ -134,20 +134,20 @@ bool Passage<Space, S>::Interpolate(const Kinematics<Space, S>& at, S step) {
 }
 
 template <class Space, class S>
-Beside Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
+Nearby Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
   const Mechanism<Space, S>& mechanism = at.mechanism();
   const S least = S(EigenvalueOf(solver_.conditioning().smallest_weight, at.regularization()));
   S speed = S(0);
   for (const Velocity<Space, S>& V : at.motions()) {
     speed = std::max({speed, S(V.angular.norm()), S(V.linear.norm() / mechanism.length())});
   }
-  if (!(speed > S(0))) return Beside::kUnknown;
+  if (!(speed > S(0))) return Nearby::kUnknown;
   mechanism.Rates(at.q(), at.u(), rates_);
   state_.kinematics() = at;  // measured angles continue from the same step
   state_.kinematics().SetRegularization(kRegularization);
   state_.ForgetFactors();
-  const Beside beside = Judge(at, least, S(kBeside) / speed);
-  if (beside != Beside::kOneBranch) return beside;
+  const Nearby beside = Judge(at, least, S(kBeside) / speed);
+  if (beside != Nearby::kOneBranch) return beside;
   bool is_known = false;
   for (double side = kNear; side >= kBeside; side /= 2.0) {
     is_known = Interpolate(at, S(side) / speed) || is_known;
@@ -159,7 +159,7 @@ Beside Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
     is_known = Interpolate(at, S(side) / speed);
   }
   is_smooth_ = false;
-  return is_known ? beside : Beside::kUnknown;
+  return is_known ? beside : Nearby::kUnknown;
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Passage<Space, S>;

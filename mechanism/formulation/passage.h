@@ -30,7 +30,7 @@ namespace loopbench {
 inline constexpr double kMinRegularization = 4e-10, kSmoothRegularization = 1.2e-7;
 
 /// Positions ahead of and behind a regularized one.
-enum class Beside {
+enum class Nearby {
   kUnknown,    ///< the mechanism rests, or they are regularized, too
   kOneBranch,  ///< they lie on one smooth branch through a singular configuration
   kRegular,    ///< the motion passes a singular configuration at a distance
@@ -44,7 +44,7 @@ class Passage {
 
   /// Looks ahead and behind from the state `at`, whose factors the solver has. Afterwards the
   /// solver has factors of other positions.
-  Beside Look(const Kinematics<Space, S>& at);
+  Nearby Look(const Kinematics<Space, S>& at);
   /// J^T lambda of the constraints after Look() with kOneBranch.
   const VectorX<S>& Force() const { return force_; }
   /// Share for regularization together with this force.
@@ -59,7 +59,7 @@ class Passage {
   S LeastEigenvalue();
   /// Whether the motion passes at a distance, from positions at -step and step; `least` is the
   /// eigenvalue between.
-  Beside Judge(const Kinematics<Space, S>& at, S least, S step);
+  Nearby Judge(const Kinematics<Space, S>& at, S least, S step);
   /// J^T lambda where Move() ended. False if a direction is regularized there.
   bool FindForce(VectorX<S>& force);
   /// Sets force_ from as many pairs of positions at multiples of -step and step as are not

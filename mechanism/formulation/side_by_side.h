@@ -8,9 +8,9 @@
 namespace loopbench {
 
 /// Work that a solver does for several runs at once.
-class Together {
+class SharedWork {
  public:
-  virtual ~Together() = default;
+  virtual ~SharedWork() = default;
   /// Does all work requested since the last call. Must not throw while runs are suspended.
   virtual void Do() noexcept = 0;
 };
@@ -24,7 +24,7 @@ class SideBySide {
   virtual void Meet() = 0;
 
   /// Works shared by the solvers of these runs.
-  std::vector<std::unique_ptr<Together>> works;
+  std::vector<std::unique_ptr<SharedWork>> works;
 };
 
 }  // namespace loopbench

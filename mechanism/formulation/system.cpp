@@ -140,10 +140,10 @@ Outcome System<Space, S>::FactorBranch() {
   if (!AtPassage() || drives_ != nullptr) return outcome;
   if (outcome != Outcome::kFinished || !is_regularized) return outcome;
   if (passage_ == nullptr) passage_ = std::make_unique<Passage<Space, S>>(mechanism_, *solver_);
-  const Beside beside = passage_->Look(kinematics());
+  const Nearby beside = passage_->Look(kinematics());
   state_.ForgetFactors();
-  if (beside == Beside::kRegular) state_.kinematics().SetRegularization(kMinRegularization);
-  if (beside == Beside::kOneBranch) {
+  if (beside == Nearby::kRegular) state_.kinematics().SetRegularization(kMinRegularization);
+  if (beside == Nearby::kOneBranch) {
     carried_ = &passage_->Force();
     state_.kinematics().SetRegularization(passage_->regularization());
   }

@@ -156,7 +156,7 @@ TEST(Report, CountsAreThoseOfTheTables) {
   EXPECT_EQ(data.findings[0].filter, "outcome=singular");
   EXPECT_EQ(data.findings[1].filter, "warnings~drift");
   ASSERT_EQ(data.costs.size(), 1u);
-  const WorkPrecision judged = MakeTradeoff(records, {.error = "error_position_max"});
+  const WorkPrecision judged = MakeWorkPrecision(records, {.error = "error_position_max"});
   ASSERT_EQ(data.costs[0].work_precision.problems.size(), judged.problems.size());
   for (std::size_t i = 0; i < judged.problems[0].rows.size(); ++i) {
     EXPECT_EQ(data.costs[0].work_precision.problems[0].rows[i].on_front,

@@ -18,7 +18,7 @@ namespace loopbench::harness {
 namespace side_by_side_test {
 
 /// Counts those that wait for it.
-class Counter final : public Together {
+class Counter final : public SharedWork {
  public:
   void Do() noexcept override {
     most = std::max(most, waiting);

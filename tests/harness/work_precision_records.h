@@ -1,4 +1,4 @@
-// Records of runs and their timings, made by hand: what `tradeoff` and its reports are tested with.
+// Records of runs and their timings, made by hand: for the tests of work-precision and its reports.
 #pragma once
 
 #include <cmath>

@@ -17,7 +17,7 @@ using namespace work_precision_records;
 
 TEST(WorkPrecisionReport, SaysNoneReachedIt) {
   const std::vector<Record> records = Store({1e-4, 1e-7}, {0.1, 0.3});
-  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
   const std::string overview = ToText(OverviewTable(work_precision));
   EXPECT_NE(overview.find("none"), std::string::npos) << overview;
   EXPECT_NE(overview.find("0.3 (3.00)"), std::string::npos) << overview;
@@ -27,7 +27,7 @@ TEST(WorkPrecisionReport, SaysNoneReachedIt) {
 TEST(WorkPrecisionReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
   std::vector<Record> records = Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3});
   records[4].Set("warnings", std::string("energy"));
-  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
   const Table brief = WorkPrecisionTable(work_precision, {});
   ASSERT_EQ(brief.rows.size(), 2u);
   EXPECT_EQ(brief.rows[0].Text("front"), "*");
@@ -47,7 +47,7 @@ TEST(WorkPrecisionReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
 }
 
 std::string Statement(const std::vector<Record>& records) {
-  return fmt::format("{}", fmt::join(FairnessStatement(MakeTradeoff(records, {})), "\n"));
+  return fmt::format("{}", fmt::join(FairnessStatement(MakeWorkPrecision(records, {})), "\n"));
 }
 
 void ExpectWords(const std::string& text, const std::vector<std::string>& words,
@@ -128,7 +128,7 @@ TEST(WorkPrecisionFigures, DrawTheFrontWarningsAndFailures) {
   records[4].Set("outcome", std::string("singular"));
   records[5].Set("wall_s_median", Value());
   records[4].Set("cpu_s", 0.05);
-  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
   const Figure figure = WorkPrecisionFigure(work_precision, work_precision.problems.front());
   std::size_t flagged = 0, crosses = 0;
   for (const Curve& curve : figure.curves) {
@@ -145,7 +145,8 @@ TEST(WorkPrecisionFigures, DrawTheFrontWarningsAndFailures) {
 }
 
 TEST(WorkPrecisionFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
-  const WorkPrecision work_precision = MakeTradeoff(Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3}), {});
+  const WorkPrecision work_precision =
+      MakeWorkPrecision(Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3}), {});
   const Figure figure = ToleranceFigure(work_precision, work_precision.problems.front(), "ode45");
   const Curve& line = figure.curves.back();
   EXPECT_EQ(line.label, "error = tolerance x link");
@@ -158,7 +159,7 @@ TEST(WorkPrecisionFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
 
 TEST(WorkPrecisionFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
   const WorkPrecision work_precision =
-      MakeTradeoff(Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4}), {});
+      MakeWorkPrecision(Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4}), {});
   const Figure figure = WorkPrecisionFigure(work_precision, work_precision.problems.front());
   std::size_t marks = 0;
   for (const Curve& curve : figure.curves) {
@@ -171,14 +172,15 @@ TEST(WorkPrecisionFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
 
 TEST(WorkPrecisionFigures, ErrorsOverTimeHaveTheTrustHorizon) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
-  EXPECT_EQ(WorkPrecisionFigures(MakeTradeoff(records, {})).size(), 2u) << "no series, no third";
+  EXPECT_EQ(WorkPrecisionFigures(MakeWorkPrecision(records, {})).size(), 2u)
+      << "no series, no third";
   for (Record& record : records) {
     if (record.Text("kind") != "accuracy") continue;
     record.Set("series.error_t", std::vector<double>{0, 5, 10});
     record.Set("series.error", std::vector<double>{0, 1e-9, 1e-6});
     record.Set("reference_valid_until", 7.5);
   }
-  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
   const Figure figure = ErrorOverTimeFigure(work_precision.problems.front(), "ode45");
   ASSERT_EQ(figure.curves.size(), 2u) << "the finest tolerance, and the horizon";
   EXPECT_EQ(figure.curves[1].label, "validity limit of the reference");

@@ -46,12 +46,12 @@ TEST(WorkPrecision, TheFrontIsWhatNobodyBeats) {
     records[2].Set("warnings", std::string("energy"));
     records[4].Set("outcome", std::string("singular"));
     int front = 0;
-    for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {}))) {
+    for (const WorkPrecisionRow& row : OnlyRows(MakeWorkPrecision(records, {}))) {
       if (!row.reason.empty()) {
         EXPECT_FALSE(row.on_front) << row.reason;
         continue;
       }
-      EXPECT_EQ(row.on_front, !IsBeaten(row, OnlyRows(MakeTradeoff(records, {}))));
+      EXPECT_EQ(row.on_front, !IsBeaten(row, OnlyRows(MakeWorkPrecision(records, {}))));
       front += row.on_front ? 1 : 0;
     }
     EXPECT_GE(front, 1);
@@ -63,7 +63,7 @@ TEST(WorkPrecision, TheCostIsThatOfTheSameCase) {
   records.push_back(TimingOf("odca", 0.5, 1e-7));  // of a case that was not run
   records.push_back(TimingOf("odca", 1e-3, 7.0));
   records.back().Set("horizon", 20.0);
-  for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {}))) {
+  for (const WorkPrecisionRow& row : OnlyRows(MakeWorkPrecision(records, {}))) {
     EXPECT_EQ(row.reason, "");
     const double expected = row.error == 1e-3 ? 0.1 : row.error == 1e-6 ? 0.2 : 0.4;
     EXPECT_EQ(row.cost, expected);
@@ -84,7 +84,7 @@ TEST(WorkPrecision, FixedStepsAreCasesOfTheirOwn) {
       records.push_back(keyed);
     }
   }
-  const auto rows = OnlyRows(MakeTradeoff(records, {}));
+  const auto rows = OnlyRows(MakeWorkPrecision(records, {}));
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].cost, 10.0);
   EXPECT_EQ(rows[0].error, 0.1);
@@ -101,7 +101,7 @@ TEST(WorkPrecision, RowsThatAreNotComparedSayWhy) {
   records[7].Set("wall_s_median", Value());
   records.erase(records.begin() + 9);  // the timing of the fifth
   std::vector<std::string> reasons;
-  for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {})))
+  for (const WorkPrecisionRow& row : OnlyRows(MakeWorkPrecision(records, {})))
     reasons.push_back(row.reason);
   std::ranges::sort(reasons);
   EXPECT_EQ(reasons, (std::vector<std::string>{"", "no error_position_max", "not timed",
@@ -113,7 +113,7 @@ TEST(WorkPrecision, RowsThatAreNotComparedSayWhy) {
 TEST(WorkPrecision, NoErrorIsBelievedBelowWhatTheReferenceIsCertifiedTo) {
   std::vector<Record> records = Store({1e-12, 3e-12}, {2.0, 1.0});
   for (Record& record : records) record.Set("reference_error", 2e-12);
-  const auto rows = OnlyRows(MakeTradeoff(records, {}));
+  const auto rows = OnlyRows(MakeWorkPrecision(records, {}));
   EXPECT_EQ(rows[0].error, 3e-12);
   EXPECT_FALSE(rows[0].is_bound);
   EXPECT_TRUE(rows[0].on_front);
@@ -124,19 +124,19 @@ TEST(WorkPrecision, NoErrorIsBelievedBelowWhatTheReferenceIsCertifiedTo) {
 
 TEST(WorkPrecision, FallsBackAndSaysSo) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {1.0, 2.0});
-  EXPECT_TRUE(MakeTradeoff(records, {}).remarks.empty());
+  EXPECT_TRUE(MakeWorkPrecision(records, {}).remarks.empty());
   for (Record& record : records) {
     record.Set("error_position_max", Value());
     record.Set("closed_form_error_max", 0.5);
     record.Set("drift_position_max", 0.25);
   }
-  WorkPrecision work_precision = MakeTradeoff(records, {});
+  WorkPrecision work_precision = MakeWorkPrecision(records, {});
   EXPECT_EQ(work_precision.error, "closed_form_error_max");
   ASSERT_EQ(work_precision.remarks.size(), 1u);
   EXPECT_NE(work_precision.remarks[0].find("no record has error_position_max"), std::string::npos);
   for (Record& record : records) record.Set("closed_form_error_max", Value());
   std::erase_if(records, [](const Record& record) { return record.Text("kind") == "timing"; });
-  work_precision = MakeTradeoff(records, {});
+  work_precision = MakeWorkPrecision(records, {});
   EXPECT_EQ(work_precision.error, "drift_position_max");
   EXPECT_EQ(work_precision.cost, "rhs_equivalents");
   ASSERT_EQ(work_precision.remarks.size(), 2u);
@@ -150,29 +150,29 @@ TEST(WorkPrecision, TimingsOfOtherCasesAreNoCost) {
   for (Record& record : records) {
     if (record.Text("kind") == "timing") record.Set("horizon", 1.0);
   }
-  EXPECT_EQ(MakeTradeoff(records, {}).cost, "rhs_equivalents");
-  for (const WorkPrecisionRow& row : OnlyRows(MakeTradeoff(records, {.cost = "wall_s"}))) {
+  EXPECT_EQ(MakeWorkPrecision(records, {}).cost, "rhs_equivalents");
+  for (const WorkPrecisionRow& row : OnlyRows(MakeWorkPrecision(records, {.cost = "wall_s"}))) {
     EXPECT_EQ(row.reason, "not timed");
   }
 }
 
 TEST(WorkPrecision, RefusesWhatNoRecordHas) {
   const std::vector<Record> records = Store({1e-3}, {1.0});
-  EXPECT_THROW(MakeTradeoff(records, {.error = "error_positoin_max"}), ConfigError);
-  EXPECT_THROW(MakeTradeoff(records, {.error = "closed_form_error_max"}), ConfigError);
-  EXPECT_THROW(MakeTradeoff(records, {.error = "mechanism"}), ConfigError);
-  EXPECT_THROW(MakeTradeoff(records, {.cost = "walls"}), ConfigError);
-  EXPECT_THROW(MakeTradeoff(records, {.per = {"mechanisms"}}), ConfigError);
-  EXPECT_THROW(MakeTradeoff(records, {.where = {ParseCondition("rtol<1e-9")}}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(records, {.error = "error_positoin_max"}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(records, {.error = "closed_form_error_max"}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(records, {.error = "mechanism"}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(records, {.cost = "walls"}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(records, {.per = {"mechanisms"}}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(records, {.where = {ParseCondition("rtol<1e-9")}}), ConfigError);
   std::vector<Record> empty = records;
   empty[0].Set("error_position_max", Value());
-  EXPECT_THROW(MakeTradeoff(empty, {}), ConfigError);
+  EXPECT_THROW(MakeWorkPrecision(empty, {}), ConfigError);
 }
 
 TEST(WorkPrecision, ConditionsSeeTheTimingToo) {
   const std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
   const WorkPrecision fast =
-      MakeTradeoff(records, {.where = {ParseCondition("wall_s_median<0.3")}});
+      MakeWorkPrecision(records, {.where = {ParseCondition("wall_s_median<0.3")}});
   EXPECT_EQ(OnlyRows(fast).size(), 2u);
 }
 
@@ -183,20 +183,20 @@ TEST(WorkPrecision, ProblemsAreComparedEachByItself) {
     record.Set("case_id", "slow" + record.Text("case_id"));
     records.push_back(record);
   }
-  const WorkPrecision work_precision = MakeTradeoff(records, {});
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
   ASSERT_EQ(work_precision.problems.size(), 2u);
   EXPECT_EQ(work_precision.problems[0].name, "four-bar, horizon 10");
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     for (const WorkPrecisionRow& row : problem.rows) EXPECT_TRUE(row.on_front);
   }
-  const WorkPrecision one = MakeTradeoff(records, {.per = {"horizon"}});
+  const WorkPrecision one = MakeWorkPrecision(records, {.per = {"horizon"}});
   EXPECT_EQ(one.problems.size(), 1u);
 }
 
 TEST(WorkPrecision, TheCheapestOfEachFormulationReachesTheError) {
   // odca 1e-4 at 0.1 and 1e-10 at 0.9, lagrange 1e-7 at 0.3
   const std::vector<Record> records = Store({1e-4, 1e-7, 1e-10}, {0.1, 0.3, 0.9});
-  const WorkPrecisionProblem problem = MakeTradeoff(records, {}).problems.front();
+  const WorkPrecisionProblem problem = MakeWorkPrecision(records, {}).problems.front();
   std::vector<std::string> found;
   for (const Cheapest& one : problem.cheapest) {
     const std::string cost =

@@ -129,7 +129,7 @@ TEST(AssemblySweep, RefusesABodyThatIsHeldTwice) {
 /// Redundant pins where a run starts: refused each time, so not tried.
 TEST(AssemblySweep, IsNotTriedInRunsThatStartWhereItIsRefused) {
   for (const double angle : {1e-6, 1.1}) {
-    const bool serves = angle > 1.0;
+    const bool usable = angle > 1.0;
     const Model mechanism(Grid(2, 2, angle, 0.5), Coordinates::kJoint);
     const auto sweep = Make(mechanism);
     ASSERT_NE(sweep, nullptr);
@@ -140,14 +140,14 @@ TEST(AssemblySweep, IsNotTriedInRunsThatStartWhereItIsRefused) {
     const Numbers still = Numbers::Zero(q.size());
     Kinematics<Planar, double> kinematics(mechanism);
     kinematics.UpdatePosition(q);
-    EXPECT_EQ(sweep->Serves(kinematics), serves);
+    EXPECT_EQ(sweep->IsUsable(kinematics), usable);
     testing::SystemWith<Odca, Planar, double> odca(mechanism, {});
     ASSERT_EQ(odca->Start(0.0, q, still), Outcome::kFinished);
     q.array() += 0.2;
     EXPECT_TRUE(sweep->Evaluate(SpeedsUsed::kGiven, nullptr, In(q), In(still), In(qdot), In(udot)));
     EXPECT_EQ(odca->solver().RightHandSide(SpeedsUsed::kGiven, kinematics, In(q), In(still),
                                            In(qdot), In(udot)),
-              serves);
+              usable);
   }
 }
 

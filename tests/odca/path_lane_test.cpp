@@ -55,7 +55,7 @@ TEST_P(PathLaneTest, HasTheBitsOfOneAlone) {
       for (int lane = 0; lane < kLanes; ++lane) {
         const Mechanism<Planar, double> mechanism(Resized(path, random), Coordinates::kJoint);
         alone.push_back(PathSweep::Make(mechanism));
-        if (lane == 0) lanes = LaneSweep::Beside(*alone[0]);
+        if (lane == 0) lanes = LaneSweep::InLanes(*alone[0]);
         ASSERT_NE(lanes, nullptr) << path.name;
         ASSERT_TRUE(lanes->SetMechanism(lane, *alone.back()));
         q.push_back(RandomNumbers(random, mechanism.num_q(), 4.0));
@@ -91,7 +91,7 @@ TEST(PathLane, HasOnlyMechanismsOfOneShape) {
     return PathSweep::Make(Mechanism<Planar, double>(description, Coordinates::kJoint));
   };
   const auto three = sweep(Chain(3));
-  const auto lanes = LaneSweep::Beside(*three);
+  const auto lanes = LaneSweep::InLanes(*three);
   EXPECT_TRUE(lanes->SetMechanism(1, *sweep(Chain(3))));
   EXPECT_FALSE(lanes->SetMechanism(1, *sweep(Chain(4))));
   EXPECT_FALSE(lanes->SetMechanism(1, *sweep(Ladder(1, 1.1, 0.0))));
@@ -99,7 +99,7 @@ TEST(PathLane, HasOnlyMechanismsOfOneShape) {
   open.joints.pop_back();
   open.initial = {};
   EXPECT_FALSE(lanes->SetMechanism(1, *sweep(open)));
-  EXPECT_EQ(LaneSweep::Beside(*sweep(Chain(2 * kLanes))), nullptr) << "its pieces fill the lanes";
+  EXPECT_EQ(LaneSweep::InLanes(*sweep(Chain(2 * kLanes))), nullptr) << "its pieces fill the lanes";
 }
 
 /// Runs of which each asks by itself.

@@ -64,9 +64,11 @@ std::filesystem::path FileOf(const PlotCommand& command) {
 
 bool IsFree(const PlotCommand& command) {
   const FreeFigure& free = command.free;
-  if ((free.x + free.y + free.group + free.log).empty() && !free.title) return false;
+  if ((free.x + free.y + free.group + free.log).empty() && !free.title && free.labels.empty()) {
+    return false;
+  }
   if (free.x.empty() || free.y.empty()) {
-    throw ConfigError("plot: --group, --log and --title need --x KEY and --y KEY");
+    throw ConfigError("plot: --group, --log, --title and --label need --x KEY and --y KEY");
   }
   return true;
 }
@@ -316,7 +318,9 @@ void AddResults(Commands& commands) {
                 {"--log", "Logarithmic axes (default: those that span two decades)", &plot.free.log,
                  OneOf({"x", "y", "xy", "none"})},
                 {"--title", "Title, \"\" for none (default: values that all records share)",
-                 &plot.free.title}});
+                 &plot.free.title},
+                {"--label", "Text of an axis (NAME: its key) or curve: NAME=TEXT, repeatable",
+                 &plot.free.labels}});
   auto& report = commands.Keep<ReportCommand>();
   commands.Add("report", "Write a self-contained HTML report of a run",
                [&](const Typed& typed) { return WriteReport(report, typed.line); },

@@ -66,10 +66,10 @@ Solid MeshSolid(const MjcfModel& model, const XmlValue& name) {
     asset.own().Fail("a mesh without a file", "\"file\", an .stl or .obj with triangles");
   }
   const auto inertia = asset.Attribute("inertia");
-  const MeshRule rule = inertia ? inertia->Choice<MeshRule>({{"legacy", MeshRule::kPositive},
-                                                             {"exact", MeshRule::kSigned},
+  const MeshRule rule = inertia ? inertia->Choice<MeshRule>({{"legacy", MeshRule::kPyramids},
+                                                             {"exact", MeshRule::kEnclosed},
                                                              {"shell", MeshRule::kShell}})
-                                : MeshRule::kPositive;
+                                : MeshRule::kPyramids;
   const auto vector = [&](const char* attribute, const Eigen::Vector3d& otherwise) {
     const auto given = asset.Attribute(attribute);
     return given ? given->Vector() : otherwise;
@@ -94,10 +94,10 @@ Solid MeshSolid(const MjcfModel& model, const XmlValue& name) {
                          "a volume > 0, with triangles counter-clockwise from outside");
   }
   const std::size_t open = NumOpenEdges(mesh);
-  if (open > 0 && rule == MeshRule::kSigned) {
+  if (open > 0 && rule == MeshRule::kEnclosed) {
     file->Fail(fmt::format("a closed mesh: {} edges have a triangle on one side only", open));
   }
-  if (open > 0 && rule == MeshRule::kPositive) {
+  if (open > 0 && rule == MeshRule::kPyramids) {
     model.draft->Note(asset.own(), "file",
                       fmt::format("not closed at {} edges: mass by MuJoCo's legacy rule", open));
   }

@@ -458,7 +458,7 @@ class SdfReader {
       for (Vector3d& point : mesh.points) point = factors.cwiseProduct(point);
     }
     const std::size_t open = NumOpenEdges(mesh);
-    const Solid solid = SolidOf(mesh, MeshRule::kSigned);
+    const Solid solid = SolidOf(mesh, MeshRule::kEnclosed);
     if (open > 0 || !(solid.volume > 0.0)) {
       uri.Fail(
           fmt::format("a closed mesh with triangles counter-clockwise from outside: {} edges "

@@ -89,7 +89,7 @@ std::size_t NumOpenEdges(const TriangleMesh& mesh) {
 }
 
 /// Sums pyramids from an apex over the triangles, first about the centroid of the surface, then
-/// about the centre of mass, as in MuJoCo: kPositive depends on the apex.
+/// about the centre of mass, as in MuJoCo: kPyramids depends on the apex.
 Solid SolidOf(const TriangleMesh& mesh, MeshRule rule) {
   /// Corners of a triangle from an origin.
   struct Corners {
@@ -104,7 +104,7 @@ Solid SolidOf(const TriangleMesh& mesh, MeshRule rule) {
   const auto weight = [&](const Corners& at) {
     if (rule == MeshRule::kShell) return at.Area();
     const double volume = at.a.dot(at.b.cross(at.c)) / 6.0;
-    return rule == MeshRule::kPositive ? std::abs(volume) : volume;
+    return rule == MeshRule::kPyramids ? std::abs(volume) : volume;
   };
   const auto middle_of = [&](const Vector3d& origin, double share, const auto& weight_of) {
     Vector3d sum = Vector3d::Zero();

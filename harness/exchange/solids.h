@@ -37,8 +37,8 @@ std::size_t NumOpenEdges(const TriangleMesh& mesh);
 
 /// Rules for the mass of a mesh.
 enum class MeshRule {
-  kSigned,    ///< of the enclosed volume
-  kPositive,  ///< of the pyramids from the surface's centroid, even where they are outside
+  kEnclosed,  ///< of the enclosed volume
+  kPyramids,  ///< of the pyramids from the surface's centroid, even where they are outside
   kShell,     ///< of the surface
 };
 /// Returns no volume for an empty mesh, and a negative one if triangles point inwards.

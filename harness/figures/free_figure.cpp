@@ -206,6 +206,29 @@ std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::s
   return groups;
 }
 
+/// Replaces the texts of axes and curves.
+void Relabel(const FreeFigure& wanted, Figure* figure) {
+  for (const std::string& label : wanted.labels) {
+    const std::size_t cut = label.find('=');
+    const std::string name = label.substr(0, cut);
+    const std::string text = cut == std::string::npos ? "" : label.substr(cut + 1);
+    bool found = false;
+    const auto put = [&](bool is_named, std::string* shown) {
+      if (is_named) *shown = text;
+      found = found || is_named;
+    };
+    put(name == wanted.x, &figure->x_label);
+    put(name == wanted.y, &figure->y_label);
+    for (Curve& curve : figure->curves) put(!name.empty() && curve.label == name, &curve.label);
+    for (LegendRow& row : figure->legend) put(!name.empty() && row.label == name, &row.label);
+    if (cut == std::string::npos || !found) {
+      throw ConfigError(fmt::format(
+          "--label {}: expected NAME=TEXT, where NAME is {}, {} or the label of a curve", label,
+          wanted.x, wanted.y));
+    }
+  }
+}
+
 std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& figure,
                                    const std::set<std::string>& mixed) {
   std::vector<std::string> remarks;
@@ -299,6 +322,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   }
   JoinPoints(figure);
   ChooseScales(figure, wanted, is_series);
+  Relabel(wanted, &figure);
   result.remarks = RemarksOn(rows, figure, mixed);
   return result;
 }

@@ -26,6 +26,8 @@ struct FreeFigure {
   std::string log;    ///< "x", "y", "xy" or "none"; "" for axes that span at least two decades
   /// Title; by default the keys and the values that all records share.
   std::optional<std::string> title = std::nullopt;
+  /// "NAME=TEXT": text of an axis (NAME is its key) or of a curve (NAME is its label).
+  std::vector<std::string> labels = {};
 };
 
 /// Splits the keys in "a,b".
@@ -48,8 +50,8 @@ void RequireKeys(const FreeFigure& wanted, std::span<const Record> records);
 /// two of them share one. A failed run is a cross at its value, or at the lower edge if it has
 /// none; it is never left out. Only records of the kinds with a y value take part.
 ///
-/// @throws ConfigError if a key is in no record, y is not numeric, no record has both values, or a
-/// logarithmic axis is requested and no value is positive.
+/// @throws ConfigError if a key is in no record, y is not numeric, no record has both values, a
+/// logarithmic axis is requested and no value is positive, or a label has no axis or curve.
 FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted);
 
 // Selection of distinguishable records if there are more records than points in a picture.

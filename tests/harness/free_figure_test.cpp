@@ -181,6 +181,23 @@ TEST(FreeFigure, AnEmptyTitleIsNone) {
   EXPECT_LT(GnuplotScript(figure).height, titled) << "nor does it take a line";
 }
 
+TEST(FreeFigure, LabelsReplaceTextsOfAxesAndCurves) {
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.labels = {"rtol=relative tolerance", "odca=O-DCA", "drift_position_max="};
+  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  EXPECT_EQ(figure.x_label, "relative tolerance");
+  EXPECT_EQ(figure.y_label, "");
+  EXPECT_EQ(figure.curves[0].label, "lagrange");
+  EXPECT_EQ(figure.curves[1].label, "O-DCA");
+  for (const char* wrong : {"rtol", "newton=N", "=N"}) {
+    wanted.labels = {wrong};
+    EXPECT_EQ(Refusal(Runs(), wanted),
+              std::string("--label ") + wrong +
+                  ": expected NAME=TEXT, where NAME is rtol, drift_position_max or the label of a "
+                  "curve");
+  }
+}
+
 TEST(FreeFigure, PointsThatShareAnXAreNotJoinedAndTheRemarkSaysWhatIsMixed) {
   FreeFigure wanted = DriftOverTolerance();
   wanted.group = "";

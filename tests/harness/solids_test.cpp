@@ -94,7 +94,7 @@ TEST(Solids, BoxesHaveTheirClosedForm) {
   const TriangleMesh mesh = Box(size);
   EXPECT_EQ(NumOpenEdges(mesh), 0u);
   const Solid expected = BoxOf(0.5 * size);
-  for (const MeshRule rule : {MeshRule::kSigned, MeshRule::kPositive}) {
+  for (const MeshRule rule : {MeshRule::kEnclosed, MeshRule::kPyramids}) {
     const Solid solid = SolidOf(mesh, rule);
     // sums of 12 pyramids, each of a few products
     EXPECT_NEAR(solid.volume, expected.volume, 64 * kEps * expected.volume);
@@ -112,14 +112,15 @@ TEST(Solids, SpheresAndToriConvergeToTheirClosedForms) {
   };
   const double R = 1.0, r = 0.3;
   const double about_z = R * R + 0.75 * r * r, across = 0.5 * R * R + 0.625 * r * r;
-  const Row rows[] = {{SolidOf(Sphere(3), MeshRule::kSigned), SolidOf(Sphere(4), MeshRule::kSigned),
-                       4.0 / 3.0 * pi, Vector3d::Constant(0.4)},
-                      {SolidOf(Sphere(3), MeshRule::kShell), SolidOf(Sphere(4), MeshRule::kShell),
-                       4.0 * pi, Vector3d::Constant(2.0 / 3.0)},
-                      {SolidOf(Torus(32), MeshRule::kSigned),
-                       SolidOf(Torus(64), MeshRule::kSigned),
-                       2.0 * pi * pi * R * r * r,
-                       {across, across, about_z}}};
+  const Row rows[] = {
+      {SolidOf(Sphere(3), MeshRule::kEnclosed), SolidOf(Sphere(4), MeshRule::kEnclosed),
+       4.0 / 3.0 * pi, Vector3d::Constant(0.4)},
+      {SolidOf(Sphere(3), MeshRule::kShell), SolidOf(Sphere(4), MeshRule::kShell), 4.0 * pi,
+       Vector3d::Constant(2.0 / 3.0)},
+      {SolidOf(Torus(32), MeshRule::kEnclosed),
+       SolidOf(Torus(64), MeshRule::kEnclosed),
+       2.0 * pi * pi * R * r * r,
+       {across, across, about_z}}};
   for (const Row& row : rows) {
     const auto errors = [&](const Solid& solid) {
       const Matrix3d moments = row.moments.asDiagonal();
@@ -135,18 +136,18 @@ TEST(Solids, SpheresAndToriConvergeToTheirClosedForms) {
 }
 
 TEST(Solids, PositivePyramidsCountOutsideTwice) {
-  const double exact = SolidOf(Torus(32), MeshRule::kSigned).volume;
-  EXPECT_GT(SolidOf(Torus(32), MeshRule::kPositive).volume, 1.2 * exact);
+  const double exact = SolidOf(Torus(32), MeshRule::kEnclosed).volume;
+  EXPECT_GT(SolidOf(Torus(32), MeshRule::kPyramids).volume, 1.2 * exact);
 }
 
 TEST(Solids, ReversedAndOpenMeshesAreSeen) {
   TriangleMesh mesh = Box({1, 1, 1});
   for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
-  EXPECT_NEAR(SolidOf(mesh, MeshRule::kSigned).volume, -1.0, 64 * kEps);
+  EXPECT_NEAR(SolidOf(mesh, MeshRule::kEnclosed).volume, -1.0, 64 * kEps);
   EXPECT_EQ(NumOpenEdges(mesh), 0u);
   mesh.triangles.pop_back();
   EXPECT_EQ(NumOpenEdges(mesh), 3u);
-  EXPECT_EQ(SolidOf({}, MeshRule::kSigned).volume, 0.0);
+  EXPECT_EQ(SolidOf({}, MeshRule::kEnclosed).volume, 0.0);
 }
 
 /// A model folder with meshes.
@@ -221,12 +222,12 @@ TEST_F(MeshFiles, AllTypesAreTheSameSolid) {
   Write("box.obj", AsObj(mesh));
   Write("text.stl", AsTextStl(mesh));
   Write("binary.STL", AsBinaryStl(mesh));
-  const Solid expected = SolidOf(mesh, MeshRule::kSigned);
+  const Solid expected = SolidOf(mesh, MeshRule::kEnclosed);
   for (const char* name : {"box.obj", "text.stl", "binary.STL"}) {
     const TriangleMesh read = ReadMesh(top_ / "model" / name);
     EXPECT_EQ(read.points.size(), 8u) << name;
     EXPECT_EQ(NumOpenEdges(read), 0u) << name;
-    const Solid solid = SolidOf(read, MeshRule::kSigned);
+    const Solid solid = SolidOf(read, MeshRule::kEnclosed);
     // points in another order: sums of 12 pyramids in another order
     EXPECT_NEAR(solid.volume, expected.volume, 64 * kEps * expected.volume) << name;
     EXPECT_LE((solid.inertia - expected.inertia).norm(), 256 * kEps * expected.inertia.norm());

@@ -220,7 +220,9 @@ void Relabel(const FreeFigure& wanted, Figure* figure) {
     put(name == wanted.x, &figure->x_label);
     put(name == wanted.y, &figure->y_label);
     for (Curve& curve : figure->curves) put(!name.empty() && curve.label == name, &curve.label);
-    for (LegendRow& row : figure->legend) put(!name.empty() && row.label == name, &row.label);
+    for (LegendRow& row : figure->legend) {
+      for (LegendItem& item : row) put(!name.empty() && item.text == name, &item.text);
+    }
     if (cut == std::string::npos || !found) {
       throw ConfigError(fmt::format(
           "--label {}: expected NAME=TEXT, where NAME is {}, {} or the label of a curve", label,

@@ -137,6 +137,7 @@ void AddList(Commands& commands);
 void AddCheck(Commands& commands);
 void AddPlan(Commands& commands);
 void AddExplain(Commands& commands);
+void AddAssemble(Commands& commands);
 void AddSimplify(Commands& commands);
 void AddSchema(Commands& commands);
 void AddMigrate(Commands& commands);

@@ -64,7 +64,8 @@ std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::stri
 const std::pair<const char*, std::vector<void (*)(Commands&)>> kGroups[] = {
     {"Experiments", {AddRun, AddList, AddPlan, AddAdvise, AddMerge}},
     {"Mechanisms",
-     {AddCheck, AddExplain, AddView, AddSimplify, AddImport, AddConvert, AddGenerate, AddCount}},
+     {AddCheck, AddExplain, AddAssemble, AddView, AddSimplify, AddImport, AddConvert, AddGenerate,
+      AddCount}},
     {"Results", {AddResults, AddTrajectory, AddWorkPrecision, AddVerdicts}},
     {"Regressions", {AddComparison, AddBaseline, AddHistory}},
     {"Clusters", {AddCluster}},

@@ -1,0 +1,140 @@
+#include "mechanism/start/branches.h"
+
+#include <algorithm>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+
+#include "mechanism/algebra/singular_values.h"
+#include "mechanism/start/closure.h"
+#include "mechanism/start/guesses.h"
+
+namespace loopbench {
+
+namespace {
+
+/// Differences below it are round-off of a closed position [rad, or mean links]; at a fold of two
+/// branches closure errors of 1e-14 move positions by 1e-7.
+constexpr double kSame = 1e-5;
+
+template <class Space>
+class BranchSearch {
+ public:
+  explicit BranchSearch(const MechanismDescription& description)
+      : description_(description),
+        bare_(WithoutGuesses(description)),
+        mechanism_(bare_, Coordinates::kJoint),
+        kinematics_(mechanism_) {}
+
+  Branches Run(int starts) {
+    Branches result;
+    const Start<double> own = Assemble<Space>(description_, mechanism_);
+    if (own.outcome == Outcome::kInconsistentStart) throw std::invalid_argument(own.message);
+    kinematics_.UpdatePosition(own.q);
+    units_ = AssemblyUnits<Space>(kinematics_);
+    fixed_ = Guesses<Space>(bare_, mechanism_, units_).fixed();
+    Add(own.q, &result);
+    result.freedom = Freedom();
+    if (result.freedom > 0) return result;
+    std::mt19937_64 generator;
+    for (result.starts = 0; result.starts < starts; ++result.starts) {
+      Start<double> start;
+      start.q = Scattered(own.q, generator);
+      kinematics_.UpdatePosition(start.q);
+      ClosePositions(bare_, kinematics_, units_, &start);
+      if (start.outcome != Outcome::kFinished) continue;
+      ++result.closed;
+      kinematics_.UpdatePosition(start.q);
+      Add(start.q, &result);
+    }
+    std::ranges::stable_sort(result.found, {}, &Branch::distance);
+    return result;
+  }
+
+ private:
+  static MechanismDescription WithoutGuesses(MechanismDescription description) {
+    std::erase_if(description.initial.coordinates, [&](const JointValues& values) {
+      const auto& held = description.initial.held;
+      return std::ranges::find(held, values.joint) == held.end();
+    });
+    return description;
+  }
+
+  VectorX<double> Scattered(const VectorX<double>& own, std::mt19937_64& generator) const {
+    VectorX<double> u(mechanism_.num_u()), rates(own.size());
+    for (double& value : u) {
+      // 53 random bits: the same number with every standard library
+      value = std::numbers::pi * (2.0 * static_cast<double>(generator() >> 11) * 0x1p-53 - 1.0);
+    }
+    ClearFixed(fixed_, &u);
+    mechanism_.Rates(own, u.cwiseProduct(units_.columns), rates);
+    VectorX<double> q = own + rates;
+    mechanism_.Normalise(q);
+    return q;
+  }
+
+  /// Free coordinates less the rank of the loops, at the current position.
+  int Freedom() const {
+    const Guesses<Space> guesses(bare_, mechanism_, units_);
+    const auto& held = guesses.held();
+    const MatrixX<double> J =
+        LoopRows(kinematics_, units_, units_.With(kinematics_, held), held, fixed_);
+    const auto free = std::ranges::count(fixed_, false);
+    if (J.size() == 0) return static_cast<int>(free);
+    SingularValues<double> values;
+    values.ComputeValues(J);
+    const double least = 1e-8 * values.sigma()[0];  // far above round-off
+    return static_cast<int>(free - (values.sigma().array() > least).count());
+  }
+
+  /// The largest difference of a body's pose from the present one [rad, or mean links].
+  double Apart(const std::vector<Pose<Space, double>>& poses) const {
+    double apart = 0.0;
+    for (std::size_t body = 0; body < poses.size(); ++body) {
+      const Pose<Space, double>&a = poses[body], &b = kinematics_.poses()[body];
+      apart = std::max({apart, (a.p - b.p).norm() / units_.length, (a.R - b.R).norm()});
+    }
+    return apart;
+  }
+
+  /// Adds the present position, unless it is known.
+  void Add(const VectorX<double>& q, Branches* result) {
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
+      if (Apart(poses_[k]) > kSame) continue;
+      // the list is sorted at the end only
+      ++result->found[k].times;
+      return;
+    }
+    Branch branch{.description = bare_, .times = poses_.empty() ? 0 : 1};
+    if (!poses_.empty()) branch.distance = Apart(poses_[0]);
+    poses_.push_back(kinematics_.poses());
+    InitialDescription& initial = branch.description.initial;
+    for (const TreeStep& step : mechanism_.tree()) {
+      const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
+      const bool is_fixed =
+          std::ranges::find(initial.held, joint.description) != initial.held.end();
+      if (joint.description < 0 || is_fixed || joint.num_drives > 0 || joint.num_q() == 0) continue;
+      const auto values = q.segment(joint.q_offset, joint.num_q());
+      initial.coordinates.push_back({joint.description, {values.begin(), values.end()}});
+    }
+    result->found.push_back(std::move(branch));
+  }
+
+  const MechanismDescription& description_;
+  const MechanismDescription bare_;  ///< with fixed coordinates only
+  const Mechanism<Space, double> mechanism_;
+  Kinematics<Space, double> kinematics_;
+  AssemblyUnits<Space> units_;
+  std::vector<bool> fixed_;
+  std::vector<std::vector<Pose<Space, double>>> poses_;  ///< of the branches found
+};
+
+}  // namespace
+
+Branches FindBranches(const MechanismDescription& description, int starts) {
+  const MechanismDescription whole = Unreleased(description);
+  if (whole.space == SpaceKind::kPlanar) return BranchSearch<Planar>(whole).Run(starts);
+  return BranchSearch<Spatial>(whole).Run(starts);
+}
+
+}  // namespace loopbench

@@ -148,10 +148,11 @@ void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int chil
   model->chains.push_back(std::move(chain));
 }
 
-// <actuator>: at constant controls, motors of joints are constant efforts.
+// <actuator>: at constant controls, actuators of joints are efforts, springs and dampers.
 //
-// MuJoCo: force = gain * ctrl + bias, with ctrl within ctrlrange and force within forcerange; the
-// joint's effort is the sum of gear * force over its actuators, within its actuatorfrcrange.
+// MuJoCo: force = gain * ctrl + bias, with ctrl within ctrlrange and force within forcerange; gain
+// and bias are linear in length = gear * qpos and its rate. The joint's effort is the sum of gear *
+// force over its actuators, within its actuatorfrcrange.
 
 namespace {
 
@@ -159,32 +160,66 @@ double Within(const std::optional<MjcfLimits>& limits, double value) {
   return limits ? std::clamp(value, limits->first, limits->second) : value;
 }
 
-/// Gain and bias of an actuator, if constant.
-struct Law {
-  std::vector<double> gain = {1.0}, bias = {0.0};
-  std::string gain_type = "fixed", bias_type = "none", dynamics = "none";
-  bool is_other = false;  ///< a layer of another kind has set unsupported parameters
+/// Coefficients of 1, of the length and of its rate.
+using Linear3 = std::array<double, 3>;
 
-  bool is_constant() const {
-    if (is_other || gain_type != "fixed" || dynamics != "none") return false;
-    if (bias_type == "none") return true;
-    const bool varies =
-        std::any_of(bias.begin() + 1, bias.end(), [](double x) { return x != 0.0; });
-    return bias_type == "affine" && !varies;
+/// Gain and bias of an actuator.
+struct Law {
+  std::vector<double> gain = {1.0, 0.0, 0.0}, bias = {0.0, 0.0, 0.0};
+  std::string gain_type = "fixed", bias_type = "none", dynamics = "none";
+  double inherited_range = 0.0;  ///< ratio of the control's range to the joint's; 0: its own
+  bool is_other = false;         ///< a layer of another kind has set unsupported parameters
+
+  bool is_linear() const {
+    return !is_other && dynamics == "none" && (gain_type == "fixed" || gain_type == "affine") &&
+           (bias_type == "none" || bias_type == "affine");
   }
-  double force(double control) const {
-    return gain[0] * control + (bias_type == "affine" ? bias[0] : 0.0);
+  Linear3 ForceAt(double control) const {
+    Linear3 force = {gain[0] * control, 0.0, 0.0};
+    for (std::size_t i = 0; i < force.size(); ++i) {
+      if (i > 0 && gain_type == "affine") force[i] += gain[i] * control;
+      if (bias_type == "affine") force[i] += bias[i];
+    }
+    return force;
   }
 };
+
+/// Sets the law of a <position>, <velocity> or <damper>.
+void SetServo(const XmlElement& layer, Law* law) {
+  const auto kp = layer.Attribute("kp"), kv = layer.Attribute("kv");
+  law->gain_type = "fixed";
+  law->bias_type = "affine";
+  if (layer.tag() == "velocity") {
+    law->gain[0] = NumberOr(kv, 1.0, kNotNegative);
+    law->bias = {0.0, 0.0, -law->gain[0]};
+  } else if (layer.tag() == "damper") {
+    law->gain = {0.0, 0.0, -NumberOr(kv, 1.0, kNotNegative)};
+    law->gain_type = "affine";
+    law->bias_type = "none";
+  } else {
+    law->gain[0] = NumberOr(kp, 1.0, kNotNegative);
+    law->bias[1] = -law->gain[0];
+    if (kv) law->bias[2] = -kv->Number(kNotNegative);
+    law->inherited_range = NumberOr(layer.Attribute("inheritrange"), 0.0, kNotNegative);
+    // these need inertias or a state
+    for (const char* name : {"dampratio", "timeconst"}) {
+      if (NumberOr(layer.Attribute(name), 0.0) != 0.0) law->is_other = true;
+    }
+  }
+  law->dynamics = "none";
+}
 
 /// Returns the law from layers of all kinds of actuators, where the nearest one has precedence. In
 /// a shorter list the remaining values stay unchanged.
 Law LawOf(const MjcfElement& actuator) {
   Law law;
   for (auto layer = actuator.layers().rbegin(); layer != actuator.layers().rend(); ++layer) {
-    if (layer->tag() == "motor") {
+    const std::string tag = layer->tag();
+    if (tag == "motor") {
       law = Law();
-    } else if (layer->tag() != "general") {
+    } else if (tag == "position" || tag == "velocity" || tag == "damper") {
+      SetServo(*layer, &law);
+    } else if (tag != "general") {
       law.is_other = true;
       // parameters of such actuators, which a nearer motor replaces
       for (const char* name : {"kp", "kv", "dampratio", "timeconst", "inheritrange", "area",
@@ -208,13 +243,28 @@ Law LawOf(const MjcfElement& actuator) {
   return law;
 }
 
-/// A constant effort on a joint in MjcfModel::joints.
+/// Effort of actuators on a joint in MjcfModel::joints: constant - stiffness q - damping u, with
+/// the coordinate q of Loopbench.
 struct Effort {
   std::size_t joint = 0;
-  double value = 0.0;
+  double constant = 0.0, stiffness = 0.0, damping = 0.0;
 };
 
-constexpr const char* kNoMotor = "there are no actuators but motors of joints (<key ctrl=...>)";
+constexpr std::string_view kActuators[] = {"motor", "general", "position", "velocity", "damper"};
+constexpr const char* kNoMotor =
+    "only motors, positions, velocities and dampers of joints act (<key ctrl=...>)";
+
+/// Returns the range of an actuator's control.
+std::optional<MjcfLimits> ControlRange(const MjcfElement& actuator, const Law& law,
+                                       const MjcfJoint& joint, const MjcfModel& model) {
+  if (law.inherited_range <= 0.0) return model.LimitsOf(actuator, "ctrllimited", "ctrlrange");
+  auto range = model.LimitsOf(joint.element, "limited", "range");
+  if (!range) return std::nullopt;
+  const double unit = joint.kind == SerialKind::kHinge ? model.settings.Angle(1.0) : 1.0;
+  const double middle = 0.5 * unit * (range->first + range->second);
+  const double half = 0.5 * unit * law.inherited_range * (range->second - range->first);
+  return MjcfLimits{middle - half, middle + half};
+}
 
 /// Reads an actuator on a joint with one coordinate at a constant control; drops others.
 std::optional<Effort> ReadActuator(const XmlElement& element, double control, MjcfModel* model) {
@@ -228,21 +278,25 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   if (!settings.has_actuation || settings.silent_groups.contains(group)) {
     return drop("it is switched off (<option>)", false);
   }
-  if (element.tag() != "motor" && element.tag() != "general") return drop(kNoMotor, true);
   const Law law = LawOf(peeked);
-  if (!law.is_constant()) return drop("its effort is no constant", true);
-  const auto controls = model->LimitsOf(peeked, "ctrllimited", "ctrlrange");
-  const double given = settings.clamps_controls ? Within(controls, control) : control;
-  const double force =
-      Within(model->LimitsOf(peeked, "forcelimited", "forcerange"), law.force(given));
-  if (force == 0.0) {
+  const auto name = element.Attribute("joint");
+  const bool is_known =
+      law.is_linear() && std::ranges::find(kActuators, element.tag()) != std::end(kActuators);
+  if (!is_known || !name) return drop(kNoMotor, true);
+  const MjcfJoint& joint = model->JointNamed(*name);
+  const auto controls = ControlRange(peeked, law, joint, *model);
+  const Linear3 force = law.ForceAt(settings.clamps_controls ? Within(controls, control) : control);
+  const bool is_constant = force[1] == 0.0 && force[2] == 0.0;
+  const auto forces = model->LimitsOf(peeked, "forcelimited", "forcerange");
+  const double constant = is_constant ? Within(forces, force[0]) : force[0];
+  if (is_constant && constant == 0.0) {
     return drop(control == 0.0 ? "its control is 0 in the start that is read" : "its force is 0",
                 false);
   }
-  const auto name = element.Attribute("joint");
-  if (!name) return drop(kNoMotor, true);
-  const MjcfJoint& joint = model->JointNamed(*name);
   if (!joint.has_coordinate()) return drop(kNeedsOneCoordinate, true);
+  if (force[1] > 0.0 || force[2] > 0.0) {
+    return drop("its stiffness or damping is negative, or a damping ratio", true);
+  }
   const MjcfElement motor = model->defaults.Of(element, "");
   // without effect on an actuator without dynamics
   for (const char* rest : {"name", "group", "user", "dynprm", "actdim", "actlimited", "actrange",
@@ -250,9 +304,17 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
     motor.Attribute(rest);
   }
   const auto gear = motor.Attribute("gear");
-  const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0;
-  model->draft->Note(element, "a constant effort here, with the control of the start");
-  return Effort{model->joint_names.at(name->text()), ratio * force};
+  const double ratio = gear ? gear->Numbers(1, 6)[0] : 1.0, square = ratio * ratio;
+  model->draft->Note(element, is_constant ? "a constant effort here, with the control of the start"
+                                          : "a spring or damper here, at the control of the start");
+  if (forces && !is_constant) {
+    model->draft->Drop(element, "forcerange", "springs and dampers have no largest effort");
+  }
+  // the coordinate of MuJoCo is that of Loopbench plus the reference
+  return Effort{.joint = model->joint_names.at(name->text()),
+                .constant = ratio * constant + square * force[1] * joint.reference,
+                .stiffness = -square * force[1],
+                .damping = -square * force[2]};
 }
 
 }  // namespace
@@ -270,15 +332,27 @@ void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& co
     if (known == efforts.end()) {
       efforts.push_back(*effort);
     } else {
-      known->value += effort->value;
+      known->constant += effort->constant;
+      known->stiffness += effort->stiffness;
+      known->damping += effort->damping;
     }
   }
   for (const Effort& effort : efforts) {
     const MjcfJoint& joint = model->joints[effort.joint];
+    auto& forces = model->draft->description.forces;
     const auto limits = model->LimitsOf(joint.element, kEffortFlag, kEffortRange);
-    const double value = Within(limits, effort.value);
-    if (value == 0.0) continue;
-    model->draft->description.forces.emplace_back(JointTorque{joint.joint, Polynomial{{value}}});
+    const bool is_constant = effort.stiffness == 0.0 && effort.damping == 0.0;
+    if (limits && !is_constant) {
+      model->draft->Drop(joint.element.own(), kEffortRange,
+                         "springs and dampers have no largest effort");
+    }
+    const double constant = is_constant ? Within(limits, effort.constant) : effort.constant;
+    if (effort.stiffness > 0.0) {
+      forces.emplace_back(JointSpring{joint.joint, effort.stiffness, constant / effort.stiffness});
+    } else if (constant != 0.0) {
+      forces.emplace_back(JointTorque{joint.joint, Polynomial{{constant}}});
+    }
+    if (effort.damping > 0.0) forces.emplace_back(JointDamper{joint.joint, effort.damping});
   }
 }
 

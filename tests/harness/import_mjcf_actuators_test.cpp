@@ -16,11 +16,44 @@ TEST(ImportMjcf, MotorsUnderAConstantControlAreTorques) {
       "<actuator><general joint=\"j\" gear=\"2\" gainprm=\"5\" biastype=\"affine\" biasprm=\"";
   const Imported biased = Two(general + "0.5 0 0\"/></actuator>");  // 2 (5 0 + 0.5)
   EXPECT_EQ(std::get<Polynomial>(ForcesOf<JointTorque>(biased)[0].value).coefficients[0], 1.0);
-  ExpectNote(Two(general + "0.5 1 0\"/></actuator>"), "<general>", "no constant");
+  ExpectNote(Two(general + "0.5 1 0\"/></actuator>"), "<general>", "is negative");
   const Imported off = Two(motor);
   EXPECT_TRUE(ForcesOf<JointTorque>(off).empty());
   ExpectNote(off, "<motor>", "control is 0");
-  ExpectNote(Two("<actuator><position joint=\"j\"/></actuator>"), "<position>", "no actuators");
+  ExpectNote(Two("<actuator><muscle joint=\"j\"/></actuator>"), "<muscle>", "only motors");
+}
+
+/// force = gain ctrl + bias, effort = gear force, length = gear qpos (MuJoCo, "Actuation model").
+TEST(ImportMjcf, ServosUnderAConstantControlAreSpringsAndDampers) {
+  const auto with = [](const std::string& actuator, const std::string& ctrl) {
+    // qpos = coordinate + 0.5
+    return Read(
+        "<joint name=\"j\" ref=\"0.5\" range=\"-1 2\"/>", "<compiler angle=\"radian\"/>",
+        "<actuator>" + actuator + "</actuator><keyframe><key ctrl=\"" + ctrl + "\"/></keyframe>");
+  };
+  const Imported position = with("<position joint=\"j\" kp=\"8\" kv=\"3\" gear=\"2\"/>", "1.5");
+  ASSERT_EQ(ForcesOf<JointSpring>(position).size(), 1u);
+  const JointSpring spring = ForcesOf<JointSpring>(position)[0];
+  EXPECT_EQ(spring.stiffness, 32.0);   // 8 2^2
+  EXPECT_EQ(spring.rest, 0.75 - 0.5);  // ctrl / gear, less the reference
+  EXPECT_EQ(ForcesOf<JointDamper>(position)[0].damping, 12.0);
+  EXPECT_TRUE(ForcesOf<JointTorque>(position).empty());
+  // without a control the target is qpos = 0
+  EXPECT_EQ(ForcesOf<JointSpring>(with("<position joint=\"j\"/>", "0"))[0].rest, -0.5);
+  const Imported inherited = with("<position joint=\"j\" inheritrange=\"0.5\"/>", "9");
+  EXPECT_EQ(ForcesOf<JointSpring>(inherited)[0].rest, 1.25 - 0.5);
+
+  const Imported velocity = with("<velocity joint=\"j\" kv=\"4\" gear=\"3\"/>", "2");
+  EXPECT_EQ(ForcesOf<JointDamper>(velocity)[0].damping, 36.0);
+  EXPECT_EQ(std::get<Polynomial>(ForcesOf<JointTorque>(velocity)[0].value).coefficients[0], 24.0);
+  const Imported damper = with("<damper joint=\"j\" kv=\"4\" ctrlrange=\"0 1\"/>", "7");
+  EXPECT_EQ(ForcesOf<JointDamper>(damper)[0].damping, 4.0);
+
+  const Imported limited = with("<position joint=\"j\" forcerange=\"-1 1\"/>", "1");
+  ExpectNote(limited, "<position> forcerange", "no largest effort");
+  const Imported both = with("<position joint=\"j\"/><motor joint=\"j\"/>", "2 3");
+  EXPECT_EQ(ForcesOf<JointSpring>(both)[0].rest, 2.0 - 0.5 + 3.0);
+  ExpectNote(with("<position joint=\"j\" dampratio=\"1\"/>", "1"), "<position>", "only motors");
 }
 
 /// The efforts on joint "j", which stands alone.
@@ -110,7 +143,7 @@ TEST(ImportMjcf, ActuatorsOfAllKindsHaveOneDefault) {
   EXPECT_EQ(Efforts(classes, "<general joint=\"j\"/>", "3"), Values{10});
   EXPECT_EQ(Efforts(classes, "<motor joint=\"j\" class=\"x\"/>", "3"), Values{2});
   EXPECT_EQ(Efforts(classes, "<general joint=\"j\" class=\"y\"/>", "3"), Values{2});
-  // a spring with the gain of the class, which is no constant
+  // a spring with the gain of the class
   EXPECT_EQ(Efforts(classes, "<general joint=\"j\" class=\"x\"/>", "3"), Values{});
   const Imported kept = Two(classes +
                             "<actuator><motor joint=\"j\" class=\"x\"/></actuator>"

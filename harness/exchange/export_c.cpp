@@ -72,7 +72,7 @@ Branches RecordAlong(const CodeRequest& request, Quantity quantity) {
   };
   for (const MotionState& state : request.motion) {
     const auto covers = [&](const RecordedFunction& branch) { return Covers(branch, state); };
-    if (std::ranges::any_of(branches.recorded, serves)) continue;
+    if (std::ranges::any_of(branches.recorded, covers)) continue;
     if (std::ssize(branches.recorded) >= kMaxCodeBranches) {
       ++branches.missed;
       continue;

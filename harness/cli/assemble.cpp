@@ -68,6 +68,9 @@ int AssembleFile(const AssembleCommand& command, const ExplainView& view) {
       "  {} of {} scattered starts closed. Branch 1 is the start of the file; distance: largest\n"
       "  difference of a body's pose from it [rad, or mean links].\n",
       branches.closed, branches.starts);
+  if (branches.movable > 0) {
+    Print("  {} of them led to positions that still move, which are not listed.\n", branches.movable);
+  }
   for (std::size_t k = 0; k < branches.found.size() && !command.out.empty(); ++k) {
     MechanismDescription description = branches.found[k].description;
     description.name = fmt::format("{}-branch-{}", file.description.name, k + 1);

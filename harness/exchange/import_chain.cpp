@@ -90,6 +90,13 @@ std::optional<ComposedJoint> JointOf(const std::vector<SerialJoint>& joints,
     // about x of F, then about y of M
     if (point) return ComposedJoint{JointType::kUniversal, {Axes(a, a.cross(b)), *point}};
   }
+  if (joints.size() == 2 && slides.size() == 2) {
+    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
+    if (Parallel(a, b)) return std::nullopt;
+    return ComposedJoint{.type = JointType::kPlanar,
+                         .X_BJ = {Axes(a, a.cross(b)), Vector3d::Zero()},
+                         .keeps_angle = true};
+  }
   if (joints.size() == 2 && hinges.size() == 1 && slides.size() == 1) {
     const Vector3d &turn = hinges[0].axis, &slide = slides[0].axis, &at = hinges[0].position;
     if (Parallel(turn, slide)) return ComposedJoint{JointType::kCylindrical, {TurnOfZ(turn), at}};
@@ -222,8 +229,11 @@ void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& co
 
 JointDescription& ImportDraft::AddComposed(const std::string& name, const ComposedJoint& composed,
                                            int parent, const Placement& X_PF, int child) {
-  return composed.from_is_child ? AddJoint(name, composed.type, child, composed.X_BJ, parent, X_PF)
+  JointDescription& joint = composed.from_is_child
+                                ? AddJoint(name, composed.type, child, composed.X_BJ, parent, X_PF)
                                 : AddJoint(name, composed.type, parent, X_PF, child, composed.X_BJ);
+  if (composed.keeps_angle) joint.motions.push_back({0, Polynomial{{0.0}}});
+  return joint;
 }
 
 // Chains of links without mass in URDF and SDF.
@@ -385,11 +395,97 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
                             chain.joints.size(), ToString(composed.type)));
 }
 
+// A link without mass between two hinges that form no joint. A point mass on the axis of a hinge
+// has the same motion on both of its bodies. Point masses on both axes, taken from the bodies
+// beside the link, therefore give it a mass and an inertia without a change of the motion. Mass on
+// the axis of a hinge of the ground does not move at all.
+
+namespace {
+
+/// Adds point masses in the axes of a body; negative ones are taken away.
+BodyDescription WithPoints(const BodyDescription& body, double mass,
+                           const std::vector<Vector3d>& points) {
+  const auto spread = [](const Vector3d& r) -> Eigen::Matrix3d {
+    return r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose();
+  };
+  BodyDescription sum = body;
+  sum.mass += mass * static_cast<double>(points.size());
+  sum.com *= body.mass;
+  for (const Vector3d& point : points) sum.com += mass * point;
+  sum.com /= sum.mass;
+  sum.inertia += body.mass * spread(body.com - sum.com);
+  for (const Vector3d& point : points) sum.inertia += mass * spread(point - sum.com);
+  return sum;
+}
+
+/// Takes point masses from both sides of a point on an axis, in the axes of the body: as much as
+/// leaves at least half of the smallest moment. Returns the mass of each, 0 if nothing can go.
+double TakePoints(const Vector3d& at, const Vector3d& axis, BodyDescription* body,
+                  std::vector<Vector3d>* points) {
+  const Eigen::Vector3d moments = SymmetricEigenvalues(body->inertia);
+  const double radius = std::sqrt(moments[2] / body->mass);
+  for (double share = 1.0 / 4.0; share > 1e-4; share /= 2.0) {
+    for (const double reach : {1.0, 0.25, 1.0 / 16.0}) {
+      *points = {at - reach * radius * axis, at + reach * radius * axis};
+      const double mass = share * body->mass / 2.0;
+      const BodyDescription rest = WithPoints(*body, -mass, *points);
+      const Eigen::Vector3d left = SymmetricEigenvalues(rest.inertia);
+      if (left[0] < 0.5 * moments[0] || left[0] + left[1] < left[2]) continue;
+      *body = rest;
+      return mass;
+    }
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+bool ImportDraft::GiveMassToLink(const MasslessChain& chain) {
+  if (chain.series.size() != 2 ||
+      std::ranges::count(chain.series, SerialKind::kHinge, &SerialJoint::kind) != 2) {
+    return false;
+  }
+  const SerialJoint &inner = chain.series[0], &outer = chain.series[1];
+  auto& bodies = description.bodies;
+  BodyDescription parent = bodies[chain.parent], child = bodies[chain.child];
+  std::vector<Vector3d> on_inner, on_outer;
+  const double outer_mass = TakePoints(outer.position, outer.axis, &child, &on_outer);
+  double inner_mass = outer_mass;
+  if (outer_mass > 0.0 && chain.parent == kGround) {
+    const Vector3d reach = 0.5 * (on_outer[1] - on_outer[0]).norm() * inner.axis;
+    on_inner = {inner.position - reach, inner.position + reach};
+  } else {
+    const Placement X_PC = chain.places[0].Inverse();
+    inner_mass = TakePoints(X_PC.At(inner.position), X_PC.q * inner.axis, &parent, &on_inner);
+    for (Vector3d& point : on_inner) point = chain.places[0].At(point);
+  }
+  const Placement X_IC = chain.places[1].Inverse();
+  for (auto* points : {&on_inner, &on_outer}) {
+    for (Vector3d& point : *points) point = X_IC.At(point);
+  }
+  BodyDescription& link = bodies[chain.between[0]];
+  const BodyDescription filled =
+      WithPoints(WithPoints(link, inner_mass, on_inner), outer_mass, on_outer);
+  const Vector3d moments = SymmetricEigenvalues(filled.inertia);
+  // points on one axis alone turn about it without inertia
+  if (!(inner_mass > 0.0 && outer_mass > 0.0 && moments[0] > 1e-6 * moments[2])) return false;
+  link = filled;
+  bodies[chain.parent] = parent;
+  bodies[chain.child] = child;
+  Note(
+      elements_[chain.between[0]],
+      fmt::format("\"{}\" has no mass, between hinges that are no joint together: {:.4g} kg of the "
+                  "bodies beside it are moved there, on both axes; the motion is the same",
+                  link.name, link.mass));
+  return true;
+}
+
 void ImportDraft::ComposeChains() {
   std::vector<Attachment> attachments(description.bodies.size());
   std::vector<MasslessChain> chains = FindChains(description);
   for (MasslessChain& chain : chains) {
     const auto composed = ComposeChain(description, &chain);
+    if (!composed && GiveMassToLink(chain)) continue;
     if (!composed) {
       std::vector<std::string_view> types;
       for (const int j : chain.joints) types.push_back(ToString(description.joints[j].type));

@@ -129,6 +129,7 @@ struct ComposedJoint {
   JointType type = JointType::kWeld;
   Placement X_BJ;              ///< its frame on the last body, in drawn axes of that body
   bool from_is_child = false;  ///< it leads from the last body to the first
+  bool keeps_angle = false;    ///< a planar joint that only slides
 };
 
 inline constexpr const char* kAxesOfOneJoint =
@@ -222,6 +223,9 @@ class ImportDraft {
   /// none.
   void ComposeChains();
   void ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed);
+  /// Gives a link without mass between two hinges mass of the bodies beside it, which does not
+  /// change the motion. Returns false if these bodies have none to give.
+  bool GiveMassToLink(const MasslessChain& chain);
   /// Removes attached bodies (one entry per body) and the joints within their carriers.
   void Attach(const std::vector<Attachment>& attachments);
   /// Fixes bodies without mass at the ends of chains where they are drawn: their motion has no

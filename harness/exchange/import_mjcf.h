@@ -131,6 +131,7 @@ class MjcfModel {
   std::map<std::string, MjcfSite> sites;
   std::map<std::string, MjcfElement> meshes;
   std::map<std::string, std::size_t> joint_names;
+  std::set<int> links;  ///< bodies without mass between two hinges of one body of MuJoCo
 
   /// Returns the orientation of the element in any notation; by default the one of its class.
   Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;

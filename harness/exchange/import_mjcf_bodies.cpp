@@ -319,6 +319,7 @@ void AdjustMasses(MjcfModel* model) {
   auto& bodies = model->draft->description.bodies;
   double total = 0.0;
   for (std::size_t i = 1; i < bodies.size(); ++i) {
+    if (model->links.contains(static_cast<int>(i))) continue;
     BodyDescription& body = bodies[i];
     body.mass = std::max(body.mass, settings.least_mass);
     if (settings.least_inertia > 0.0) BoundBelow(settings.least_inertia, &body.inertia);

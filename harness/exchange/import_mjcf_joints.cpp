@@ -118,12 +118,8 @@ void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints, I
   }
 }
 
-}  // namespace
-
-void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
-                  const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
-  std::vector<MjcfJoint> joints;
-  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(*model, joint));
+void AddChain(MjcfModel* model, const XmlElement& body, int parent, int child,
+              const Placement& X_PB, std::vector<MjcfJoint> joints) {
   MjcfChain chain;
   chain.parent = parent;
   chain.child = child;
@@ -146,6 +142,27 @@ void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int chil
     model->joints.push_back(joint);
   }
   model->chains.push_back(std::move(chain));
+}
+
+}  // namespace
+
+void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
+                  const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
+  std::vector<MjcfJoint> joints;
+  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(*model, joint));
+  // two hinges that are no joint together: a link without mass is between them
+  const bool has_link = joints.size() == 2 && !Compose({joints.begin(), joints.end()}) &&
+                        std::ranges::count(joints, SerialKind::kHinge, &MjcfJoint::kind) == 2;
+  if (has_link) {
+    ImportDraft* draft = model->draft;
+    const int link = draft->AddBody(body, draft->description.bodies[child].name + " link");
+    draft->at_rest[link] = draft->at_rest[child];
+    model->links.insert(link);
+    AddChain(model, body, parent, link, X_PB, {joints[0]});
+    AddChain(model, body, link, child, {}, {joints[1]});
+  } else {
+    AddChain(model, body, parent, child, X_PB, std::move(joints));
+  }
 }
 
 // <actuator>: at constant controls, actuators of joints are efforts, springs and dampers.

@@ -282,7 +282,7 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
       for (const std::size_t part : chain.parts) series.push_back(model->joints[part]);
       SetComposed(series, chain.composed, q, u, &coordinates, &speeds);
     }
-    if (!ours.motions.empty()) {
+    if (!ours.motions.empty() && first.alone) {
       // a start that contradicts an <equality>
       const double held = std::get<Polynomial>(ours.motions[0].value).coefficients[0];
       const std::string reason =

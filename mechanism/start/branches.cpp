@@ -105,6 +105,10 @@ class BranchSearch {
       ++result->found[k].times;
       return;
     }
+    if (!poses_.empty() && Freedom() > 0) {
+      ++result->movable;
+      return;
+    }
     Branch branch{.description = bare_, .times = poses_.empty() ? 0 : 1};
     if (!poses_.empty()) branch.distance = Apart(poses_[0]);
     poses_.push_back(kinematics_.poses());

@@ -22,6 +22,7 @@ struct Branch {
 struct Branches {
   /// Motions that remain with the fixed coordinates: branches are isolated only if it is 0.
   int freedom = 0;
+  int movable = 0;             ///< starts that led to other positions in which a motion remains
   int starts = 0, closed = 0;  ///< scattered starts, and those that closed
   std::vector<Branch> found;   ///< the description's own start first, then by distance from it
 };

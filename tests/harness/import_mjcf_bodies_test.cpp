@@ -75,12 +75,16 @@ TEST(ImportMjcf, JointsOnOneBodyAreOneOfOurs) {
   EXPECT_EQ(TypeOfChain(x + y + z + ball), "free");
   EXPECT_EQ(TypeOfChain(x + y + z + a + b + c), "free");
   EXPECT_EQ(TypeOfChain(""), "weld");
-  // no kind of ours: axes that are not perpendicular or do not meet, two slides
-  EXPECT_EQ(TypeOfChain(b + skew), "");
-  EXPECT_EQ(TypeOfChain(a + away), "");
-  EXPECT_EQ(TypeOfChain(x + y), "");
+  EXPECT_EQ(TypeOfChain(x + y), "planar");  // its angle is kept
+  // axes that are not perpendicular or do not meet: two joints and a link
+  EXPECT_EQ(TypeOfChain(b + skew), "revolute");
+  EXPECT_EQ(TypeOfChain(a + away), "revolute");
+  // no joint of a mechanism
+  EXPECT_EQ(TypeOfChain(a + a), "");
+  EXPECT_EQ(TypeOfChain(x + x), "");
+  EXPECT_EQ(TypeOfChain(x + y + z), "");
   EXPECT_EQ(TypeOfChain("<freejoint/>" + c), "");
-  ExpectRefusal(Model(x + y), {"file.xml:1", "2 joints on one body", "slide, slide"});
+  ExpectRefusal(Model(x + y + z), {"file.xml:1", "3 joints on one body", "slide, slide, slide"});
 }
 
 TEST(ImportMjcf, ShapesHaveTheMassesOfSolids) {

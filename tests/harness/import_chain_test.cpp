@@ -1,9 +1,15 @@
 // Joints in series through links without mass: the joint that they form, its frames and its start.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "harness/text/files.h"
+#include "mechanism/model/kinematics.h"
 #include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {
@@ -305,7 +311,9 @@ TEST(ImportChain, HingesThatMissEachOtherKeepTheirMotion) {
     for (const Hinged& body : chain) expected_mass += body.mass;
     // the ground gives mass that does not move
     EXPECT_GE(mass, expected_mass * (1.0 - 16.0 * kEps));
-    if (chain.size() > 1) EXPECT_NEAR(mass, expected_mass, 16.0 * kEps * expected_mass);
+    if (chain.size() > 1) {
+      EXPECT_NEAR(mass, expected_mass, 16.0 * kEps * expected_mass);
+    }
     Kinematics<Spatial, double> kinematics(mechanism);
     const int n = mechanism.num_u();
     ASSERT_EQ(n, static_cast<int>(chain.size()) + 1);

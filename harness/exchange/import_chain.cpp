@@ -430,7 +430,8 @@ double TakePoints(const Vector3d& at, const Vector3d& axis, BodyDescription* bod
       const double mass = share * body->mass / 2.0;
       const BodyDescription rest = WithPoints(*body, -mass, *points);
       const Eigen::Vector3d left = SymmetricEigenvalues(rest.inertia);
-      if (left[0] < 0.5 * moments[0] || left[0] + left[1] < left[2]) continue;
+      // mechanism files accept moments that are rounded by a hundredth
+      if (left[0] < 0.5 * moments[0] || left[2] > 1.005 * (left[0] + left[1])) continue;
       *body = rest;
       return mass;
     }

@@ -34,7 +34,8 @@ void MoveSide(const Attachment& at, SpaceKind space, JointSide* side) {
 void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carrier) {
   const Vector3 com = X.R * body.com + X.p;
   const double mass = carrier->mass + body.mass;
-  const Vector3 joint_com = (carrier->mass * carrier->com + body.mass * com) / mass;
+  Vector3 joint_com = carrier->com;
+  if (mass > 0.0) joint_com = (carrier->mass * carrier->com + body.mass * com) / mass;
   carrier->inertia += PointInertia(carrier->mass, carrier->com - joint_com) +
                       X.R * body.inertia * X.R.transpose() +
                       PointInertia(body.mass, com - joint_com);

@@ -261,8 +261,8 @@ TEST(ImportMerge, MeshesOfWhatCannotMoveAreNotRead) {
            "<body name=\"arm\"><joint/>" + kInertial + "</body></body></body></worldbody></mujoco>";
   };
   ExpectBody(Only(Read(wall(mesh))), 2, {0, 0, -0.5}, {0.2, 0.2, 0.01});
-  ExpectRefusal(wall(mesh + "<joint/>"), {"the mass of a mesh"});
-  ExpectRefusal(wall(mesh, "<compiler settotalmass=\"3\"/>"), {"the mass of a mesh"});
+  ExpectRefusal(wall(mesh + "<joint/>"), {"the name of a mesh"});
+  ExpectRefusal(wall(mesh, "<compiler settotalmass=\"3\"/>"), {"the name of a mesh"});
   // MuJoCo's total includes parts that cannot move: 1 and 2 kg
   const Imported total = Read(wall(sphere, "<compiler settotalmass=\"6\"/>"));
   EXPECT_NEAR(total.description.bodies.back().mass, 4.0, kRounding);

@@ -175,9 +175,10 @@ TEST(ImportMerge, LinksWithoutMassAtTheEndAreFixed) {
   ExpectNote(imported, "<link name=\"tool\">", "without mass at the end of a chain");
   ExpectNote(imported, "<link name=\"wrist\">", "joint \"w\" dropped");
   // with mass behind it, or on the ground, a link without mass is refused
-  ExpectRefusal(Arm(Link("wrist") + Link("tool", Inertial(1, "1 1 1")) +
+  ExpectRefusal(Arm(Link("wrist") + Link("tool", Inertial(1, "1 1 1")) + Link("palm") +
                     Joint("w", "continuous", "arm", "wrist", "0 0 -1") +
-                    Joint("t", "continuous", "wrist", "tool", "0.1 0 0")),
+                    Joint("p", "continuous", "wrist", "palm", "0.1 0 0") +
+                    Joint("t", "continuous", "palm", "tool", "0.1 0 0")),
                 {"<link name=\"wrist\">: found a body without mass that moves"});
   ExpectRefusal(Arm(Link("flag") + Joint("f", "continuous", "world", "flag")),
                 {"<link name=\"flag\">: found a body without mass that moves"});

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "harness/integrator/stepper.h"
 
@@ -94,6 +95,19 @@ void UseOurOperations(N_Vector v, bool max_norm) {
 
 namespace loopbench::harness {
 
+void SetTable(void* memory, const ButcherTable& table) {
+  std::vector<double> rows, b = table.b, c = table.c, d = table.b_embedded;
+  for (const std::vector<double>& row : table.A) rows.insert(rows.end(), row.begin(), row.end());
+  ARKodeButcherTable copy =
+      ARKodeButcherTable_Create(table.stages(), table.order, table.embedded_order, c.data(),
+                                rows.data(), b.data(), d.empty() ? nullptr : d.data());
+  const int code = table.is_implicit()
+                       ? ARKStepSetTables(memory, table.order, table.embedded_order, copy, nullptr)
+                       : ERKStepSetTable(memory, copy);
+  ARKodeButcherTable_Free(copy);
+  Require(code, "the table");
+}
+
 #if SUNDIALS_VERSION_MAJOR >= 7
 
 namespace {
@@ -184,7 +198,7 @@ SUNLinearSolver_Type IsDirect(SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; 
 
 }  // namespace
 
-Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_step,
+Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, const IntegratorOptions& options,
                SUNContext context)
     : controlled_(controlled),
       factors_(controlled),
@@ -206,10 +220,8 @@ Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_ste
   // run ends; a Jacobian per step costs less than the iterations and the rejected steps it saves.
   LOOPBENCH_SET_IMPLICIT(SetLSetupFrequency, memory, 1);
   LOOPBENCH_SET_IMPLICIT(SetJacEvalFrequency, memory, 1);
-  // Newton residual in units of the tolerance: at ARKODE's 0.1 it dominates the global error.
-  LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, 0.01);
-  // A step that may shrink is cheaper shortened than iterated on.
-  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, fixed_step ? Stepper::kMaxIterations : 8);
+  LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, options.newton_coefficient);
+  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, Stepper::MaxIterations(options));
   // A stage starts from the line through the last two states: fewer and less distant iterations
   // than from the last state alone.
   LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);

@@ -89,6 +89,9 @@ using ControllerPtr = Nothing;  // ARKODE 6 keeps the controller inside its memo
 Context MakeContext(std::string* message);
 void CaptureMessages(void* memory, bool implicit, std::string* message);
 
+/// Sets the Runge-Kutta method of `memory`, of ERKStep for an explicit table, else of ARKStep.
+void SetTable(void* memory, const ButcherTable& table);
+
 /// Makes `memory` choose steps by `c`; the returned object must live as long as `memory`.
 ControllerPtr SetControl(void* memory, bool implicit, SUNContext context, const Controller& c);
 
@@ -100,9 +103,9 @@ ControllerPtr SetControl(void* memory, bool implicit, SUNContext context, const 
 class Newton {
  public:
   /// Makes ARKStep's `memory` solve its stages with Jacobians of the GuardedOde that is its user
-  /// data. The first `controlled` components of y are not quadratures. Steps of fixed length cannot
-  /// shrink, and may take Stepper::kMaxIterations. Must outlive `memory`.
-  Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_step, SUNContext context);
+  /// data. The first `controlled` components of y are not quadratures. Must outlive `memory`.
+  Newton(void* memory, N_Vector y, Eigen::Index controlled, const IntegratorOptions& options,
+         SUNContext context);
   Newton(const Newton&) = delete;
   Newton& operator=(const Newton&) = delete;
 

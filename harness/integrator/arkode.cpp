@@ -142,9 +142,7 @@ struct Stepper::Arkode {
                   profile_.is_ode45 ? Weights<true> : Weights<false>);
     SetTable(memory(), profile_.table);
     if (profile_.is_implicit) {
-      newton_ =
-          std::make_unique<Newton>(memory(), y_.get(), static_cast<Eigen::Index>(ode_.Controlled()),
-                                   ode_.options(), context_.get());
+      newton_ = std::make_unique<Newton>(memory(), y_.get(), ode_, context_.get());
       // the other interpolant evaluates a derivative at the end of every step
       LOOPBENCH_SET_IMPLICIT(SetInterpolantType, memory(), ARK_INTERP_LAGRANGE);
     }

@@ -179,5 +179,37 @@ TEST(IntegrationOptions, AreKeysOfTheCasesThatTheyAffect) {
             plain.keys);
 }
 
+/// A crank-rocker whose crank turns by 0.15 and 0.8 rad a step. With one Jacobian a step, a third
+/// of the long steps fail.
+TEST(ImplicitFixedSteps, ConvergeAtLongStepsOfAFourBar) {
+  const std::string mechanism = "/problems/0/mechanism";
+  const Experiment experiment =
+      ParseExperiments(
+          R"({"name": "e", "problems": [{"mechanism": "four-bar.json", "horizon": 1}],
+          "methods": {"formulation": ["odca", "lagrange", "reduction"],
+                      "enforcement": ["acceleration", "velocity", "projection", "baumgarte"],
+                      "coordinates": ["joint", "absolute"]},
+          "integrator": ["trbdf2", "kennedy-carpenter-32", "kennedy-carpenter-43", "kvaerno-54",
+                         "kennedy-carpenter-54", "ARKODE_SDIRK_5_3_4"],
+          "fixed_steps": [0.01875, 0.1]})",
+          kConfigs / "mechanisms/e.json",
+          {{mechanism + "/ground/points/C", "[1, 0]"},
+           {mechanism + "/bodies/0/points/B", "[0.4, 0]"},
+           {mechanism + "/bodies/0/com", "[0.2, 0]"},
+           {mechanism + "/bodies/1/points/B", "[1.2, 0]"},
+           {mechanism + "/bodies/1/com", "[0.6, 0]"},
+           {mechanism + "/initial/coordinates", R"({"OA": 0.5, "AB": 0.2, "BC": -2.54})"},
+           {mechanism + "/initial/speeds", R"({"OA": 8})"}})
+          .front();
+  double renewed = 0.0;
+  for (const Case& one : Expand(experiment)) {
+    const Record record = RunCase(experiment, one);
+    EXPECT_EQ(record.Text("outcome"), "finished")
+        << ToString(one.method) << " " << one.integrator << ": " << record.Text("message");
+    renewed = std::max(renewed, record.Number("newton_jacobians") - record.Number("steps"));
+  }
+  EXPECT_GT(renewed, 0.0) << "no case tests the renewal of Jacobians";
+}
+
 }  // namespace integration_options_test
 }  // namespace loopbench::harness

@@ -253,5 +253,22 @@ TEST_F(IntegratorsProgram, ListsThemAndRunsThoseOfFiles) {
                {"rule.json:1: /order: found coefficients of order 1", "expected order 2"});
 }
 
+/// The orders of the shipped example, as the legend of the figure has them: 3 and 4 within 0.1.
+TEST_F(IntegratorsProgram, DrawObservedOrders) {
+  const std::string example = (kConfigs / "experiments/examples/butcher-tables.json").string();
+  ExpectEnding(Call("run " + example + " --out out"), 0, {"ran 19 cases"});
+  ExpectEnding(Call("work-precision out --cost-key rhs_evaluations --figures --out out"), 0,
+               {"wrote 5 figures to out/figures"});
+  const fs::path figures = folder_ / "out/figures";
+  const std::string orders = ReadFile(figures / "order-four-bar-horizon-1-velocity.svg");
+  for (const auto& [table, order] :
+       {std::pair("ESDIRK325L2SA_5_2_3", 3.0), std::pair("three-eighths", 4.0)}) {
+    const std::size_t at = orders.find(", order ", orders.find(table));
+    ASSERT_NE(at, std::string::npos) << orders.substr(0, 200);
+    EXPECT_NEAR(std::stod(orders.substr(at + 8)), order, 0.1) << table;
+  }
+  EXPECT_TRUE(fs::exists(figures / "integrators-four-bar-horizon-1-velocity.svg"));
+}
+
 }  // namespace butcher_table_test
 }  // namespace loopbench::harness

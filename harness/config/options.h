@@ -39,8 +39,8 @@ namespace loopbench::harness {
 ///
 /// Sources: R. Bank et al., IEEE Trans. Electron Devices 32, 1985, and M. Hosea, L. Shampine, Appl.
 /// Numer. Math. 20, 1996 (TR-BDF2); A. Kvaerno, BIT 44, 2004; C. Kennedy, M. Carpenter,
-/// NASA/TM-2016-219173. They are those tables of ARKODE whose embeddings do not amplify stiff
-/// components.
+/// NASA/TM-2016-219173. Some other tables of ARKODE have an embedding that amplifies stiff
+/// components, such as SDIRK 5(3)4.
 ///
 /// Every table of the installed ARKODE is a profile, too, under ARKODE's own name such as
 /// "ARKODE_ZONNEVELD_5_3_4", with norm and controller as dormand-prince. So are user-defined

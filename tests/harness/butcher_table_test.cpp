@@ -246,6 +246,9 @@ TEST_F(IntegratorsProgram, ListsThemAndRunsThoseOfFiles) {
     "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
     "methods": [{"formulation": "odca", "enforcement": "acceleration"}]})");
   ExpectEnding(Call("run own.json --out out"), 0, {"ran 2 cases"});
+  ExpectEnding(Call("explain own.json --set /tolerances=1e-6 --set /integrator=verner --set "
+                    "'/atol={\"length\": 1e-9}'"),
+               0, {"relative tolerances: 1e-06", "1e-09 m, 0 rad, 0 m/s, 0 rad/s"});
   ExpectEnding(Call("table out --columns integrator,steps,rhs_evaluations --format csv"), 0,
                {"three-eighths,10,", "ARKODE_ZONNEVELD_5_3_4,10,"});
   Write("rule.json", R"({"name": "three-eighths", "A": [[0]], "b": [1], "c": [0], "order": 2})");

@@ -65,7 +65,7 @@ TEST(AbsoluteTolerances, BelongToTheQuantitiesOfTheState) {
 /// Given as they are by default, they leave all bits; otherwise the steps change.
 TEST(AbsoluteTolerances, ChangeTheRunAndItsIdentity) {
   const std::string quantities =
-      R"("integrator": "dormand-prince", "tolerances": 1e-6, "atol": {"speed": )";
+      R"("integrator": "dormand-prince", "tolerances": 1e-6, "atol": {"length": )";
   for (const char* formulation : {"lagrange", "reduction"}) {
     const auto run = [&](const std::string& rest) {
       return RunFirst(SliderCrank(rest, "absolute", formulation));
@@ -75,10 +75,10 @@ TEST(AbsoluteTolerances, ChangeTheRunAndItsIdentity) {
         run(R"("integrator": "dormand-prince", "tolerances": 1e-6, "atol": 1e-9)");
     const Record same = run(quantities + "1e-6}"), other = run(quantities + "1e-9}");
     EXPECT_EQ(standard.Number("atol"), 1e-6);
-    EXPECT_EQ(standard.Find("atol_speed"), nullptr);
+    EXPECT_EQ(standard.Find("atol_length"), nullptr);
     EXPECT_EQ(number.Number("atol"), 1e-9);
     EXPECT_EQ(same.Text("atol"), "");
-    EXPECT_EQ(same.Number("atol_speed"), 1e-6);
+    EXPECT_EQ(same.Number("atol_length"), 1e-6);
     EXPECT_EQ(other.Number("atol_angular_speed"), 1e-6);
     EXPECT_EQ(same.Text("state_hash"), standard.Text("state_hash")) << formulation;
     EXPECT_GT(number.Number("steps"), standard.Number("steps"));

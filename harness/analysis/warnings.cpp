@@ -297,7 +297,8 @@ double TolerancesOfDrift(const Record& record) {
 /// Returns true if the energy corresponds to speeds below 1e-6 of the absolute tolerance at 1 kg
 /// (round-off amplified by Baumgarte feedback).
 bool IsAtRest(const Record& record) {
-  const double speed = 1e-6 * record.Number("atol");
+  const char* key = record.Find("atol_speed") != nullptr ? "atol_speed" : "atol";
+  const double speed = 1e-6 * record.Number(key);
   return record.Number("energy_scale") <= speed * speed;
 }
 

@@ -134,6 +134,7 @@ class Commands {
 void AddRun(Commands& commands);
 void AddMerge(Commands& commands);
 void AddList(Commands& commands);
+void AddIntegrators(Commands& commands);
 void AddCheck(Commands& commands);
 void AddPlan(Commands& commands);
 void AddExplain(Commands& commands);

@@ -9,6 +9,7 @@
 #include "harness/cli/commands.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/config/options.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims.h"
 #include "harness/judge/robustness_map.h"
@@ -287,6 +288,28 @@ int List(const ExperimentFiles& files, bool json) {
   return 0;
 }
 
+int ListIntegrators(bool json) {
+  Table table;
+  table.columns = {{"integrator", "integrator"},
+                   {"order", "order", Format::kInteger},
+                   {"embedded_order", "embedded", Format::kInteger},
+                   {"stages", "stages", Format::kInteger},
+                   {"kind", "kind"},
+                   {"table", "table of ARKODE"}};
+  for (const Profile& profile : Profiles()) {
+    const ButcherTable& pair = profile.table;
+    const std::string other = pair.name == profile.name ? "" : pair.name;
+    AddRow({profile.name, pair.order,
+            profile.has_embedding() ? Value(std::int64_t{pair.embedded_order}) : Value(),
+            pair.stages(), profile.is_implicit ? "implicit" : "explicit", other},
+           &table);
+  }
+  if (!json) PrintText(ToScreen(table));
+  std::vector<JsonObject> rows(table.rows.begin(), table.rows.end());
+  if (json) PrintText(JsonObject().Add("integrators", rows).Text() + "\n");
+  return 0;
+}
+
 int CheckFiles(const CheckCommand& command) {
   std::vector<JsonObject> documents;
   int exit_code = 0;
@@ -322,6 +345,13 @@ void AddList(Commands& commands) {
                 SetOption(&files.settings),
                 WideOption(),
                 JsonOption(&json)});
+}
+
+void AddIntegrators(Commands& commands) {
+  auto& json = commands.Keep<bool>();
+  commands.Add("integrators", "List the integrators with their orders and stages",
+               [&](const Typed&) { return ListIntegrators(json); },
+               {WideOption(), JsonOption(&json)});
 }
 
 void AddCheck(Commands& commands) {

@@ -101,7 +101,15 @@ std::string_view UnitOf(const Experiment& experiment, const std::string& joint) 
 void ExplainRuns(const Experiment& experiment) {
   Print("\nRuns\n  integrators: {}\n", fmt::join(experiment.integrators, ", "));
   if (!experiment.tolerances.empty()) {
-    Print("  relative and absolute tolerances: {}\n", Numbers(experiment.tolerances));
+    const bool is_tied = experiment.atol == 0.0 && !experiment.atols;
+    Print("  relative {}tolerances: {}\n", is_tied ? "and absolute " : "",
+          Numbers(experiment.tolerances));
+  }
+  if (experiment.atol > 0.0) Print("  absolute tolerance: {:g}\n", experiment.atol);
+  if (experiment.atols) {
+    const auto& [length, angle, speed, angular_speed] = *experiment.atols;
+    Print("  absolute tolerances (0: as relative): {:g} m, {:g} rad, {:g} m/s, {:g} rad/s\n",
+          length, angle, speed, angular_speed);
   }
   if (!experiment.fixed_steps.empty()) {
     Print("  fixed steps without error control [s]: {}\n", Numbers(experiment.fixed_steps));

@@ -62,7 +62,7 @@ std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::stri
 
 /// Commands under the headings of `loopbench --help`.
 const std::pair<const char*, std::vector<void (*)(Commands&)>> kGroups[] = {
-    {"Experiments", {AddRun, AddList, AddPlan, AddAdvise, AddMerge}},
+    {"Experiments", {AddRun, AddList, AddIntegrators, AddPlan, AddAdvise, AddMerge}},
     {"Mechanisms",
      {AddCheck, AddExplain, AddAssemble, AddView, AddSimplify, AddImport, AddConvert, AddGenerate,
       AddCount}},

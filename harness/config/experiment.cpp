@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/config/experiment_sections.h"
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
 
@@ -39,13 +40,21 @@ std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Metho
 
 Case MakeCase(const Experiment& experiment, std::size_t problem, const Method& method,
               const StepChoice& choice, double horizon, const std::string& integrator) {
+  std::optional<AbsoluteTolerances> atols = experiment.atols;
+  if (atols) {
+    for (double* one : {&atols->length, &atols->angle, &atols->speed, &atols->angular_speed}) {
+      if (*one == 0.0) *one = choice.tolerance;
+    }
+  }
   Case one{.problem = problem,
            .mechanism = experiment.problems[problem].name,
            .method = method,
            .integrator = integrator,
            .jacobian = experiment.jacobian,
            .rtol = choice.tolerance,
-           .atol = choice.tolerance,
+           .atol = experiment.atol > 0.0 && choice.step == 0.0 ? experiment.atol : choice.tolerance,
+           .atols = choice.step == 0.0 ? atols : std::nullopt,
+           .integration = experiment.integration,
            .horizon = horizon,
            .step = choice.step,
            .limits = experiment.limits};
@@ -86,14 +95,29 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   const bool is_peer = row != nullptr && row->is_peer();
   keys.Set("integrator", is_peer ? row->integrator : one.integrator);
   const Profile* profile = FindProfile(one.integrator);
-  if (profile != nullptr && profile->is_implicit && !is_peer) {
+  const bool is_implicit = profile != nullptr && profile->is_implicit && !is_peer;
+  if (is_implicit) {
     const auto kind = static_cast<std::size_t>(one.jacobian);
     keys.Set("jacobian", std::string(kNames<JacobianKind>[kind]));
   }
   const bool is_fixed = one.step > 0.0;
   keys.Set("rtol", is_fixed ? Value() : Value(one.rtol));
-  keys.Set("atol", is_fixed ? Value() : Value(one.atol));
+  keys.Set("atol", is_fixed || one.atols ? Value() : Value(one.atol));
+  if (one.atols) {
+    AtolFields().Show(*one.atols, [&keys](const std::string& quantity, const Json& value) {
+      keys.Set("atol_" + quantity, value.get<double>());
+    });
+  }
   if (is_fixed) keys.Set("step", one.step);
+  const auto set = [&keys](bool matters, const char* key, auto value, auto usual) {
+    if (matters && value != usual) keys.Set(key, value);
+  };
+  const Integration& own = one.integration;
+  set(!is_fixed, "max_step", own.max_step, 0.0);
+  set(!is_fixed, "initial_step", own.initial_step, 0.0);
+  set(is_implicit, "max_newton_iterations", std::int64_t{own.max_newton_iterations},
+      std::int64_t{0});
+  set(is_implicit, "newton_coefficient", own.newton_coefficient, Integration().newton_coefficient);
   keys.Set("horizon", one.horizon);
   if (one.method.gains) {
     keys.Set("alpha", one.method.gains->alpha);
@@ -199,7 +223,13 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
   const Timing& timing = experiment.timing;
   if (timing.repeats == 0) return {};
   if (timing.cases) return ExpandRuns(experiment, experiment.methods, StepChoices(experiment));
-  return ExpandRuns(experiment, timing.methods, {{.tolerance = timing.tolerance}}, timing.horizon);
+  std::vector<Case> cases =
+      ExpandRuns(experiment, timing.methods, {{.tolerance = timing.tolerance}}, timing.horizon);
+  std::erase_if(cases, [](const Case& one) {
+    const Profile* profile = FindProfile(one.integrator);
+    return profile != nullptr && !profile->has_embedding();
+  });
+  return cases;
 }
 
 }  // namespace loopbench::harness

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "harness/config/mechanism_reader.h"
+#include "harness/config/options.h"
 #include "harness/config/published_series.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
@@ -202,14 +203,33 @@ std::vector<double> OutputTimes(const OutputOptions& output, double horizon);
 /// Returns all options as text, for the identity of cases.
 std::string ToString(const OutputOptions& output);
 
+/// Absolute tolerances by quantity. In files and experiments 0 stands for the relative tolerance.
+struct AbsoluteTolerances {
+  double length = 0.0, angle = 0.0;         ///< [m], [rad]; coordinates of quaternions are angles
+  double speed = 0.0, angular_speed = 0.0;  ///< [m/s], [rad/s]
+};
+
+/// Options of the integrator besides its method and tolerances (IntegratorOptions).
+struct Integration {
+  double max_step = 0.0;      ///< [s]; 0: the profile's own
+  double initial_step = 0.0;  ///< [s]; 0: the profile's own
+  int max_newton_iterations = 0;
+  double newton_coefficient = IntegratorOptions().newton_coefficient;
+
+  friend bool operator==(const Integration&, const Integration&) = default;
+};
+
 struct Experiment {
   std::string name;
   std::string comment;
   std::filesystem::path path;
   std::vector<ExperimentProblem> problems;
   std::vector<Method> methods;
-  std::vector<double> tolerances;   ///< rtol = atol; may be empty if there are fixed_steps
-  std::vector<double> fixed_steps;  ///< [s]; additional cases without error test
+  std::vector<double> tolerances;  ///< rtol, and atol; may be empty if there are fixed_steps
+  double atol = 0.0;               ///< 0: as rtol
+  std::optional<AbsoluteTolerances> atols = std::nullopt;  ///< instead of atol
+  Integration integration;
+  std::vector<double> fixed_steps;                   ///< [s]; additional cases without error test
   std::vector<std::string> integrators = {"ode45"};  ///< profiles, crossed with all steps
   JacobianKind jacobian = JacobianKind::kForward;    ///< unused by explicit profiles
   std::vector<EnsembleRule> ensembles;               ///< the first match of a case applies
@@ -234,8 +254,10 @@ struct Case {
   Method method;
   std::string integrator;
   JacobianKind jacobian = JacobianKind::kForward;
-  double rtol = 0.0;       ///< 0 if the step is fixed
-  double atol = 0.0;       ///< 0 if the step is fixed
+  double rtol = 0.0;                             ///< 0 if the step is fixed
+  double atol = 0.0;                             ///< 0 if the step is fixed
+  std::optional<AbsoluteTolerances> atols = {};  ///< instead of atol; all positive
+  Integration integration = {};
   double horizon = 0.0;    ///< [s]
   double step = 0.0;       ///< fixed step [s], without error test; 0: set by the tolerance
   int ensemble = 1;        ///< number of runs; 1: no perturbation
@@ -253,7 +275,8 @@ struct Case {
 bool Matches(const EnsembleRule& rule, const Case& one);
 
 /// Returns the keys of a case in every record (docs/reference/records.md), then the experiment's
-/// parameters. With a fixed step, rtol and atol are empty and "step" is a key.
+/// parameters. With a fixed step, rtol and atol are empty and "step" is a key. Other options of the
+/// integrator are keys if they are not defaults and affect the case.
 Record CaseKeys(const Experiment& experiment, const Case& one);
 
 /// "1e-08", or "step 0.001": the setting that determines step lengths.
@@ -275,7 +298,8 @@ std::vector<Case> Expand(const Experiment& experiment);
 std::vector<Case> ExpandLadders(const Experiment& experiment);
 
 /// Returns all timing cases except excluded cases, in the order problem, method, integrator. With
-/// `timing.cases`, returns the accuracy cases, each as one run. Empty if timing is off.
+/// `timing.cases`, returns the accuracy cases, each as one run; else integrators without embedding
+/// have none. Empty if timing is off.
 std::vector<Case> ExpandTiming(const Experiment& experiment);
 
 // Limits as keys and values, for the content of a case.

@@ -321,16 +321,21 @@ void RequireSteps(const JsonNode& node, File&) {
   if (is_empty) tolerances->Fail("at least one tolerance, or \"fixed_steps\" beside it");
 }
 
-/// Reports peers, which choose their own steps, where steps are fixed.
-void RequireNoPeerOfFixedSteps(const JsonNode& node, File& file) {
-  const auto steps = node.Optional("fixed_steps");
-  if (!steps) return;
-  for (const Method& method : file.methods) {
+/// Reports peers, which have their own integrators, beside options of integrators.
+void RequireNoPeerOfOptions(const JsonNode& node, File& file) {
+  const auto peer = std::ranges::find_if(file.methods, [](const Method& method) {
     const FormulationRow* row = FindFormulation(method.formulation);
-    if (row == nullptr || !row->is_peer()) continue;
-    steps->FailAs(fmt::format("fixed steps of \"{}\", which has its own integrator", row->name),
-                  "\"tolerances\" alone, or an experiment of its own for peers");
-    return;
+    return row != nullptr && row->is_peer();
+  });
+  if (peer == file.methods.end()) return;
+  for (const auto& [key, what] :
+       {std::pair("fixed_steps", "fixed steps"), std::pair("atol", "absolute tolerances"),
+        std::pair("integration", "options")}) {
+    const auto option = node.Optional(key);
+    if (!option) continue;
+    option->FailAs(
+        fmt::format("{} of \"{}\", which has its own integrator", what, peer->formulation),
+        "\"tolerances\" alone, or an experiment of its own for peers");
   }
 }
 
@@ -343,10 +348,8 @@ void ReadPrecision(const JsonNode& node, File& file) {
 }
 
 FieldValue<File> Integrators() {
-  FieldValue<File> value =
-      RegisteredChoices(&File::integrators, ProfileNames, "an integrator profile");
-  value.show = [](const File& file) { return Json(file.integrators.front()); };
-  return value;
+  return {IntegratorsSchema(), ReadIntegrators,
+          [](const File& file) { return Json(file.integrators.front()); }};
 }
 
 void ReadOutputOptions(const JsonNode& node, File& file) {
@@ -396,20 +399,26 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
            {"methods", By(MethodsSchema(), ReadAllMethods),
             "Methods that impose the loop constraints.", "an array of methods"},
            {"tolerances", By(some_or_none, ReadAnyTolerances),
-            "Tolerances rtol = atol of the integrator, above the spacing of doubles. Optional, "
-            "or [], if fixed_steps is given."},
+            "Relative tolerances of the integrator, above the spacing of doubles; absolute ones, "
+            "too, unless atol is given. Optional, or [], if fixed_steps is given."},
            {"fixed_steps", NumberList(&File::fixed_steps, kPositive),
             "Fixed step lengths [s]: each adds cases in which all steps have this length (the "
             "last step is clipped) and no error test is made. Not for peers."},
            {"", By(one_of_both, RequireSteps)},
-           {"", By(Json::object(), RequireNoPeerOfFixedSteps)},
+           {"atol", By(AtolSchema(), ReadAtol),
+            "Absolute tolerance of every component of the state, or by quantity; default: as the "
+            "relative tolerance."},
+           {"integration", Object(&File::integration, IntegrationFields())},
+           {"", By(Json::object(), RequireNoPeerOfOptions)},
            {"refine", Bool(&File::refine),
             "If true, every case with a tolerance runs again at a tenth of it. Records then "
             "contain refinement_difference, the largest difference of final poses. A difference "
             "above 1000 tolerances sets the warning refinement."},
            {"integrator", Integrators(),
-            "Integrator profiles: Runge-Kutta pairs with norm and controller, crossed with all "
-            "other lists."},
+            "Integrators: profiles (Runge-Kutta pairs with norm and controller), tables of ARKODE "
+            "by "
+            "their names (loopbench integrators), Butcher tables, or files of such tables relative "
+            "to this file. Crossed with all other lists."},
            {"jacobian", Choice(&File::jacobian, NamesOf<JacobianKind>(), "a kind of Jacobian"),
             "Jacobians of implicit profiles: by forward differentiation or finite differences."},
            {"limits", Object(&File::limits, LimitsFields())},
@@ -429,7 +438,8 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
             "Rules: cases that match all conditions of a rule are left out. Keys are mechanism, "
             "formulation, enforcement, coordinates, solver, integrator, rtol, atol, step, "
             "horizon and the names of axes."},
-           {"", By(Json::object(), RequireDerivatives)}}));
+           {"", By(Json::object(), RequireDerivatives)},
+           {"", By(Json::object(), RequireUseOfIntegrators)}}));
   return fields;
 }
 

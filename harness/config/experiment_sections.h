@@ -85,6 +85,15 @@ Json MethodsSchema();
 /// Fields of the sections of the same names, and of "series".
 const Fields<Limits>& LimitsFields();
 const Fields<CompileOptions>& CompileFields();
+const Fields<AbsoluteTolerances>& AtolFields();
+const Fields<Integration>& IntegrationFields();
+/// Reads "integrator": names, and Butcher tables as objects or files, which are registered.
+void ReadIntegrators(const JsonNode& node, ExperimentFile& experiment);
+Json IntegratorsSchema();
+void ReadAtol(const JsonNode& node, ExperimentFile& experiment);
+Json AtolSchema();
+/// Reports tables without embedding that would need one, and options without effect.
+void RequireUseOfIntegrators(const JsonNode& node, ExperimentFile& experiment);
 const Fields<Experiment>& SeriesFields();
 const Fields<Timing>& TimingFields();
 const Fields<Precision>& PrecisionFields();

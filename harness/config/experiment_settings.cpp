@@ -134,7 +134,8 @@ const Fields<Timing>& TimingFields() {
   static const Fields<Timing> fields(
       "timing", "Timing runs, separate from accuracy runs.",
       {{"repeats", Integer(&Timing::repeats, 0, kMaxCount), "Repetitions; 0: no timing."},
-       {"tolerance", Number(&Timing::tolerance, kTolerances), "rtol = atol of the integrator."},
+       {"tolerance", Number(&Timing::tolerance, kTolerances),
+        "Relative tolerance of the integrator; absolute one, too, unless atol is given."},
        {"horizon", Number(&Timing::horizon, kPositive),
         "Simulated time [s]; default: the shortest of each problem."},
        {"methods", Methods(&Timing::methods), "Methods; default: as in the experiment."},

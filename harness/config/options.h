@@ -2,10 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "harness/config/butcher_table.h"
 
 namespace loopbench::harness {
 
@@ -36,13 +39,15 @@ namespace loopbench::harness {
 ///
 /// Sources: R. Bank et al., IEEE Trans. Electron Devices 32, 1985, and M. Hosea, L. Shampine, Appl.
 /// Numer. Math. 20, 1996 (TR-BDF2); A. Kvaerno, BIT 44, 2004; C. Kennedy, M. Carpenter,
-/// NASA/TM-2016-219173. Left out of ARKODE's tables: those with an embedding that amplifies stiff
-/// components (SDIRK 5(3)4 and others), and ESDIRK547L2SA2, whose coefficients are wrong in 6.4.
+/// NASA/TM-2016-219173. Some other tables of ARKODE have an embedding that amplifies stiff
+/// components, such as SDIRK 5(3)4.
+///
+/// Every table of the installed ARKODE is a profile, too, under ARKODE's own name such as
+/// "ARKODE_ZONNEVELD_5_3_4", with norm and controller as dormand-prince. So are user-defined
+/// tables, from experiments or RegisterIntegrator().
 ///
 /// "ode45" follows MATLAB's function of that name (L. Shampine, M. Reichelt, The MATLAB ODE suite,
-/// 1997): step counts agree with it within about 1 %. The list is closed because ARKODE 6.4.1 loses
-/// the order of many of its own tables (LLNL/sundials issue 311); each profile here has a
-/// convergence-order test.
+/// 1997): step counts agree with it within about 1 %.
 struct IntegratorOptions {
   std::string profile = "ode45";
 
@@ -51,6 +56,8 @@ struct IntegratorOptions {
   /// <= 1.
   double rtol = 1e-8;
   double atol = 1e-8;
+  /// If not empty, the absolute tolerance of each component, without quadratures, instead of atol.
+  std::vector<double> atols = {};
 
   /// Accepted steps before the run ends with kStepLimit.
   std::int64_t step_limit = 10'000'000;
@@ -62,6 +69,16 @@ struct IntegratorOptions {
 
   /// Longest step in seconds; 0 is the profile's own (ode45: a tenth of the interval; else none).
   double max_step = 0;
+
+  /// Length of the first step in seconds; 0 is the profile's own choice.
+  double initial_step = 0;
+
+  /// Limit of Newton's iterations in a stage of an implicit profile; 0: 8, and 50 at a fixed step.
+  int max_newton_iterations = 0;
+
+  /// Newton's iteration ends at an estimated error of this part of the tolerances. At ARKODE's 0.1
+  /// it dominates the global error.
+  double newton_coefficient = 0.01;
 
   /// If positive, every step has this length and no error test is made. The last step, and steps
   /// that end at a stop time, are clipped. Tolerances are then used by Newton's iteration only.
@@ -89,7 +106,7 @@ inline constexpr double kToleranceOfFixedSteps = 1e-10;
 /// allowed values.
 std::string Validate(const IntegratorOptions& options);
 
-/// Returns the accepted values of `IntegratorOptions::profile`, in the order of the table above.
+/// Returns the names of the tables above, in their order.
 std::vector<std::string> ProfileNames();
 
 /// ARKODE's step-size controller. Every value is set by the profile, because ARKODE's own defaults
@@ -106,22 +123,37 @@ struct Controller {
   double keep_below;        ///< the step is kept if it would grow by less than this factor
 };
 
-/// Row of the table above, for arkode.cpp.
+/// A Runge-Kutta method with the properties of a profile.
 struct Profile {
-  std::string_view name;
-  const char* table;  ///< ARKODE's name of the Runge-Kutta pair
+  std::string name;
+  ButcherTable table;
   Controller controller;
   bool is_ode45;  ///< MATLAB's norm, weights, first step and longest step
+  bool is_own;    ///< user-defined: its coefficients are part of the identity of cases
 
-  /// ERKStep 6.4.1 assumes that every table whose last abscissa is 1 is first-same-as-last, and
+  bool is_implicit;  ///< diagonally implicit, stages by Newton's iteration
+  /// ARKODE 6.4.1 assumes that every table whose last abscissa is 1 is first-same-as-last, and
   /// loses order for other tables; a post-step hook, even an empty one, makes it evaluate the
   /// derivative at the new solution (LLNL/sundials issue 311, fixed in 6.7).
   bool needs_fresh_derivative;
 
-  bool is_implicit = false;  ///< diagonally implicit, stages by Newton's iteration
+  bool has_embedding() const { return !table.b_embedded.empty(); }
 };
 
-/// Returns the profile of that name, or nullptr.
+/// Returns the profile of that name, or nullptr. References stay valid.
 const Profile* FindProfile(std::string_view name);
+
+/// Returns all profiles: those of the table above, ARKODE's tables, user-defined tables.
+const std::deque<Profile>& Profiles();
+std::vector<std::string> IntegratorNames();
+
+/// Adds a user-defined table with norm and controller as dormand-prince; not while experiments run.
+/// Does nothing for a table that is registered already. Throws std::invalid_argument for the fault
+/// that FaultOfIntegrator() returns.
+void RegisterIntegrator(const ButcherTable& table);
+
+/// Returns a fault of the table (butcher_table.h) or of its name: no word of a-z, 0-9, '-' and '_',
+/// or the name of another integrator.
+std::optional<TableFault> FaultOfIntegrator(const ButcherTable& table);
 
 }  // namespace loopbench::harness

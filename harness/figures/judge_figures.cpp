@@ -515,6 +515,50 @@ Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::strin
   return figure;
 }
 
+namespace {
+
+/// Returns the exponent of y ~ x^p by least squares; NaN for fewer than two different x.
+double Slope(const Curve& curve) {
+  double sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
+  const double n = static_cast<double>(curve.x.size());
+  for (std::size_t i = 0; i < curve.x.size(); ++i) {
+    const double x = std::log(curve.x[i]), y = std::log(curve.y[i]);
+    sum_x += x, sum_y += y, sum_xx += x * x, sum_xy += x * y;
+  }
+  const double spread = n * sum_xx - sum_x * sum_x;
+  return spread > 1e-12 * n * sum_xx ? (n * sum_xy - sum_x * sum_y) / spread : kNowhere;
+}
+
+/// Draws the error of one method, with a curve for each integrator: over the fixed step with the
+/// observed orders, or over the cost.
+Figure IntegratorsFigure(const WorkPrecision& work_precision, const std::string& title,
+                         const Rows& rows, bool over_step) {
+  Figure figure{.title = title,
+                .x_label = over_step ? "step [s]" : LabelOfAxis(work_precision.cost),
+                .y_label = LabelOfAxis(work_precision.error),
+                .log_x = true,
+                .log_y = true,
+                .curves = {}};
+  constexpr const char* kIntegrator[] = {"integrator"};
+  for (auto& [name, own] : RowsBy(kIntegrator, rows)) {
+    const std::string label = own.front()->record.Text("integrator");
+    const auto x = [&](const WorkPrecisionRow& row) {
+      return over_step ? row.record.Number("step") : row.cost;
+    };
+    Rows sorted = own;
+    std::ranges::stable_sort(sorted, std::less(),
+                             [&](const WorkPrecisionRow* row) { return x(*row); });
+    const std::size_t before = figure.curves.size();
+    AddRuns(sorted, x, {.label = label, .style = DistinctStyle(before)}, &figure);
+    Curve& curve = figure.curves.back();
+    const double order = over_step ? Slope(curve) : kNowhere;
+    if (std::isfinite(order)) curve.label += fmt::format(", order {:.2f}", order);
+  }
+  return figure;
+}
+
+}  // namespace
+
 std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precision) {
   std::vector<NamedFigure> figures;
   std::set<std::string> taken;
@@ -530,6 +574,21 @@ std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precisio
   };
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     add("work-precision-", problem.name, WorkPrecisionFigure(work_precision, problem));
+    const bool several = IntegratorsOfRows(problem).size() > 1;
+    const std::vector<Record> all = RecordsOf(RowsWith(problem, ""));
+    for (const auto& [name, rows] : RowsBy(kChannelKeys, RowsWith(problem, ""))) {
+      const std::string what =
+          fmt::format("{}, {}", problem.name, MethodLabel(rows.front()->record, all));
+      Rows fixed = rows;
+      std::erase_if(
+          fixed, [](const WorkPrecisionRow* row) { return !(row->record.Number("step") > 0.0); });
+      if (several) {
+        add("integrators-", what, IntegratorsFigure(work_precision, what, rows, false));
+      }
+      if (Varies(RecordsOf(fixed), "step")) {
+        add("order-", what, IntegratorsFigure(work_precision, what + ": order", fixed, true));
+      }
+    }
     for (const std::string& integrator : IntegratorsOfRows(problem)) {
       const std::string what = problem.name + " " + integrator;
       add("tolerance-", what, ToleranceFigure(work_precision, problem, integrator));

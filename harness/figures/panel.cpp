@@ -45,7 +45,10 @@ std::string InMillimetres(std::string svg, const GnuplotPage& page) {
 }  // namespace
 
 double WidthOf(std::string_view text) {
-  return kLetterWidth * static_cast<double>(CountCharacters(text));
+  // names in capitals, as of ARKODE's tables, are wider
+  const auto capitals = std::ranges::count_if(text, [](char c) { return c >= 'A' && c <= 'Z'; });
+  const double wider = 1.5 * static_cast<double>(std::max<std::ptrdiff_t>(capitals - 4, 0));
+  return kLetterWidth * static_cast<double>(CountCharacters(text)) + wider;
 }
 
 std::vector<std::string> Wrapped(const std::string& text, std::size_t most) {

@@ -140,15 +140,11 @@ struct Stepper::Arkode {
     LOOPBENCH_SET(profile_.is_implicit, SetUserData, memory(), &ode_);
     LOOPBENCH_SET(profile_.is_implicit, WFtolerances, memory(),
                   profile_.is_ode45 ? Weights<true> : Weights<false>);
+    SetTable(memory(), profile_.table);
     if (profile_.is_implicit) {
-      Require(ARKStepSetTableName(memory(), profile_.table, "ARKODE_ERK_NONE"), "the table");
-      newton_ =
-          std::make_unique<Newton>(memory(), y_.get(), static_cast<Eigen::Index>(ode_.Controlled()),
-                                   ode_.options().fixed_step > 0, context_.get());
+      newton_ = std::make_unique<Newton>(memory(), y_.get(), ode_, context_.get());
       // the other interpolant evaluates a derivative at the end of every step
       LOOPBENCH_SET_IMPLICIT(SetInterpolantType, memory(), ARK_INTERP_LAGRANGE);
-    } else {
-      Require(ERKStepSetTableName(memory(), profile_.table), "the table");
     }
     if (profile_.needs_fresh_derivative) {
       LOOPBENCH_SET(profile_.is_implicit, SetPostprocessStepFn, memory(), NoChange);
@@ -186,9 +182,10 @@ struct Stepper::Arkode {
     LOOPBENCH_SET(profile_.is_implicit, SetMaxStep, memory(), longest);  // 0 is none
     if (options.fixed_step > 0) {
       LOOPBENCH_SET(profile_.is_implicit, SetFixedStep, memory(), options.fixed_step);
-    } else if (profile_.is_ode45) {
+    } else if (profile_.is_ode45 || options.initial_step > 0) {
       LOOPBENCH_SET(profile_.is_implicit, SetInitStep, memory(),
-                    ode_.FirstStepOfOde45(t0, t_end(), y(), longest));
+                    options.initial_step > 0 ? std::min(options.initial_step, t_end() - t0)
+                                             : ode_.FirstStepOfOde45(t0, t_end(), y(), longest));
     }
   }
 

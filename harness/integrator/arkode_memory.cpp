@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "harness/integrator/stepper.h"
 
@@ -94,6 +95,19 @@ void UseOurOperations(N_Vector v, bool max_norm) {
 
 namespace loopbench::harness {
 
+void SetTable(void* memory, const ButcherTable& table) {
+  std::vector<double> rows, b = table.b, c = table.c, d = table.b_embedded;
+  for (const std::vector<double>& row : table.A) rows.insert(rows.end(), row.begin(), row.end());
+  ARKodeButcherTable copy =
+      ARKodeButcherTable_Create(table.stages(), table.order, table.embedded_order, c.data(),
+                                rows.data(), b.data(), d.empty() ? nullptr : d.data());
+  const int code = table.is_implicit()
+                       ? ARKStepSetTables(memory, table.order, table.embedded_order, copy, nullptr)
+                       : ERKStepSetTable(memory, copy);
+  ARKodeButcherTable_Free(copy);
+  Require(code, "the table");
+}
+
 #if SUNDIALS_VERSION_MAJOR >= 7
 
 namespace {
@@ -163,7 +177,16 @@ Matrix View(SUNMatrix matrix) {
   return {SM_DATA_D(matrix), SM_ROWS_D(matrix), SM_COLUMNS_D(matrix)};
 }
 
-// ARKODE's callback for I - gamma J; jok allows the Jacobian of an earlier stage.
+/// I - gamma J, with the last Jacobian of `ode`.
+void SetMatrix(const GuardedOde& ode, double gamma, SUNMatrix matrix) {
+  Matrix A = View(matrix);
+  const auto controlled = static_cast<Eigen::Index>(ode.Controlled());
+  A.setIdentity();
+  A.leftCols(controlled) -=
+      gamma * Eigen::Map<const Eigen::MatrixXd>(ode.jacobian().data(), A.rows(), controlled);
+}
+
+// ARKODE's callback for the matrix; jok allows the Jacobian of an earlier stage.
 int LinearSystem(sunrealtype t, N_Vector y, N_Vector f, SUNMatrix matrix, SUNMatrix,
                  sunbooleantype jok, sunbooleantype* is_current, sunrealtype gamma, void* data,
                  N_Vector, N_Vector, N_Vector) {
@@ -172,11 +195,7 @@ int LinearSystem(sunrealtype t, N_Vector y, N_Vector f, SUNMatrix matrix, SUNMat
   if (!jok && !ode.EvaluateJacobian(t, Span(y), Span(f))) {
     return -1;
   }
-  Matrix A = View(matrix);
-  const auto controlled = static_cast<Eigen::Index>(ode.Controlled());
-  A.setIdentity();
-  A.leftCols(controlled) -=
-      gamma * Eigen::Map<const Eigen::MatrixXd>(ode.jacobian().data(), A.rows(), controlled);
+  SetMatrix(ode, gamma, matrix);
   return 0;
 }
 
@@ -184,11 +203,12 @@ SUNLinearSolver_Type IsDirect(SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; 
 
 }  // namespace
 
-Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_step,
-               SUNContext context)
-    : controlled_(controlled),
-      factors_(controlled),
-      solution_(controlled),
+Newton::Newton(void* memory, N_Vector y, GuardedOde& ode, SUNContext context)
+    : memory_(memory),
+      ode_(ode),
+      controlled_(static_cast<Eigen::Index>(ode.Controlled())),
+      factors_(controlled_),
+      solution_(controlled_),
       matrix_(SUNDenseMatrix(NV_LENGTH_S(y), NV_LENGTH_S(y), context)),
       solver_(SUNLinSolNewEmpty(context)) {
   solver_->content = this;
@@ -206,10 +226,12 @@ Newton::Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_ste
   // run ends; a Jacobian per step costs less than the iterations and the rejected steps it saves.
   LOOPBENCH_SET_IMPLICIT(SetLSetupFrequency, memory, 1);
   LOOPBENCH_SET_IMPLICIT(SetJacEvalFrequency, memory, 1);
-  // Newton residual in units of the tolerance: at ARKODE's 0.1 it dominates the global error.
-  LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, 0.01);
-  // A step that may shrink is cheaper shortened than iterated on.
-  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, fixed_step ? Stepper::kMaxIterations : 8);
+  LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, ode.options().newton_coefficient);
+  LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, Stepper::MaxIterations(ode.options()));
+  if (ode.options().fixed_step > 0) {
+    // a correction that grows ends the iteration elsewhere; here it renews the Jacobian
+    LOOPBENCH_SET_IMPLICIT(SetNonlinRDiv, memory, 1e9);
+  }
   // A stage starts from the line through the last two states: fewer and less distant iterations
   // than from the last state alone.
   LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);
@@ -222,8 +244,27 @@ int Newton::Factor(SUNLinearSolver solver, SUNMatrix matrix) {
   return (self.factors_.matrixLU().diagonal().array() == 0).any() ? 1 : 0;
 }
 
+int Newton::Renew(SUNMatrix matrix) {
+  if (ode_.options().fixed_step == 0) return 0;
+  if (const std::int64_t before = NewtonIterations(memory_); before != iterations_) {
+    iterations_ = before;
+    corrections_ = {};
+  }
+  if (corrections_[0] == 0 || corrections_[1] <= 0.5 * corrections_[0]) return 0;
+  sunrealtype t = 0, gamma = 0;
+  N_Vector y = nullptr;  // the iterate of the residual
+  LOOPBENCH_ARK_IMPLICIT(GetCurrentTime, memory_, &t);
+  LOOPBENCH_ARK_IMPLICIT(GetCurrentGamma, memory_, &gamma);
+  LOOPBENCH_ARK_IMPLICIT(GetCurrentState, memory_, &y);
+  std::vector<double> f(Span(y).size());
+  if (!ode_.Evaluate(t, Span(y), f) || !ode_.EvaluateJacobian(t, Span(y), f)) return -1;
+  SetMatrix(ode_, gamma, matrix);
+  return Factor(solver_.get(), matrix);
+}
+
 int Newton::Solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, sunrealtype) {
   Newton& self = *static_cast<Newton*>(solver->content);
+  if (const int code = self.Renew(matrix); code != 0) return code;
   const Eigen::Index n = self.controlled_, quadratures = NV_LENGTH_S(b) - n;
   const Eigen::Map<const Eigen::VectorXd> rhs(NV_DATA_S(b), NV_LENGTH_S(b));
   Eigen::Map<Eigen::VectorXd> to(NV_DATA_S(x), NV_LENGTH_S(x));
@@ -232,6 +273,7 @@ int Newton::Solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector
   solution.noalias() = self.factors_.permutationP() * rhs.head(n);
   self.factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(solution);
   self.factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(solution);
+  self.corrections_ = {self.corrections_[1], solution.norm()};
   to.head(n) = solution;
   to.tail(quadratures) = rhs.tail(quadratures);
   to.tail(quadratures).noalias() -= View(matrix).bottomLeftCorner(quadratures, n) * solution;

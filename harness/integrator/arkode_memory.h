@@ -9,6 +9,7 @@
 #include <sundials/sundials_version.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -39,6 +40,8 @@
   ::loopbench::harness::Require(LOOPBENCH_ARK_IMPLICIT(call, __VA_ARGS__), #call)
 
 namespace loopbench::harness {
+
+class GuardedOde;
 
 // ARKODE's vectors: SUNDIALS' serial ones with some operations of our own.
 
@@ -89,6 +92,9 @@ using ControllerPtr = Nothing;  // ARKODE 6 keeps the controller inside its memo
 Context MakeContext(std::string* message);
 void CaptureMessages(void* memory, bool implicit, std::string* message);
 
+/// Sets the Runge-Kutta method of `memory`, of ERKStep for an explicit table, else of ARKStep.
+void SetTable(void* memory, const ButcherTable& table);
+
 /// Makes `memory` choose steps by `c`; the returned object must live as long as `memory`.
 ControllerPtr SetControl(void* memory, bool implicit, SUNContext context, const Controller& c);
 
@@ -97,12 +103,15 @@ ControllerPtr SetControl(void* memory, bool implicit, SUNContext context, const 
 /// The dense matrix I - gamma J of a stage and its factors. Quadratures come last in y, and f does
 /// not depend on them, so the matrix is block triangular. Only the leading block is factored; its
 /// solution does not depend on the quadratures in any bit.
+///
+/// The matrix is that of the first implicit stage of a step. A step that may shrink is shortened
+/// where this is not enough. At a fixed step the Jacobian is renewed at the iterate whenever a
+/// correction is more than half of the one before.
 class Newton {
  public:
-  /// Makes ARKStep's `memory` solve its stages with Jacobians of the GuardedOde that is its user
-  /// data. The first `controlled` components of y are not quadratures. Steps of fixed length cannot
-  /// shrink, and may take Stepper::kMaxIterations. Must outlive `memory`.
-  Newton(void* memory, N_Vector y, Eigen::Index controlled, bool fixed_step, SUNContext context);
+  /// Makes ARKStep's `memory` solve its stages with Jacobians of `ode`, its user data. Must outlive
+  /// `memory`.
+  Newton(void* memory, N_Vector y, GuardedOde& ode, SUNContext context);
   Newton(const Newton&) = delete;
   Newton& operator=(const Newton&) = delete;
 
@@ -118,6 +127,14 @@ class Newton {
   static int Factor(SUNLinearSolver solver, SUNMatrix matrix);
   static int Solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, sunrealtype);
 
+  /// At a fixed step: renews the factors if the last two corrections of this stage demand it.
+  /// Returns ARKODE's code.
+  int Renew(SUNMatrix matrix);
+
+  void* memory_;
+  GuardedOde& ode_;
+  std::int64_t iterations_ = -1;         ///< before this stage
+  std::array<double, 2> corrections_{};  ///< norms of the last two of this stage; 0: none
   Eigen::Index controlled_;
   Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
   Eigen::VectorXd solution_;

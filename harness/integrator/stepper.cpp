@@ -58,10 +58,9 @@ bool GuardedOde::OutOfTime() {
 }
 
 void GuardedOde::Weights(std::span<const double> y, std::span<double> weight, bool is_ode45) const {
-  const double rtol = options_.rtol, atol = options_.atol;
   const size_t controlled = Controlled();
   for (size_t i = 0; i < controlled; ++i) {
-    const double relative = rtol * std::abs(y[i]);
+    const double relative = options_.rtol * std::abs(y[i]), atol = Atol(i);
     weight[i] = 1 / (is_ode45 ? std::max(relative, atol) : relative + atol);
   }
   std::fill(weight.begin() + static_cast<std::ptrdiff_t>(controlled), weight.end(), 0.0);
@@ -73,10 +72,9 @@ double GuardedOde::FirstStepOfOde45(double t0, double t_end, std::span<const dou
   if (!Evaluate(t0, y0, f)) {
     return 0;
   }
-  const double threshold = options_.atol / options_.rtol;
   double rate = 0;
   for (size_t i = 0; i < Controlled(); ++i) {
-    rate = std::max(rate, std::abs(f[i]) / std::max(std::abs(y0[i]), threshold));
+    rate = std::max(rate, std::abs(f[i]) / std::max(std::abs(y0[i]), Atol(i) / options_.rtol));
   }
   rate /= 0.8 * std::pow(options_.rtol, 0.2);
   const double h = std::min(longest, t_end - t0);
@@ -115,10 +113,9 @@ bool GuardedOde::EvaluateJacobian(double t, std::span<const double> y,
 // 1997, numjac).
 bool GuardedOde::Differences(double t, std::span<const double> y, std::span<const double> f) {
   const double root = std::sqrt(std::numeric_limits<double>::epsilon());
-  const double small = options_.atol / options_.rtol;
   std::copy(y.begin(), y.end(), shifted_.begin());
   for (size_t j = 0; j < Controlled(); ++j) {
-    const double increment = root * std::max(std::abs(y[j]), small);
+    const double increment = root * std::max(std::abs(y[j]), Atol(j) / options_.rtol);
     shifted_[j] = y[j] + std::copysign(increment, f[j]);
     const std::int64_t before = calls_;
     const bool is_good = Evaluate(t, shifted_, shifted_f_);
@@ -153,8 +150,9 @@ bool Fails(const GuardedOde& ode, const Stepper& stepper, int code, IntegratorRe
     result.outcome = OutcomeOfReturnCode(code);
     result.message = result.outcome == Outcome::kFinished ? "" : stepper.message();
     if (result.outcome == Outcome::kNewtonFailure && ode.options().fixed_step > 0) {
-      result.message += " The step is fixed: " + std::to_string(Stepper::kMaxIterations) +
-                        " iterations are its limit, and a shorter step needs fewer.";
+      result.message +=
+          " The step is fixed: " + std::to_string(Stepper::MaxIterations(ode.options())) +
+          " iterations are its limit, and a shorter step needs fewer.";
     }
   }
   return result.outcome != Outcome::kFinished;
@@ -274,6 +272,11 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
   if (fault.empty() && !(ode.num_quadratures() >= 0 && ode.num_quadratures() < ode.size())) {
     fault = std::to_string(ode.num_quadratures()) + " of " + std::to_string(ode.size()) +
             " components are quadratures; at least one must not be";
+  }
+  const std::ptrdiff_t controlled = ode.size() - ode.num_quadratures();
+  if (fault.empty() && !options.atols.empty() && std::ssize(options.atols) != controlled) {
+    fault = std::to_string(options.atols.size()) + " absolute tolerances for " +
+            std::to_string(controlled) + " components";
   }
   if (fault.empty() && !(t_end >= t0)) {
     fault = "t_end is " + std::to_string(t_end) + "; it must not lie before t0";

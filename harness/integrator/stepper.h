@@ -72,6 +72,8 @@ class GuardedOde {
   const IntegratorOptions& options() const { return options_; }
 
  private:
+  /// Absolute tolerance of a component.
+  double Atol(size_t i) const { return options_.atols.empty() ? options_.atol : options_.atols[i]; }
   bool Differences(double t, std::span<const double> y, std::span<const double> f);
 
   const IntegratorOptions& options_;
@@ -90,7 +92,12 @@ class GuardedOde {
 /// this header; Integrate() (arkode.h) is the loop over Step() with limits and observers.
 class Stepper {
  public:
-  static constexpr int kMaxIterations = 50;  ///< of Newton in a stage of a step of fixed length
+  /// Returns the limit of Newton's iterations in a stage. A step that may shrink is cheaper
+  /// shortened than iterated on; a fixed one cannot.
+  static int MaxIterations(const IntegratorOptions& options) {
+    if (options.max_newton_iterations > 0) return options.max_newton_iterations;
+    return options.fixed_step > 0 ? 50 : 8;
+  }
 
   /// Takes the profile, step limits and stop times from `ode.options()`, which must be valid. May
   /// evaluate the derivative at (t0, y0) to choose the first step; requires t0 < t_end.

@@ -340,8 +340,7 @@ std::string FrontColour(const Record& row, const TableColumn& column) {
 
 /// Returns true for keys that identify a method, not shared by all rows of a problem.
 bool NamesMethod(const std::string& key) {
-  static const std::set<std::string> others = {"kind", "experiment", "mechanism", "horizon",
-                                               "atol"};
+  static const std::set<std::string> others = {"kind", "experiment", "mechanism", "horizon"};
   return !others.contains(key);
 }
 
@@ -363,7 +362,7 @@ bool IsAlike(const std::vector<Record>& records, const std::string& key) {
 std::vector<TableColumn> MethodColumns(const std::vector<Record>& records, bool compact) {
   std::vector<TableColumn> columns;
   for (const std::string& key : CaseKeysOf(records)) {
-    if (!NamesMethod(key)) continue;
+    if (!NamesMethod(key) || (key == "atol" && AtolFollowsRtol(records))) continue;
     if (compact && key != "formulation" && IsAlike(records, key)) continue;
     const TableColumn column = ColumnOf(key, records);
     columns.push_back(compact ? CompactCaseColumn(key).value_or(column) : column);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "harness/config/experiment.h"
+#include "harness/config/options.h"
 #include "harness/record/provenance.h"
 #include "harness/record/record.h"
 #include "harness/text/hash.h"
@@ -76,6 +77,10 @@ Record CommonContent(const Experiment& experiment) {
 Record ProblemContent(const Experiment& experiment, const Case& entry) {
   Record content = CommonContent(experiment);
   content.Set("document", experiment.problems[entry.problem].mechanism.canonical);
+  const Profile* profile = FindProfile(entry.integrator);
+  if (profile != nullptr && profile->is_own) {
+    content.Set("butcher_table", ToString(profile->table));
+  }
   return content;
 }
 

@@ -122,6 +122,10 @@ bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Out
 void WriteRefinement(const Experiment& experiment, Case entry, Record& record) {
   entry.rtol /= 10.0;
   entry.atol /= 10.0;
+  if (entry.atols) {
+    AbsoluteTolerances& own = *entry.atols;
+    for (double* one : {&own.length, &own.angle, &own.speed, &own.angular_speed}) *one /= 10.0;
+  }
   const Run finer =
       RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description, nullptr);
   record.Set("refinement_difference", HasFinished(finer.record)
@@ -138,6 +142,12 @@ IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_t
   const bool is_fixed = entry.step > 0.0;
   options.rtol = is_fixed ? kToleranceOfFixedSteps : entry.rtol;
   options.atol = is_fixed ? kToleranceOfFixedSteps : entry.atol;
+  if (!is_fixed) {
+    options.max_step = entry.integration.max_step;
+    options.initial_step = entry.integration.initial_step;
+  }
+  options.max_newton_iterations = entry.integration.max_newton_iterations;
+  options.newton_coefficient = entry.integration.newton_coefficient;
   options.step_limit = entry.limits.steps;
   options.time_limit_s = entry.limits.cpu_s;
   options.stop_times = stop_times;
@@ -361,9 +371,13 @@ class Runner {
     y_.assign(static_cast<std::size_t>(formulation->size()), 0.0);
     formulation->ToState(start.q, start.u, y_);
     std::vector<double> ydot(n);
+    IntegratorOptions options = OptionsOf(case_, stops_);
+    options.atols = AtolsOf(case_, description_, *formulation);
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
       const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);
       const bool restart = formulation->BeginStep(t, y);
+      // components may have another meaning
+      if (restart) options.atols = AtolsOf(case_, description_, *formulation);
       // a failing derivative fails again in the integrator's next call, which gives the outcome;
       // this keeps only the diagnostics of the failing matrix
       const Outcome outcome =
@@ -385,7 +399,6 @@ class Runner {
     const double compiled_before =
         formulation->compiled() != nullptr ? formulation->compiled()->seconds() : 0.0;
     const DenseObserver dense = Dense(*formulation);
-    const IntegratorOptions options = OptionsOf(case_, stops_);
     IntegratorResult run =
         peer ? peer->Integrate(case_.horizon, y_, options, observe)
              : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe,

@@ -90,6 +90,33 @@ void GiveExecution(const Method& method, const MechanismDescription& description
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.
 IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times);
 
+/// Returns the absolute tolerance of each component of a system's present state. Empty if all have
+/// the case's atol.
+template <class Space>
+std::vector<double> AtolsOf(const Case& entry, const MechanismDescription& description,
+                            const System<Space, double>& system) {
+  if (!entry.atols) return {};
+  const Mechanism<Space, double>& mechanism = system.mechanism();
+  std::vector<double> q(mechanism.num_q()), u(mechanism.num_u());
+  const auto set = [&](const Joint<Space, double>& joint, bool speeds, double* next, double length,
+                       double angle) {
+    const JointType type =
+        joint.description < 0 ? JointType::kFree : description.joints[joint.description].type;
+    const std::vector<ValueWord> words = ValueWords(type, description.space, speeds);
+    for (std::size_t i = 0; i < words.size(); ++i) {
+      const bool is_prescribed = mechanism.DriveOf(joint, static_cast<int>(i)) >= 0;
+      if (!is_prescribed) *next++ = words[i].is_length() ? length : angle;
+    }
+  };
+  for (const Joint<Space, double>& joint : mechanism.joints()) {
+    if (!joint.in_tree()) continue;
+    set(joint, false, q.data() + joint.q_offset, entry.atols->length, entry.atols->angle);
+    set(joint, true, u.data() + joint.u_offset, entry.atols->speed, entry.atols->angular_speed);
+  }
+  for (int i = 0; i < system.num_state_speeds(); ++i) q.push_back(u[system.state_speed(i)]);
+  return q;
+}
+
 /// Runs the case and, if requested, its ensemble of perturbed starts. The record holds the keys,
 /// the outcome and all measured values of the unperturbed run. Growth is analysed over the ensemble
 /// (or over the single run, which resolves nothing). Limits hold for each run.

@@ -161,7 +161,8 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     Case pilot = one;
     pilot.problem = problem;
     pilot.ensemble = 1;
-    if (rtol > 0.0) pilot.rtol = pilot.atol = rtol;
+    if (rtol > 0.0 && pilot.atol == pilot.rtol) pilot.atol = rtol;
+    if (rtol > 0.0) pilot.rtol = rtol;
     if (pilot.step > 0.0) pilot.step = std::ranges::max(like.fixed_steps);
     pilot.horizon = fraction * Longest(like, problem);
     pilot.limits.cpu_s = std::min(budget_.most_s, one.limits.cpu_s);

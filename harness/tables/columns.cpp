@@ -247,6 +247,11 @@ std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
   return keys;
 }
 
+bool AtolFollowsRtol(std::span<const Record> rows) {
+  return std::ranges::all_of(
+      rows, [](const Record& row) { return row.Text("atol") == row.Text("rtol"); });
+}
+
 void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
   const std::vector<std::string> keys = KeysOf(rows);
   // a column of the tables may be empty in every record

@@ -45,6 +45,9 @@ std::string UnitOf(const TableColumn& column);
 /// Returns the keys that identify cases: those before "case_id" or "outcome", each once.
 std::vector<std::string> CaseKeysOf(std::span<const Record> rows);
 
+/// Returns true if no row has an absolute tolerance of its own.
+bool AtolFollowsRtol(std::span<const Record> rows);
+
 /// Returns all keys of the records, each once, in order of first appearance.
 std::vector<std::string> KeysOf(std::span<const Record> rows);
 

@@ -156,7 +156,7 @@ std::string NoteOfProblem(const std::vector<Record>& runs, std::span<const Recor
 std::vector<std::string> DistinguishingKeys(std::span<const Record> rows) {
   std::vector<std::string> keys;
   for (const std::string& key : CaseKeysOf(rows)) {
-    if (key == "atol") continue;
+    if (key == "atol" && AtolFollowsRtol(rows)) continue;
     const bool differs = std::ranges::any_of(
         rows, [&](const Record& row) { return row.Text(key) != rows.front().Text(key); });
     if (differs) keys.push_back(key);

@@ -167,7 +167,7 @@ class SubjectIn final : public Subject {
   }
 
   IntegratorResult Simulate(const std::function<void(std::span<double>)>& keep) {
-    const IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());
+    IntegratorOptions options = OptionsOf(case_, mechanism_.stop_times());
     if (peer_) {
       StepObserver observe;
       if (keep)
@@ -175,9 +175,12 @@ class SubjectIn final : public Subject {
       return peer_->Integrate(case_.horizon, y_, options, observe);
     }
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation_);
+    options.atols = AtolsOf(case_, description_, *formulation_);
     const auto observe = [&](double t, std::span<double> y) {
       if (keep) keep(y);
-      return formulation_->BeginStep(t, y) ? StepAction::kRestart : StepAction::kContinue;
+      if (!formulation_->BeginStep(t, y)) return StepAction::kContinue;
+      options.atols = AtolsOf(case_, description_, *formulation_);
+      return StepAction::kRestart;
     };
     return Integrate(*formulation_, 0.0, case_.horizon, y_, options, observe);
   }

@@ -83,7 +83,7 @@ inline int OrderOf(const std::string& profile) {
 }
 
 /// How far an observed order may lie from the claimed one; reasons at the tests.
-constexpr double kOrderTolerance = 0.6;
+constexpr double kMaxOrderError = 0.6;
 
 /// Profile names without hyphens, as GoogleTest wants them.
 inline std::string NameOfProfileTest(const testing::TestParamInfo<std::string>& info) {

@@ -222,9 +222,10 @@ TEST_F(WorkPrecisionProgram, PrintsAndWritesWhatAccuracyCosts) {
   ExpectEnding(Call("work-precision out --figures"), 0,
                {"closed_form_error_max against wall_s_median", "problem = pendulum, horizon 0.5",
                 "no record has error_position_max", "equal in all compared rows",
-                "work-precision-overview.csv", "wrote 3 figures to out/figures"});
+                "work-precision-overview.csv", "wrote 5 figures to out/figures"});
   for (const char* file : {"work-precision.csv", "work-precision.md", "work-precision-overview.csv",
                            "figures/work-precision-pendulum-horizon-0.5.svg",
+                           "figures/integrators-pendulum-horizon-0.5-lagrange.svg",
                            "figures/tolerance-pendulum-horizon-0.5-verner.svg"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / file)) << file;
   }

@@ -136,6 +136,33 @@ INSTANTIATE_TEST_SUITE_P(Methods, Orders, testing::ValuesIn(AllMethods()), [](co
   return NameOf(test.param).substr(0, NameOf(test.param).find('('));
 });
 
+/// Every Butcher table of ARKODE at two levels: with the steps of a profile of the same order.
+class OrdersOfTables : public testing::TestWithParam<Enforcement> {};
+
+TEST_P(OrdersOfTables, AreThoseOfTheirNames) {
+  const Method method{.formulation = "lagrange", .enforcement = GetParam()};
+  const std::map<int, int> steps = {{2, 48}, {3, 24}, {4, 16}, {5, 12}, {6, 10}, {8, 6}};
+  for (const Motion& motion : kMotions) {
+    const MechanismDescription description = Shipped(motion.mechanism).description;
+    for (const ButcherTable& table : ArkodeTables()) {
+      if (!steps.contains(table.order)) continue;
+      const int coarse = steps.at(table.order) * motion.factor;
+      const auto error = [&](int count) {
+        return ErrorOf(StatesOf(description, method, table.name, motion.horizon, count),
+                       Exact(motion));
+      };
+      const double first = error(coarse), second = error(2 * coarse);
+      EXPECT_GT(second, 1e-13) << motion.mechanism << " " << table.name;
+      EXPECT_NEAR(std::log2(first / second), table.order, 0.5)
+          << motion.mechanism << " " << table.name << " " << first << " " << second;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Levels, OrdersOfTables,
+                         testing::Values(Enforcement::kAcceleration, Enforcement::kVelocity),
+                         [](const auto& test) { return std::string(ToString(test.param)); });
+
 TEST(OrdersOfProfiles, LackNone) {
   std::vector<std::string> names;
   for (const Profiled& one : Profiles()) names.push_back(one.name);

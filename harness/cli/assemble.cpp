@@ -6,8 +6,8 @@
 #include "harness/cli/commands.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/isolation/processes.h"
-#include "harness/text/files.h"
 #include "harness/text/escape.h"
+#include "harness/text/files.h"
 #include "harness/text/terminal.h"
 #include "mechanism/start/branches.h"
 
@@ -69,7 +69,8 @@ int AssembleFile(const AssembleCommand& command, const ExplainView& view) {
       "  difference of a body's pose from it [rad, or mean links].\n",
       branches.closed, branches.starts);
   if (branches.movable > 0) {
-    Print("  {} of them led to positions that still move, which are not listed.\n", branches.movable);
+    Print("  {} of them led to positions that still move, which are not listed.\n",
+          branches.movable);
   }
   for (std::size_t k = 0; k < branches.found.size() && !command.out.empty(); ++k) {
     MechanismDescription description = branches.found[k].description;

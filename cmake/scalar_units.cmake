@@ -5,7 +5,7 @@ function(loopbench_add_scalar_units result name prologue)
   set(sources ${${result}})
   foreach(group ${ARGN}
     "drives force_elements forces joint joint_planar kinematics mechanism time_function"
-    "constraint_solver factored_state level* passage system*"
+    "constraint_solver coupled_solver factored_state level* passage system*"
     "joint_directions joint_measures self_stress"
     "body_equations tree_dynamics"
     "joins odca sweep"

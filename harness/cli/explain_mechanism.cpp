@@ -51,8 +51,9 @@ void PrintFreedom(const Structure& s, const ExplainView& view) {
   Say(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
       s.counted_freedom, s.bodies, each, s.rows);
   if (!s.analysed) return;
-  Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops\n",
-      s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows);
+  Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
+      s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows,
+      s.couplings > 0 ? " and couplings" : "");
   if (s.locked() && s.freedom_at_start() > 0) {
     Say(view,
         "  0 finite motions: the start is singular, and its first-order motions\n"

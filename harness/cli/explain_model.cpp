@@ -220,6 +220,21 @@ Table ForceTable(const MechanismDescription& description) {
   return table;
 }
 
+Table CouplingTable(const MechanismDescription& description) {
+  Table table;
+  table.columns = {{"name", "coupling", Format::kText, {}},
+                   {"relation", "relation", Format::kText, {}}};
+  for (const CouplingDescription& coupling : description.couplings) {
+    std::string text;
+    for (const auto& [joint, ratio] : coupling.parts) {
+      text += fmt::format("{}{} {}", text.empty() ? "" : " + ", ShortNumber(ratio),
+                          description.joints[joint].name);
+    }
+    AddRow({coupling.name, fmt::format("{} = {}", text, ShortNumber(coupling.offset))}, &table);
+  }
+  return table;
+}
+
 }  // namespace
 
 void PrintModel(const MechanismDescription& description, const Structure& structure,
@@ -237,6 +252,9 @@ void PrintModel(const MechanismDescription& description, const Structure& struct
   Say(view,
       "  Origin, axis and rotation vector are in body axes. Coordinates describe M relative to "
       "F.\n");
+  if (!description.couplings.empty()) {
+    PrintSection("Couplings of joint coordinates", CouplingTable(description), view, "couplings");
+  }
   PrintSection("Forces", ForceTable(description), view, "forces");
 }
 

@@ -408,4 +408,83 @@ FieldValue<Draft> JointsValue() {
   return By(ArraySchema(JointFields().Schema()), ReadJoints, WriteJoints);
 }
 
+// "couplings" of a mechanism file.
+
+namespace {
+
+using Coupling = PartOf<CouplingDescription>;
+
+/// Reads {"joint": coefficient, ...}; the reader of files rejects a joint that appears twice.
+void ReadCoefficients(const JsonNode& node, Coupling& coupling) {
+  const Draft& draft = *coupling.draft;
+  if (!node.ExpectObject(draft.joint_names)) return;
+  bool all_driven = true;
+  for (const auto& [name, value] : node.Members()) {
+    const double ratio = value.Number();
+    if (ratio == 0.0 && value.value().is_number()) value.Fail("a number that is not 0");
+    const auto joint = draft.joint_names.Find(name);
+    if (!joint) continue;
+    const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
+    if (NumValues(described.type, draft.space, false) != 1) {
+      value.FailAs(fmt::format("\"{}\" ({})", name, ToString(described.type)),
+                   "a joint with one coordinate (revolute, prismatic or helical)");
+    }
+    all_driven = all_driven && !described.motions.empty();
+    coupling.parts.push_back({*joint, ratio});
+  }
+  if (node.Members().size() < 2) {
+    node.FailAs(node.Members().empty() ? "no joint" : "one joint", "two or more joints");
+  } else if (all_driven) {
+    node.FailAs("joints with prescribed motions only", "a joint without one");
+  }
+}
+
+Json WriteCoefficients(const Coupling& coupling) {
+  Json written = Json::object();
+  for (const auto& [joint, ratio] : coupling.parts) {
+    written[coupling.draft->joints[static_cast<std::size_t>(joint)].name] = ratio;
+  }
+  return written;
+}
+
+const Fields<Coupling>& CouplingFields() {
+  Json ratio = NumberSchema();
+  ratio["not"] = {{"const", 0}};
+  Json coefficients = MapSchema(ratio);
+  coefficients["minProperties"] = 2;
+  static const Fields<Coupling> fields(
+      "coupling", "Linear relation of joint coordinates: sum of coefficient times q = offset.",
+      {{"name", NewName(&CouplingDescription::name, &Draft::coupling_names),
+        "Unique name of the coupling.", "a name"},
+       {"coefficients", By(coefficients, ReadCoefficients, WriteCoefficients),
+        "Coefficients by joint: revolute, prismatic or helical joints, two or more.",
+        "an object with a coefficient per joint"},
+       {"offset", Number(&CouplingDescription::offset),
+        "Value of the sum [unit of coefficient times coordinate]."}});
+  return fields;
+}
+
+void ReadCouplings(const JsonNode& node, Draft& draft) {
+  draft.coupling_names = draft.joint_names;  // records name both alike
+  for (const CouplingDescription& known : draft.couplings) draft.coupling_names.Add(known.name);
+  for (const JsonNode& element : node.Elements("couplings")) {
+    draft.couplings.push_back(ReadPart(CouplingFields(), element, draft));
+    draft.coupling_names.Add(draft.couplings.back().name);
+  }
+}
+
+Json WriteCouplings(const Draft& draft) {
+  Json couplings = Json::array();
+  for (const CouplingDescription& coupling : draft.couplings) {
+    couplings.push_back(WritePart(CouplingFields(), draft, coupling));
+  }
+  return couplings.empty() ? Json() : couplings;
+}
+
+}  // namespace
+
+FieldValue<Draft> CouplingsValue() {
+  return By(ArraySchema(CouplingFields().Schema()), ReadCouplings, WriteCouplings);
+}
+
 }  // namespace loopbench::harness

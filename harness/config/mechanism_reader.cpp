@@ -94,6 +94,8 @@ const Fields<Draft>& MechanismFileFields() {
            {"ground", GroundValue()},
            {"bodies", BodiesValue(), "Moving bodies.", "an array of bodies", HasNoBodies},
            {"joints", JointsValue(), "Joints between the bodies.", "an array of joints"},
+           {"couplings", CouplingsValue(),
+            "Linear relations of joint coordinates: gears, racks, differentials."},
            {"forces", ForcesValue(), "Forces other than gravity."},
            {"initial", Section(InitialFields())},
            {"independent", IndependentValue(),

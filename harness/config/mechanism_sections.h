@@ -23,6 +23,7 @@ namespace loopbench::harness {
 struct Draft : MechanismDescription {
   NameList body_names;  ///< ground first
   NameList joint_names;
+  NameList coupling_names;
   ObservedQuantities observe;
   std::string comment;
 };
@@ -45,6 +46,7 @@ const Fields<Draft>& MechanismFileFields();
 FieldValue<Draft> GroundValue();
 FieldValue<Draft> BodiesValue();
 FieldValue<Draft> JointsValue();
+FieldValue<Draft> CouplingsValue();
 FieldValue<Draft> ForcesValue();
 FieldValue<Draft> IndependentValue();
 const Fields<Draft>& InitialFields();

@@ -370,7 +370,7 @@ void Describe(const CodeRequest& request, const std::vector<int>& carried_speeds
       code.pose_words.emplace_back(format("R{}{}", i / 3 + 1, i % 3 + 1), "1");
   }
   code.num_q = mechanism.num_q();
-  code.num_rows = mechanism.num_rows();
+  code.num_rows = mechanism.num_equations();
   code.body_names.assign(mechanism.body_names().begin() + 1, mechanism.body_names().end());
   std::vector<Labelled> state = Coordinates<Space>(description, mechanism, false);
   const std::vector<Labelled> speeds = Coordinates<Space>(description, mechanism, true);

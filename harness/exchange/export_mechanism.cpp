@@ -51,6 +51,9 @@ class Maker {
     }
     for (const int index : mechanism.constraints())
       model_.cut.push_back(MakeJoint(mechanism, index));
+    for (const CouplingDescription& coupling : description_.couplings) {
+      Add(coupling);
+    }
     for (const ForceDescription& force : description_.forces) {
       std::visit([this](const auto& one) { Add(one); }, force);
     }
@@ -118,6 +121,17 @@ class Maker {
 
   std::string NameOf(int joint) const { return description_.joints[joint].name; }
 
+  void Add(const CouplingDescription& coupling) {
+    Coupling made{coupling.name, {}};
+    for (const auto& [joint, ratio] : coupling.parts) {
+      if (tree_of_[joint] < 0) {
+        Miss("coupling \"{}\" of joint \"{}\", which closes a loop", coupling.name, NameOf(joint));
+        return;
+      }
+      made.parts.emplace_back(tree_of_[joint], ratio);
+    }
+    model_.couplings.push_back(std::move(made));
+  }
   void Add(const JointForce& force, int joint, const char* kind) {
     const int tree = tree_of_[joint];
     if (tree < 0) {

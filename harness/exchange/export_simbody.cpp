@@ -158,6 +158,9 @@ void AddForces(const Model& model, std::vector<SimbodyForce>* forces) {
 
 SimbodyParts MakeSimbodyParts(const Model& model) {
   std::vector<std::string> missing = model.missing;
+  for (const Coupling& coupling : model.couplings) {
+    missing.push_back(fmt::format("coupling \"{}\"", coupling.name));
+  }
   SimbodyParts parts;
   for (std::size_t i = 0; i < model.tree.size(); ++i) {
     const SimbodyMobilizer& made = parts.mobilizers.emplace_back(MakeMobilizer(model, i));

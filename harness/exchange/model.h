@@ -58,6 +58,12 @@ struct JointForce {
   double constant = 0.0, stiffness = 0.0, rest = 0.0, damping = 0.0;
 };
 
+/// The sum of ratio times coordinate over joints of one coordinate is constant.
+struct Coupling {
+  std::string name;
+  std::vector<std::pair<int, double>> parts;  ///< indices into Model::tree, ratios
+};
+
 /// A material point of a body, from its centre of mass, in body axes [m].
 struct Point {
   int body = 0;
@@ -81,9 +87,10 @@ struct Model {
   std::string name;
   bool planar = false;
   Vec gravity = {};
-  std::vector<Body> bodies;  ///< [0] is Ground
-  std::vector<Joint> tree;   ///< parents before children, one per body but Ground
-  std::vector<Joint> cut;    ///< joints that close loops
+  std::vector<Body> bodies;         ///< [0] is Ground
+  std::vector<Joint> tree;          ///< parents before children, one per body but Ground
+  std::vector<Joint> cut;           ///< joints that close loops
+  std::vector<Coupling> couplings;  ///< they hold at the assembled start
   std::vector<JointForce> joint_forces;
   std::vector<PointForce> point_forces;
   std::vector<SpringDamper> spring_dampers;

@@ -117,7 +117,7 @@ class Recorder {
         break;
       case Quantity::kViolation: {
         Correction<Recorded> largest;
-        VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_rows());
+        VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_equations());
         PositionViolation(kinematics, violation, largest);
         values.assign(violation.begin(), violation.end());
         SpeedViolation(kinematics, violation);
@@ -137,10 +137,11 @@ class Recorder {
   void Correct() {
     state_.emplace(mechanism_, system_->solver());
     state_->kinematics().SetTime(system_->kinematics().time());
+    state_->kinematics().CountTurnsLike(system_->kinematics());
     state_->SetPositions(system_->q());
     state_->SetSpeeds(system_->u());
     Correction<Recorded> largest;
-    VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_rows());
+    VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_equations());
     VectorX<Recorded> change = VectorX<Recorded>::Zero(mechanism_.num_u());
     VectorX<Recorded> q = system_->q(), step = q;
     const VectorX<Recorded> u = system_->u();

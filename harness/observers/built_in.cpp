@@ -78,6 +78,20 @@ struct Largest {
   }
 };
 
+/// A mismatch of a coupling or its rate as a shift of its first joint's coordinate; angles count as
+/// arcs at the length of the mechanism.
+template <class Space>
+double ShiftOf(const Kinematics<Space, double>& kinematics, int coupling, double mismatch,
+               double* rotation) {
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  const int first = mechanism.couplings()[static_cast<std::size_t>(coupling)].parts.front().joint;
+  const double by = std::abs(kinematics.OfFirstJoint(coupling, mismatch));
+  const auto& H = kinematics.joints()[static_cast<std::size_t>(first)].basis[0];
+  if (H.angular.isZero()) return by;
+  Keep(rotation, by);
+  return by * mechanism.length();
+}
+
 }  // namespace
 
 /// Measured quantities besides positions.
@@ -91,13 +105,14 @@ struct DriftObserver<Space>::Rest {
     for (int index : view.mechanism().constraints()) {
       loop_names.emplace_back(index, view.mechanism().joint_names()[index]);
     }
+    coupling_max.assign(mechanism.couplings().size(), 0.0);
   }
 
   TreeDynamics<Space, double> dynamics;
   std::vector<Acceleration<Space, double>> A;
   JointView<Space> view;
   std::vector<std::pair<int, std::string>> loop_names;
-  std::vector<double> loop_max;
+  std::vector<double> loop_max, coupling_max;
   double velocity = 0.0, acceleration = 0.0, closure = 0.0;
 };
 
@@ -117,7 +132,16 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
   const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
   Largest now;
   for (int index : kinematics.mechanism().constraints()) now.Add(kinematics, index);
-  if (now.shift > shift_) worst_loop_ = kinematics.mechanism().joint_names()[now.joint];
+  const std::string* worst =
+      now.joint < 0 ? nullptr : &kinematics.mechanism().joint_names()[now.joint];
+  for (int c = 0; c < std::ssize(kinematics.mechanism().couplings()); ++c) {
+    const double by = ShiftOf(kinematics, c, kinematics.CouplingMismatch(c), &now.rotation);
+    if (rest_ != nullptr) Keep(&rest_->coupling_max[c], by);
+    if (by <= now.shift) continue;
+    now.shift = by;
+    worst = &kinematics.mechanism().couplings()[c].name;
+  }
+  if (now.shift > shift_) worst_loop_ = *worst;
   Keep(&shift_, now.shift);
   Keep(&rotation_, now.rotation);
   series_.t.push_back(sample.t);
@@ -137,6 +161,14 @@ void DriftObserver<Space>::ObserveRest(const Sample<Space>& sample) {
     Keep(&rest.velocity, shift_of(kinematics.joints()[index].V_rel));
     Keep(&rest.acceleration,
          shift_of(RelativeAcceleration<Space, double>(kinematics, index, rest.A)));
+  }
+  for (int c = 0; c < std::ssize(kinematics.mechanism().couplings()); ++c) {
+    double rotation = 0.0;
+    Keep(&rest.velocity, ShiftOf(kinematics, c, kinematics.CouplingSpeed(c), &rotation));
+    const double acceleration =
+        CouplingAcceleration<Space, double>(kinematics, c, &sample.formulation.udot(), rest.A);
+    Keep(&rest.acceleration, ShiftOf(kinematics, c, acceleration, &rotation));
+    Keep(&rest.closure, rest.coupling_max[c]);
   }
   const Kinematics<Space, double>& closure = rest.view.At(kinematics);
   for (const auto& [index, name] : rest.loop_names) {
@@ -159,6 +191,9 @@ void DriftObserver<Space>::Write(Record& record) const {
   record.Set("worst_loop", worst_loop_);
   for (const auto& [index, name] : rest_->loop_names) {
     record.Set("drift.loop." + name, rest_->loop_max[index]);
+  }
+  for (std::size_t c = 0; c < rest_->coupling_max.size(); ++c) {
+    record.Set("drift.loop." + rest_->view.mechanism().couplings()[c].name, rest_->coupling_max[c]);
   }
 }
 
@@ -429,7 +464,7 @@ SingularityObserver<Space>::~SingularityObserver() = default;
 template <class Space>
 void SingularityObserver<Space>::Observe(const Sample<Space>& sample) {
   Work& work = *work_;
-  const int rows = work.view.mechanism().num_rows(), speeds = work.view.mechanism().num_u();
+  const int rows = work.view.mechanism().num_equations(), speeds = work.view.mechanism().num_u();
   if (rows == 0 || rows > kMaxRows || speeds == 0 || speeds > kMaxSpeeds) return;
   const LoopSpectrum now = SpectrumOfLoops(work.view.At(sample.formulation.kinematics()));
   const std::size_t count = static_cast<std::size_t>(now.singular_values.size());

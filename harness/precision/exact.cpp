@@ -68,6 +68,12 @@ Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
         state.Sum(state.Along(kinematics_.ConstraintMismatch(index), all), all);
     largest = std::max(largest, constrained.linear.norm());
   }
+  for (int c = 0; c < std::ssize(mechanism_.couplings()); ++c) {
+    const int first = mechanism_.couplings()[c].parts.front().joint;
+    const Float128 by = abs(kinematics_.OfFirstJoint(c, kinematics_.CouplingMismatch(c)));
+    const bool turns = !kinematics_.joints()[first].basis[0].angular.isZero();
+    largest = std::max(largest, turns ? by * mechanism_.length() : by);
+  }
   return largest;
 }
 

@@ -298,6 +298,14 @@ struct Reactions<Space>::Work {
     return std::sqrt(D.angular.squaredNorm() / (length() * length()) + D.linear.squaredNorm());
   }
   double length() const { return user.mechanism().length(); }
+  double SizeOfForce(const Coupling<double>& coupling) const {
+    double most = 0.0;
+    for (const auto& [j, ratio] : coupling.parts) {
+      const double size = SizeOf(user.DirectionOfSpeed(j, 0));
+      most = std::max(most, std::abs(ratio) * At(j).kind->inverse_H_squared * size);
+    }
+    return most;
+  }
 
   void SolvePart(const std::vector<int>& part, double limit) {
     std::vector<int> place(w.size(), -1);
@@ -322,6 +330,16 @@ struct Reactions<Space>::Work {
         enter(At(j).to, ShiftForce<Space, double>(D, State(j).r_Q), scale);
         enter(At(j).from, ShiftForce<Space, double>(D, State(j).r_P), -scale);
       }
+    }
+    for (const Coupling<double>& coupling : user.mechanism().couplings()) {
+      const double most = SizeOfForce(coupling);
+      for (const auto& [j, ratio] : coupling.parts) {
+        const Direction<Space, double>& H = user.DirectionOfSpeed(j, 0);
+        const double scale = ratio * At(j).kind->inverse_H_squared / most;
+        enter(At(j).to, ShiftForce<Space, double>(H, State(j).r_Q), scale);
+        enter(At(j).from, ShiftForce<Space, double>(H, State(j).r_P), -scale);
+      }
+      ++columns;
     }
     Eigen::VectorXd needed(rows);
     for (std::size_t b = 1; b < place.size(); ++b) {
@@ -400,11 +418,13 @@ void Reactions<Space>::Solve(std::span<const Acceleration<Space, double>> A,
   }
   for (auto& open : work.open) open.clear();
   work.is_done.assign(work.total.size(), false);
-  work.Leaves();
+  const bool is_coupled = !work.user.mechanism().couplings().empty();
+  if (!is_coupled) work.Leaves();
   const double limit = std::max(100 * kEpsilon * static_cast<double>(work.bearing.size()),
                                 kOfMismatch * work.user.RelativeMismatch());
   // geometric mean of round-off (a multiple of the limit) and a share of the load
   work.negligible = std::sqrt(limit);
+  if (is_coupled) return work.SolvePart(work.bearing, limit);
   for (const int j : work.bearing) {
     if (!work.is_done[j]) work.SolvePart(work.PartOf(j), limit);
   }

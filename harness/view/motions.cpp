@@ -32,6 +32,7 @@ class Follower {
   Follower(const Mechanism<Space, double>& mechanism, const VectorX<double>& q)
       : mechanism_(mechanism), kinematics_(mechanism), q_(q), units_(mechanism.num_u()) {
     kinematics_.UpdatePosition(q_);
+    kinematics_.CountTurns();
     units_.setOnes();
     for (const TreeStep& step : mechanism.tree()) {
       const JointState<Space, double>& state = kinematics_.joints()[step.joint];
@@ -64,7 +65,7 @@ class Follower {
   /// Moves along the projection of `u` onto the constraints, which becomes the new direction.
   /// Returns true if the loops close at a different position.
   bool Step(double distance, VectorXd* u) {
-    if (mechanism_.num_rows() == 0) {
+    if (mechanism_.num_equations() == 0) {
       Shift(*u * (distance / Size(*u)));
       return true;
     }
@@ -147,7 +148,7 @@ std::vector<MotionStart> MotionStarts(const Follower<Space>& start, std::size_t 
   const Mechanism<Space, double>& mechanism = start.kinematics().mechanism();
   const Eigen::Index n = mechanism.num_u();
   std::vector<MotionStart> all;
-  if (mechanism.num_rows() == 0) {
+  if (mechanism.num_equations() == 0) {
     for (int i = 0; i < n && all.size() < most; ++i) all.push_back({i, VectorXd::Unit(n, i)});
     return all;
   }
@@ -300,7 +301,7 @@ std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
                                        const Mechanism<Space, double>& mechanism,
                                        const VectorX<double>& q, std::string* left_out) {
   std::vector<PictureMotion> motions;
-  if (mechanism.num_rows() > 0 && mechanism.num_u() > kMaxFollowed) {
+  if (mechanism.num_equations() > 0 && mechanism.num_u() > kMaxFollowed) {
     *left_out = fmt::format("motions: the loops have {} speeds, followed are up to {}",
                             mechanism.num_u(), kMaxFollowed);
     return motions;

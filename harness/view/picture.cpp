@@ -155,7 +155,7 @@ class Maker {
         kinematics_(mechanism_) {}
 
   void Make() {
-    const bool analysed = mechanism_.num_rows() == 0 || mechanism_.num_u() <= kMaxFollowed;
+    const bool analysed = mechanism_.num_equations() == 0 || mechanism_.num_u() <= kMaxFollowed;
     Structure structure;
     if (analysed && mechanism_.num_u() <= kMaxAnalysedSpeeds) {
       structure = AnalyseStructure(description_);
@@ -166,7 +166,7 @@ class Maker {
       picture_->notes.push_back(fmt::format(
           "{} speeds: rank, redundant constraints and what a run leaves out are looked for up to "
           "{} of them; loopbench explain has more patience",
-          mechanism_.num_u(), mechanism_.num_rows() == 0 ? kMaxAnalysedSpeeds : kMaxFollowed));
+          mechanism_.num_u(), mechanism_.num_equations() == 0 ? kMaxAnalysedSpeeds : kMaxFollowed));
     }
     const Start<double>& start = structure.start;
     picture_->assembled = start.outcome != Outcome::kInconsistentStart;

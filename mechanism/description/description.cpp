@@ -97,6 +97,32 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
   return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
 }
 
+std::string CheckCoupling(const MechanismDescription& description,
+                          const CouplingDescription& coupling) {
+  if (coupling.parts.size() < 2) return "a coupling needs two or more joints";
+  if (!std::isfinite(coupling.offset)) return "the offset must be finite";
+  bool has_free_joint = false;
+  for (std::size_t i = 0; i < coupling.parts.size(); ++i) {
+    const auto& [index, ratio] = coupling.parts[i];
+    if (index < 0 || index >= static_cast<int>(description.joints.size())) {
+      return "joint index " + std::to_string(index) + " does not exist";
+    }
+    const JointDescription& joint = description.joints[index];
+    if (NumValues(joint.type, description.space, false) != 1) {
+      return "joint " + Quote(joint.name) + " is " + std::string(ToString(joint.type)) +
+             ", expected a joint with one coordinate";
+    }
+    if (!std::isfinite(ratio) || ratio == 0.0) {
+      return "the coefficient of joint " + Quote(joint.name) + " must be finite and not 0";
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      if (coupling.parts[k].joint == index) return "joint " + Quote(joint.name) + " appears twice";
+    }
+    has_free_joint = has_free_joint || joint.motions.empty();
+  }
+  return has_free_joint ? "" : "all of its joints have prescribed motions";
+}
+
 std::string CheckValues(const MechanismDescription& description,
                         const std::vector<JointValues>& list, bool speeds) {
   for (const JointValues& values : list) {
@@ -134,6 +160,10 @@ std::string Validate(const MechanismDescription& description) {
   }
   for (std::size_t i = 0; i < description.joints.size() && error.empty(); ++i) {
     error = CheckJoint(description, description.joints[i]);
+  }
+  for (std::size_t i = 0; i < description.couplings.size() && error.empty(); ++i) {
+    error = CheckCoupling(description, description.couplings[i]);
+    if (!error.empty()) error = "coupling " + Quote(description.couplings[i].name) + ": " + error;
   }
   for (std::size_t i = 0; i < description.forces.size() && error.empty(); ++i) {
     error = ValidateForce(description, description.forces[i]);

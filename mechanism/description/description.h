@@ -56,6 +56,18 @@ struct JointDescription {
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
 };
 
+/// A linear relation of joint coordinates, sum_i ratio_i q_i = offset: gears, racks, differentials,
+/// joints that follow another one. Two or more joints, each with one coordinate.
+struct CouplingDescription {
+  struct Part {
+    int joint = 0;
+    double ratio = 1.0;  ///< not zero
+  };
+  std::string name;
+  std::vector<Part> parts;  ///< at most one per joint
+  double offset = 0.0;
+};
+
 /// Initial values of one joint's coordinates or speeds (one number; free joints: see joint.h).
 struct JointValues {
   int joint = 0;
@@ -75,6 +87,7 @@ struct MechanismDescription {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();                      ///< [m/s^2], ground axes
   std::vector<BodyDescription> bodies = std::vector<BodyDescription>(1);  ///< [0] is Ground
   std::vector<JointDescription> joints;
+  std::vector<CouplingDescription> couplings;
   std::vector<ForceDescription> forces;
   InitialDescription initial;
   /// Names of independent speeds of a fixed coordinate reduction: joint names for joint coordinates
@@ -92,8 +105,8 @@ struct MechanismDescription {
 MechanismDescription Unreleased(const MechanismDescription& description);
 
 /// Returns the first error of the description as text ("" if it is valid): masses and inertias not
-/// positive, joints of a body with itself, forces or values on joints of another size, a planar
-/// problem with parts out of plane, non-finite numbers.
+/// positive, joints of a body with itself, forces, couplings or values on joints of another size, a
+/// planar problem with parts out of plane, non-finite numbers.
 std::string Validate(const MechanismDescription& description);
 
 }  // namespace loopbench

@@ -36,6 +36,15 @@ std::vector<Island> FindIslands(const MechanismDescription& description, Connect
       sets.Unite(points[0]->body, points[1]->body);
     }
   }
+  for (const CouplingDescription& coupling : description.couplings) {
+    int last = kGround;
+    for (const auto& [joint, ratio] : coupling.parts) {
+      const JointDescription& one = description.joints[joint];
+      const int body = one.to.body != kGround ? one.to.body : one.from.body;
+      if (connection == Connection::kJointsAndForces && last != kGround) sets.Unite(last, body);
+      last = body;
+    }
+  }
   std::vector<Island> islands;
   std::vector<int> island_of_root(description.bodies.size(), -1);
   for (int body = 1; body < num_bodies; ++body) {

@@ -13,7 +13,7 @@ struct Island {
   bool grounded = false;    ///< a joint leads to Ground; otherwise the part floats
 };
 
-/// Connections that put two bodies into one island.
+/// Connections that put two bodies into one island. Couplings of joints count as forces.
 enum class Connection { kJoints, kJointsAndForces };
 
 /// Returns the islands in the order of their first bodies; each body except Ground is in just one.

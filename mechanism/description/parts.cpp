@@ -52,8 +52,8 @@ std::vector<JointValues> KeptValues(const std::vector<JointValues>& old, const R
 MechanismDescription Select(const MechanismDescription& description,
                             const Renumbering& renumbering) {
   // A new member of the description must be thought about here: this line stops compiling.
-  const auto& [name, space, gravity, bodies, joints, forces, initial, independent, accuracy,
-               rounded] = description;
+  const auto& [name, space, gravity, bodies, joints, couplings, forces, initial, independent,
+               accuracy, rounded] = description;
   MechanismDescription part;
   part.name = name;
   part.space = space;
@@ -72,6 +72,14 @@ MechanismDescription Select(const MechanismDescription& description,
     joint.from.body = renumbering.bodies[from.body];
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);
+  }
+  for (CouplingDescription coupling : couplings) {
+    bool is_kept = true;
+    for (auto& [joint, ratio] : coupling.parts) {
+      joint = renumbering.joints[joint];
+      is_kept = is_kept && joint >= 0;
+    }
+    if (is_kept) part.couplings.push_back(std::move(coupling));
   }
   for (ForceDescription force : forces) {
     if (Keep(PartsOf(force), renumbering)) part.forces.push_back(force);

@@ -13,7 +13,8 @@ struct Renumbering {
 };
 
 /// Returns a part of a description: the bodies and joints with index >= 0 in `bodies` and `joints`,
-/// and their forces, initial values and names of independent speeds. `renumbering` has the new
+/// and their couplings, forces, initial values and names of independent speeds. Couplings keep all
+/// of their joints or are left out. `renumbering` has the new
 /// indices, in the old order.
 MechanismDescription Select(const MechanismDescription& description,
                             const Renumbering& renumbering);

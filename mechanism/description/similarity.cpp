@@ -1,5 +1,7 @@
 #include "mechanism/description/similarity.h"
 
+#include <algorithm>
+
 namespace loopbench {
 
 namespace {
@@ -37,6 +39,7 @@ class Scaling {
         if (IsLength(index, motion.coordinate, false)) Scale(motion.value, factor_);
       }
     }
+    for (CouplingDescription& coupling : description_.couplings) Coupling(coupling);
     for (ForceDescription& force : description_.forces) Force(PartsOf(force));
     Values(description_.initial.coordinates, false);
     Values(description_.initial.speeds, true);
@@ -47,6 +50,17 @@ class Scaling {
   bool IsLength(std::size_t joint, int coordinate, bool speeds) const {
     const auto words = ValueWords(description_.joints[joint].type, description_.space, speeds);
     return coordinate < std::ssize(words) && words[coordinate].is_length();
+  }
+  /// If a coordinate is a length, the equation is one of lengths.
+  void Coupling(CouplingDescription& coupling) const {
+    const auto is_length = [&](const CouplingDescription::Part& part) {
+      return IsLength(static_cast<std::size_t>(part.joint), 0, false);
+    };
+    if (std::ranges::none_of(coupling.parts, is_length)) return;
+    coupling.offset *= factor_;
+    for (CouplingDescription::Part& part : coupling.parts) {
+      if (!is_length(part)) part.ratio *= factor_;
+    }
   }
   void Force(const ForceParts& parts) const {
     const bool is_length = parts.joint == nullptr || IsLength(*parts.joint, 0, false);

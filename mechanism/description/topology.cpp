@@ -31,12 +31,15 @@ class DisjointSets {
 };
 
 /// Low numbers prefer the tree. 0: follows a prescribed motion or a thread exactly there, 1: fixed,
-/// 2: guessed, 3: carries a force or a speed, 4: neutral, 5: marked "cut".
+/// 2: guessed, 3: carries a force, a coupling or a speed, 4: neutral, 5: marked "cut".
 std::vector<int> CutPreference(const MechanismDescription& description) {
   std::vector<int> preference(description.joints.size(), 4);
   const auto keep = [&](int joint) { preference[joint] = 3; };
   for (ForceDescription force : description.forces) {
     if (const int* joint = PartsOf(force).joint; joint != nullptr) keep(*joint);
+  }
+  for (const CouplingDescription& coupling : description.couplings) {
+    for (const auto& [joint, ratio] : coupling.parts) keep(joint);
   }
   for (const JointValues& values : description.initial.speeds) keep(values.joint);
   for (const JointValues& values : description.initial.coordinates) preference[values.joint] = 2;

@@ -57,7 +57,10 @@ void FactoredState<Space, S>::ShareSpeeds(VectorX<S>& u) {
 template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
                        Correction<S>& largest) {
+  using std::abs;
   using std::max;
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  violation.resize(mechanism.num_equations());
   largest.shift = largest.rotation = S(0);
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
@@ -69,10 +72,23 @@ void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& viola
     largest.rotation = max(largest.rotation, constrained.angular.norm());
     largest.shift = max(largest.shift, constrained.linear.norm());
   }
+  for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
+    const S mismatch = kinematics.CouplingMismatch(c);
+    violation[mechanism.num_rows() + c] = mismatch;
+    const int first = mechanism.couplings()[c].parts.front().joint;
+    const bool turns = !kinematics.joints()[first].basis[0].angular.isZero();
+    S& same = turns ? largest.rotation : largest.shift;
+    same = max(same, S(abs(kinematics.OfFirstJoint(c, mismatch))));
+  }
 }
 
 template <class Space, class S>
 void SpeedViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  violation.resize(mechanism.num_equations());
+  for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
+    violation[mechanism.num_rows() + c] = kinematics.CouplingSpeed(c);
+  }
   for (int index : kinematics.mechanism().constraints()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     violation.segment(joint.row, joint.num_constraints()) =

@@ -18,7 +18,7 @@ class FactoredState {
   FactoredState(const Mechanism<Space, S>& mechanism, ConstraintSolver<Space, S>& solver)
       : kinematics_(mechanism),
         solver_(solver),
-        target_(VectorX<S>::Zero(mechanism.num_rows())),
+        target_(VectorX<S>::Zero(mechanism.num_equations())),
         change_(VectorX<S>::Zero(mechanism.num_u())),
         stress_(mechanism.is_redundant() ? std::make_unique<SelfStress<Space, S>>(mechanism)
                                          : nullptr),
@@ -64,13 +64,15 @@ class FactoredState {
   std::vector<Released> released_;  ///< by AcceptReleased()
 };
 
-/// Returns D^T times the violations of all constraints by row, and the largest violations in
-/// `largest`, released directions included.
+/// Returns D^T times the violations of all constraints by row, then the mismatch of each coupling
+/// (num_equations), and the largest violations in `largest`, released directions included. A
+/// coupling counts as its first joint's coordinate.
 template <class Space, class S>
 void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation,
                        Correction<S>& largest);
 
-/// J u + b, by row: D^T (V_Q - V_P) of all constraints, less prescribed rates.
+/// J u + b, by row: D^T (V_Q - V_P) of all constraints, less prescribed rates; then the rate of
+/// each coupling (num_equations).
 template <class Space, class S>
 void SpeedViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& violation);
 

@@ -18,10 +18,10 @@ ForwardJacobian<Space>::ForwardJacobian(const MechanismDescription& description,
       u_(VectorX<Dual>::Zero(mechanism_.num_u())),
       qdot_(q_),
       udot_(u_),
-      lambda_(VectorX<Dual>::Zero(mechanism_.num_rows())),
+      lambda_(VectorX<Dual>::Zero(mechanism_.num_equations())),
       force_left_(u_),
       constraint_left_(lambda_),
-      lambda_now_(VectorX<double>::Zero(mechanism_.num_rows())),
+      lambda_now_(VectorX<double>::Zero(mechanism_.num_equations())),
       force_(VectorX<double>::Zero(mechanism_.num_u())),
       target_(lambda_now_),
       x_(force_),
@@ -73,6 +73,9 @@ void ForwardJacobian<Space>::ProjectSpeeds(int count) {
     const int row = mechanism_.joints()[index].row;
     const int rows = mechanism_.joints()[index].num_constraints();
     constraint_left_.segment(row, rows) = kinematics_.ConstraintSpeed(index).head(rows);
+  }
+  for (int c = 0; c < static_cast<int>(mechanism_.couplings().size()); ++c) {
+    constraint_left_[mechanism_.num_rows() + c] = kinematics_.CouplingSpeed(c);
   }
   for (int k = 0; k < count && mechanism_.num_u() > 0; ++k) {
     for (int r = 0; r < target_.size(); ++r) target_[r] = -constraint_left_[r].partial(k);

@@ -42,7 +42,7 @@ class Level {
                             const Eigen::Ref<const VectorX<S>>& carried);
 
   /// Returns Baumgarte feedback added to the constraint accelerations, one value per constraint
-  /// row; empty if none. Valid until the next call.
+  /// row (num_equations, or num_rows without couplings); empty if none. Valid until the next call.
   virtual const VectorX<S>& Feedback(const Kinematics<Space, S>&) { return nothing_; }
 
   /// After an accepted step of length h, SetSpeeds() being done.
@@ -120,7 +120,8 @@ LevelRow LevelRowOf(LevelTraits traits) {
 /// std::invalid_argument for a row that is not sound (registration.h).
 Enforcement RegisterLevel(LevelRow row, int alignment = EIGEN_MAX_STATIC_ALIGN_BYTES);
 
-/// 2 alpha e' + beta^2 e of all constraints, added to `rows`; in any scalar, for derivatives too.
+/// 2 alpha e' + beta^2 e of all constraints, added to `rows` (num_equations); in any scalar, for
+/// derivatives too.
 template <class Space, class S>
 void AddFeedback(const Kinematics<Space, S>& kinematics, const BaumgarteGains& gains,
                  VectorX<S>& rows) {
@@ -132,6 +133,11 @@ void AddFeedback(const Kinematics<Space, S>& kinematics, const BaumgarteGains& g
       const S e = kinematics.joints()[index].D(r).dot(mismatch);
       rows[joint.row + r] += S(2 * gains.alpha) * speed[r] + S(gains.beta * gains.beta) * e;
     }
+  }
+  const int num_rows = kinematics.mechanism().num_rows();
+  for (int c = 0; c < static_cast<int>(kinematics.mechanism().couplings().size()); ++c) {
+    rows[num_rows + c] += S(2 * gains.alpha) * kinematics.CouplingSpeed(c) +
+                          S(gains.beta * gains.beta) * kinematics.CouplingMismatch(c);
   }
 }
 

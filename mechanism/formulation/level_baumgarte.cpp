@@ -17,7 +17,7 @@ template <class Space, class S>
 class BaumgarteLevel final : public Level<Space, S> {
  public:
   BaumgarteLevel(const Mechanism<Space, S>& mechanism, std::optional<BaumgarteGains> gains)
-      : chooses_gains_(!gains), feedback_(VectorX<S>::Zero(mechanism.num_rows())) {
+      : chooses_gains_(!gains), feedback_(VectorX<S>::Zero(mechanism.num_equations())) {
     Level<Space, S>::gains_ = gains.value_or(BaumgarteGains());
   }
 

@@ -17,7 +17,7 @@ class PositionLevel final : public Level<Space, S> {
       // round-off of poses that pass through all bodies
       : goal_(S(4) * std::numeric_limits<S>::epsilon() * S(mechanism.num_bodies())),
         length_(mechanism.length()),
-        violation_(VectorX<S>::Zero(mechanism.num_rows())),
+        violation_(VectorX<S>::Zero(mechanism.num_equations())),
         change_(VectorX<S>::Zero(mechanism.num_u())),
         q_(VectorX<S>::Zero(mechanism.num_q())),
         moved_(q_),

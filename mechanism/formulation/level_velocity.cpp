@@ -14,7 +14,7 @@ class VelocityLevel final : public Level<Space, S> {
   explicit VelocityLevel(const Mechanism<Space, S>& mechanism)
       : u_(VectorX<S>::Zero(mechanism.num_u())),
         change_(u_),
-        violation_(VectorX<S>::Zero(mechanism.num_rows())) {
+        violation_(VectorX<S>::Zero(mechanism.num_equations())) {
     this->changes_speeds_ = true;
     this->right_hand_side_ = SpeedsUsed::kCompleted;
   }

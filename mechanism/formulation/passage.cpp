@@ -49,7 +49,7 @@ Passage<Space, S>::Passage(const Mechanism<Space, S>& mechanism, ConstraintSolve
       udot_(VectorX<S>::Zero(mechanism.num_u())),
       force_(udot_),
       change_(udot_),
-      rows_(VectorX<S>::Zero(mechanism.num_rows())),
+      rows_(VectorX<S>::Zero(mechanism.num_equations())),
       nothing_(rows_) {
   means_.fill(udot_);
 }
@@ -59,6 +59,7 @@ bool Passage<Space, S>::Move(const Kinematics<Space, S>& at, S step) {
   there_ = at.q() + step * (rates_ + step * curve_);
   at.mechanism().Normalise(there_);
   state_.kinematics().SetTime(at.time() + step);
+  state_.kinematics().CountTurnsLike(at);
   state_.SetPositions(there_);
   state_.SetSpeeds(at.u());
   return projection_->Accept(state_, S(0)) != Accepted::kFailed &&

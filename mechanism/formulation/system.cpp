@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "mechanism/algebra/instantiate.h"
+#include "mechanism/formulation/coupled_solver.h"
 #include "mechanism/formulation/forward_jacobian.h"
 #include "mechanism/formulation/passage.h"
 
@@ -18,6 +19,15 @@ void SetRegularization(FactoredState<Space, S>& state, double share) {
   state.ForgetFactors();
 }
 
+/// The solver itself without couplings.
+template <class Space, class S>
+std::unique_ptr<ConstraintSolver<Space, S>> WithCouplings(
+    const Mechanism<Space, S>& mechanism, std::unique_ptr<ConstraintSolver<Space, S>> solver,
+    SolverKind kind) {
+  if (mechanism.couplings().empty()) return solver;
+  return std::make_unique<CoupledSolver<Space, S>>(mechanism, std::move(solver), kind);
+}
+
 }  // namespace
 
 template <class Space, class S>
@@ -26,13 +36,13 @@ System<Space, S>::System(const Mechanism<Space, S>& mechanism,
                          const FormulationOptions& options)
     : mechanism_(mechanism),
       options_(options),
-      solver_(std::move(solver)),
+      solver_(WithCouplings(mechanism, std::move(solver), options.solver)),
       level_(MakeLevel(mechanism, options)),
       state_(mechanism, *solver_),
       dynamics_(mechanism),
       drives_(mechanism.drives().empty() ? nullptr : std::make_unique<Drives<Space, S>>(mechanism)),
       udot_(VectorX<S>::Zero(mechanism.num_u())),
-      lambda_(VectorX<S>::Zero(mechanism.num_rows())),
+      lambda_(VectorX<S>::Zero(mechanism.num_equations())),
       change_(udot_),
       lambda_change_(lambda_),
       A_(mechanism.released().empty() ? 0 : static_cast<std::size_t>(mechanism.num_bodies())),
@@ -52,6 +62,7 @@ Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
   state_.SetPositions(q);
   state_.SetSpeeds(u);
   kinematics.AcceptStep();
+  kinematics.CountTurns();
   accepted_t_ = t;
   state_.AcceptReleased();
   solver_->Start(kinematics);
@@ -108,7 +119,7 @@ void System<Space, S>::SolveFormed(VectorX<S>* lambda) {
   dynamics_.Bias(kinematics(), force_);
   dynamics_.JacobianBias(kinematics(), target_);
   force_ = -force_;
-  if (feedback_->size() > 0) target_ -= *feedback_;
+  target_.head(feedback_->size()) -= *feedback_;
   solver_->Solve(force_, target_, udot_, lambda);
 }
 

@@ -38,7 +38,8 @@ class Passage;
 template <class Space, class S>
 class System final : public Ode<S> {
  public:
-  /// `mechanism` must outlive the system and its solver, which was made for it.
+  /// `mechanism` must outlive the system and its solver, which was made for it. Couplings are added
+  /// to the solver (coupled_solver.h).
   System(const Mechanism<Space, S>& mechanism, std::unique_ptr<ConstraintSolver<Space, S>> solver,
          const FormulationOptions& options);
   ~System() override;
@@ -114,7 +115,8 @@ class System final : public Ode<S> {
   /// restart. If a projection failed, `y` is unchanged; the next evaluation gives the reason.
   bool BeginStep(S t, std::span<S> y);
 
-  /// Multipliers lambda of all constraint rows; D lambda is the force on Q. The last call must have
+  /// Multipliers of all constraint rows: lambda by joint, D lambda being the force on Q, then mu by
+  /// coupling, ratio mu being the effort along each of its coordinates. The last call must have
   /// been a successful Evaluate() or Examine().
   const VectorX<S>& Multipliers();
 

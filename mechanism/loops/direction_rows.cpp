@@ -39,6 +39,8 @@ DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics) {
     result.count.push_back(mechanism.joints()[index].num_directions());
     size += result.count.back();
   }
+  const int of_joints = size;
+  size += static_cast<int>(mechanism.couplings().size());
   MatrixX<S> M;
   dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
   result.mass.compute(M.template cast<double>().eval());
@@ -65,6 +67,14 @@ DirectionRows RowsOfDirections(const Kinematics<Space, S>& kinematics) {
       result.rows.row(row) = rows.row(i).template cast<double>() / scale;
       result.mismatch[row] = static_cast<double>(e(i, 0)) / scale;
     }
+  }
+  MatrixX<S> G;
+  dynamics.CouplingJacobian(kinematics, G);
+  for (int c = 0; c < G.rows(); ++c) {
+    const double scale =
+        std::sqrt(static_cast<double>(FreeResponseOf(kinematics, Masses::kGeometric, c)));
+    result.rows.row(of_joints + c) = G.row(c).template cast<double>() / scale;
+    result.mismatch[of_joints + c] = static_cast<double>(kinematics.CouplingMismatch(c)) / scale;
   }
   result.rows = result.mass.matrixL().solve(result.rows.transpose()).transpose();
   return result;

@@ -69,6 +69,16 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     missed_[index] = SizeOf(kinematics, state.Sum(left, state.rows()));  // released ones follow
     worst_ = max(worst_, missed_[index]);
   }
+  for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
+    const int first = mechanism.couplings()[c].parts.front().joint, row = mechanism.num_rows() + c;
+    S left = CouplingAcceleration<Space, S>(kinematics, c, &udot, A_);
+    if (feedback.size() > row) left += feedback[row];
+    using std::abs;
+    const S missed = abs(kinematics.OfFirstJoint(c, left));
+    const bool turns = !kinematics.joints()[first].basis[0].angular.isZero();
+    missed_[first] = max(missed_[first], turns ? missed : S(missed / mechanism.length()));
+    worst_ = max(worst_, missed_[first]);
+  }
   AppliedForces<Space, S>(kinematics, F_);
   S alone = S(0);
   for (int body = 1; body < mechanism.num_bodies(); ++body) {

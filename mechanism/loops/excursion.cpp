@@ -32,12 +32,15 @@ Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const Vec
   }
   const double eps = std::numeric_limits<double>::epsilon();
   closed_ = std::max(std::max(1e-11, accuracy) * mechanism.length(), 100 * eps * farthest);
+  kinematics_.AcceptStep();
+  kinematics_.CountTurns();
   Factor();
 }
 
 template <class Space>
 void Excursion<Space>::Factor() {
   kinematics_.UpdatePosition(q_);
+  kinematics_.AcceptStep();
   here_ = RowsOfDirections(kinematics_);
   rank_ = 0;
   conditioning_ = 1.0;

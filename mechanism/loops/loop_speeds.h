@@ -35,4 +35,18 @@ void ForEachSpeedOfLoop(const Kinematics<Space, S>& kinematics, int index, const
   }
 }
 
+/// Calls sink(index into u, rate) for each speed of the forest that changes the one coordinate of a
+/// joint; `rate` is the coordinate's rate per unit of that speed. Drives have no speed.
+template <class Space, class S, class Sink>
+void ForEachSpeedOfCoordinate(const Kinematics<Space, S>& kinematics, int index, const Sink& sink) {
+  const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  if (joint.in_tree()) {
+    if (joint.num_drives == 0) sink(joint.u_offset, S(1));
+    return;
+  }
+  ForEachSpeedOfLoop(kinematics, index, [&](int column, const Velocity<Space, S>& V) {
+    sink(column, S(joint.kind->inverse_H_squared * kinematics.joints()[index].basis[0].dot(V)));
+  });
+}
+
 }  // namespace loopbench

@@ -22,9 +22,12 @@ template <class Space>
 Scaling Scale(const Kinematics<Space, double>& kinematics) {
   const Mechanism<Space, double>& mechanism = kinematics.mechanism();
   TreeDynamics<Space, double> dynamics(mechanism);
-  Eigen::MatrixXd M, J;
+  Eigen::MatrixXd M, J, G;
   dynamics.MassMatrix(kinematics, Masses::kGeometric, M);
   dynamics.Jacobian(kinematics, J);
+  dynamics.CouplingJacobian(kinematics, G);
+  J.conservativeResize(mechanism.num_equations(), Eigen::NoChange);
+  J.bottomRows(G.rows()) = G;
   Scaling scaling;
   scaling.L.compute(M);
   scaling.rows = scaling.B = J;
@@ -39,6 +42,12 @@ Scaling Scale(const Kinematics<Space, double>& kinematics) {
     auto block = scaling.B.middleRows(joint.row, rows);
     block = Eigen::LLT<Eigen::MatrixXd>(free).matrixL().solve(Eigen::MatrixXd(block));
     for (int i = 0; i < rows; ++i) scaling.rows.row(joint.row + i) /= std::sqrt(free(i, i));
+  }
+  for (int c = 0; c < G.rows(); ++c) {
+    const int row = mechanism.num_rows() + c;
+    const double scale = std::sqrt(FreeResponseOf(kinematics, Masses::kGeometric, c));
+    scaling.B.row(row) /= scale;
+    scaling.rows.row(row) /= scale;
   }
   return scaling;
 }

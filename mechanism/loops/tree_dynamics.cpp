@@ -210,6 +210,17 @@ std::span<const Wrench<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
     F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
   }
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  for (int c = 0; mechanism.num_rows() + c < static_cast<int>(lambda.size()); ++c) {
+    for (const auto& [index, ratio] : mechanism.couplings()[c].parts) {
+      const Joint<Space, S>& joint = mechanism.joints()[index];
+      const JointState<Space, S>& state = kinematics.joints()[index];
+      const Wrench<Space, S> F = state.basis[0] * (joint.kind->inverse_H_squared * ratio *
+                                                   lambda[mechanism.num_rows() + c]);
+      F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
+      F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
+    }
+  }
   return F_;
 }
 
@@ -222,6 +233,11 @@ void TreeDynamics<Space, S>::Residual(const Kinematics<Space, S>& kinematics,
   force.setZero(kinematics.mechanism().num_u());
   AlongForest(kinematics, force);
   JacobianBias(kinematics, constraint);
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
+    constraint[mechanism.num_rows() + c] =
+        -CouplingAcceleration<Space, S>(kinematics, c, &udot, A_bias_);
+  }
   constraint = -constraint;
 }
 
@@ -272,6 +288,62 @@ void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, 
   rows = J;
 }
 
+template <class Space, class S>
+void TreeDynamics<Space, S>::CouplingJacobian(const Kinematics<Space, S>& kinematics,
+                                              MatrixX<S>& G) const {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  G.setZero(static_cast<Eigen::Index>(mechanism.couplings().size()), mechanism.num_u());
+  for (int c = 0; c < G.rows(); ++c) {
+    for (const auto& [index, ratio] : mechanism.couplings()[c].parts) {
+      ForEachSpeedOfCoordinate(kinematics, index,
+                               [&](int column, const S& rate) { G(c, column) += ratio * rate; });
+    }
+  }
+}
+
+/// A joint of the forest has its udot; of a cut joint it is H^T (A_Q - A_P - g) / |H|^2, where g
+/// has a prescribed acceleration.
+template <class Space, class S>
+S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, const VectorX<S>* udot,
+                       std::span<const Acceleration<Space, S>> A) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  S sum = S(0);
+  for (const auto& [index, ratio] : mechanism.couplings()[coupling].parts) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    if (joint.num_drives > 0) {
+      sum += ratio * kinematics.drives()[joint.first_drive].acceleration;
+    } else if (joint.in_tree() && udot != nullptr) {
+      sum += ratio * (*udot)[joint.u_offset];
+    }
+    if (joint.in_tree()) continue;
+    sum += ratio * joint.kind->inverse_H_squared *
+           kinematics.joints()[index].basis[0].dot(
+               RelativeAcceleration<Space, S>(kinematics, index, A));
+  }
+  return sum;
+}
+
+template <class Space, class S>
+S FreeResponseOf(const Kinematics<Space, S>& kinematics, Masses masses, int coupling) {
+  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const std::vector<Inertia<Space, S>>& inertias = mechanism.bodies(masses);
+  S sum = S(0);
+  for (const auto& [index, ratio] : mechanism.couplings()[coupling].parts) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    if (joint.num_drives > 0) continue;
+    const S scale = ratio * joint.kind->inverse_H_squared;
+    for (const auto& [body, r] : {std::pair{joint.to, kinematics.ArmQ(index, masses)},
+                                  std::pair{joint.from, kinematics.ArmP(index, masses)}}) {
+      if (body == kGround) continue;
+      const Wrench<Space, S> F = ShiftForce<Space, S>(kinematics.joints()[index].basis[0], r);
+      const Acceleration<Space, S> A(kinematics.RotationalInverse(inertias[body], body) * F.angular,
+                                     F.linear / inertias[body].mass);
+      sum += scale * scale * F.dot(A);
+    }
+  }
+  return sum;
+}
+
 /// Motions with zero free speeds come from prescribed motions alone.
 template <class Space, class S>
 void SpeedBias(Kinematics<Space, S>& kinematics, const VectorX<S>& zero, VectorX<S>& bias) {
@@ -292,12 +364,16 @@ template <class Space, class S>
 void TreeDynamics<Space, S>::JacobianBias(const Kinematics<Space, S>& kinematics,
                                           VectorX<S>& gamma) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  gamma.resize(mechanism.num_rows());
+  gamma.resize(mechanism.num_equations());
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
     const int rows = joint.num_constraints();
     const Components<Space, S> bias = JointAcceleration<Space, S>(kinematics, index, A_bias_);
     gamma.segment(joint.row, rows) = -bias.head(rows);
+  }
+  for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
+    gamma[mechanism.num_rows() + c] =
+        -CouplingAcceleration<Space, S>(kinematics, c, nullptr, A_bias_);
   }
 }
 
@@ -357,6 +433,9 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
                                                        std::span<const Acceleration<Space, S>>); \
   template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,              \
                                                   std::span<const Acceleration<Space, S>>);      \
+  template S CouplingAcceleration(const Kinematics<Space, S>&, int, const VectorX<S>*,           \
+                                  std::span<const Acceleration<Space, S>>);                      \
+  template S FreeResponseOf(const Kinematics<Space, S>&, Masses, int);                           \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

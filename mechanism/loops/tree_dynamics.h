@@ -3,6 +3,7 @@
 //   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u + b(q, t) = 0.
 //
 // b, from prescribed motions, is zero without them, and h and gamma then do not depend on time.
+// Couplings (mechanism.h) add rows G to J, multipliers mu to lambda and numbers to gamma.
 //
 // M by the composite-rigid-body method, h by one outward and one inward pass (Featherstone, Rigid
 // Body Dynamics Algorithms, ch. 5 and 6), J row by row from D^T (V_Q - V_P) at the joint's point.
@@ -35,11 +36,15 @@ class TreeDynamics {
   void JacobianOf(const Kinematics<Space, S>& kinematics, int joint,
                   Eigen::Ref<MatrixX<S>> rows) const;
 
-  /// gamma, after Bias().
+  /// G (num_equations - num_rows x num_u): derivatives of the couplings' rates by u.
+  void CouplingJacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& G) const;
+
+  /// gamma of joints and couplings (num_equations), after Bias().
   void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
 
-  /// The wrench at each body's centre of mass that udot takes beyond applied forces and lambda: the
-  /// joints of the forest must transmit it. Good until the next call of any member function.
+  /// The wrench at each body's centre of mass that udot takes beyond applied forces and lambda
+  /// (with mu behind it, if any): the joints of the forest must transmit it. Good until the next
+  /// call of any member function.
   std::span<const Wrench<Space, S>> WrenchesLeft(const Kinematics<Space, S>& kinematics,
                                                  const VectorX<S>& udot, const VectorX<S>& lambda);
 
@@ -99,6 +104,17 @@ Acceleration<Space, S> RelativeAcceleration(const Kinematics<Space, S>& kinemati
 template <class Space, class S>
 Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
                                        std::span<const Acceleration<Space, S>> A);
+
+/// Second derivative of a coupling's mismatch, from the accelerations A of all centres of mass and
+/// the udot that they belong to; null: zero.
+template <class Space, class S>
+S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, const VectorX<S>* udot,
+                       std::span<const Acceleration<Space, S>> A);
+
+/// Response of a coupling to its own force if only the two bodies of each joint move: the scale of
+/// its row.
+template <class Space, class S>
+S FreeResponseOf(const Kinematics<Space, S>& kinematics, Masses masses, int coupling);
 
 /// Response D^T (S M^-1 S^T) D of the two bodies of a joint when nothing else holds them, the scale
 /// against which the response of the assembled mechanism is judged (docs/decisions/005): of the

@@ -51,7 +51,9 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
     const S turn = 2 * std::numbers::pi_v<S>;
     using std::remainder;
-    q = accepted_[index] + remainder(q - accepted_[index], turn);
+    S near = accepted_[index];
+    if (!accepted_speeds_.empty()) near += accepted_speeds_[index] * (time_ - accepted_time_);
+    q = near + remainder(q - near, turn);
   }
   return q;
 }
@@ -66,10 +68,54 @@ S Kinematics<Space, S>::JointSpeed(int index) const {
 }
 
 template <class Space, class S>
+S Kinematics<Space, S>::CouplingMismatch(int index) const {
+  const Coupling<S>& coupling = mechanism_->couplings()[index];
+  S sum = -coupling.offset - turns_[index];
+  for (const auto& [joint, ratio] : coupling.parts) sum += ratio * JointCoordinate(joint);
+  return sum;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::CouplingSpeed(int index) const {
+  S sum = S(0);
+  for (const auto& [joint, ratio] : mechanism_->couplings()[index].parts) {
+    sum += ratio * JointSpeed(joint);
+  }
+  return sum;
+}
+
+template <class Space, class S>
 void Kinematics<Space, S>::AcceptStep() {
   for (int index : mechanism_->constraints()) {
     if (mechanism_->joints()[index].kind->num_u == 1) accepted_[index] = JointCoordinate(index);
   }
+  if (accepted_speeds_.empty()) return;
+  for (const Coupling<S>& coupling : mechanism_->couplings()) {
+    for (const auto& [joint, ratio] : coupling.parts) accepted_speeds_[joint] = JointSpeed(joint);
+  }
+  accepted_time_ = time_;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::CountTurns() {
+  using std::abs;
+  constexpr double kOpen = 1e-3;  // of a start that is not consistent
+  for (std::size_t c = 0; c < turns_.size(); ++c) {
+    const int index = static_cast<int>(c);
+    turns_[c] = S(0);
+    if (!mechanism_->couplings()[c].is_measured) continue;
+    const S open = CouplingMismatch(index);
+    if (abs(OfFirstJoint(index, open)) > S(kOpen)) turns_[c] = open;
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::CountTurnsLike(const Kinematics& other) {
+  if (turns_.empty()) return;
+  accepted_ = other.accepted_;
+  accepted_speeds_ = other.accepted_speeds_;
+  turns_ = other.turns_;
+  accepted_time_ = other.accepted_time_;
 }
 
 template <class Space, class S>
@@ -112,7 +158,11 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   template Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int) const;            \
   template S Kinematics<Space, S>::JointCoordinate(int) const;                               \
   template S Kinematics<Space, S>::JointSpeed(int) const;                                    \
+  template S Kinematics<Space, S>::CouplingMismatch(int) const;                              \
+  template S Kinematics<Space, S>::CouplingSpeed(int) const;                                 \
   template void Kinematics<Space, S>::AcceptStep();                                          \
+  template void Kinematics<Space, S>::CountTurns();                                          \
+  template void Kinematics<Space, S>::CountTurnsLike(const Kinematics<Space, S>&);           \
   template VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>&) const; \
   template VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics&) const;
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)

@@ -132,6 +132,15 @@ class Kinematics {
   S JointCoordinate(int joint) const;
   S JointSpeed(int joint) const;
 
+  /// sum_i ratio_i q_i less the offset, and its rate. Angles of cut joints are counted so that
+  /// couplings hold at the start.
+  S CouplingMismatch(int coupling) const;
+  S CouplingSpeed(int coupling) const;
+  /// A mismatch or a rate of a coupling in the unit of its first coordinate [rad or m].
+  S OfFirstJoint(int coupling, const S& mismatch) const {
+    return mismatch / mechanism_->couplings()[coupling].parts.front().ratio;
+  }
+
   /// Directions that are not imposed from now on, as many of each joint as the mechanism releases.
   /// Part of the mode; the positions must be updated afterwards.
   void Release(const std::vector<Released>& released);
@@ -148,6 +157,10 @@ class Kinematics {
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
+  /// Counts the turns of measured angles anew: couplings hold here. After AcceptStep() at a start.
+  void CountTurns();
+  /// Continues angles from where `other` does.
+  void CountTurnsLike(const Kinematics& other);
 
   /// q of a mechanism with the same bodies, from body poses here (other coordinate set).
   VectorX<S> CoordinatesIn(const Mechanism<Space, S>& other) const;
@@ -178,6 +191,10 @@ class Kinematics {
   std::vector<Pose<Space, S>> joint_poses_;
   std::vector<TimeValue<S>> drives_;
   std::vector<S> accepted_;  ///< last accepted coordinate of each joint
+  /// With couplings: speeds of joints and the time there, by which angles are expected between
+  /// accepted steps; by coupling, the turns that measured angles lack.
+  std::vector<S> accepted_speeds_, turns_;
+  S accepted_time_ = S(0);
   std::vector<Released> released_;
   VectorX<S> q_, u_;
   S time_ = S(0);

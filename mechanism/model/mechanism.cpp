@@ -88,6 +88,7 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   }
   AddBodies(description);
   AddJoints(description, BuildTopology(description, coordinates));
+  AddCouplings(description);
   forces_ = ForceElements<Space, S>(description);
   AddStopTimes();
   AddGeometry(description);
@@ -196,6 +197,21 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     joint.row = num_rows_;
     num_rows_ += joint.num_constraints();
     constraints_.push_back(index);
+  }
+}
+
+template <class Space, class S>
+void Mechanism<Space, S>::AddCouplings(const MechanismDescription& description) {
+  for (const CouplingDescription& given : description.couplings) {
+    Coupling<S>& coupling = couplings_.emplace_back();
+    coupling.name = given.name;
+    coupling.offset = S(given.offset);
+    for (const auto& [index, ratio] : given.parts) {
+      const Joint<Space, S>& joint = joints_[index];
+      coupling.parts.push_back({index, S(ratio)});
+      const bool is_angle = joint.kind->axes[0] < Space::kRot && joint.kind->parameter == S(0);
+      coupling.is_measured = coupling.is_measured || (is_angle && !joint.in_tree());
+    }
   }
 }
 

@@ -53,6 +53,20 @@ struct Drive {
   TimeFunction value;
 };
 
+/// sum_i ratio_i q_i = offset over joints of one coordinate. Its force mu acts as ratio_i mu along
+/// each coordinate and does no work.
+template <class S>
+struct Coupling {
+  struct Part {
+    int joint = 0;
+    S ratio = S(1);
+  };
+  std::string name;
+  std::vector<Part> parts;
+  S offset = S(0);
+  bool is_measured = false;  ///< some coordinate is an angle of a cut joint, modulo a turn
+};
+
 /// Directions that a joint does not impose (redundancy.h), ascending, counted in D behind the
 /// directions of prescribed coordinates.
 struct Released {
@@ -83,6 +97,9 @@ class Mechanism {
   int num_q() const { return num_q_; }
   int num_u() const { return num_u_; }
   int num_rows() const { return num_rows_; }  ///< scalar constraints of all cut joints
+  /// Scalar constraints: those of joints, then a coupling each. Solvers know the former only
+  /// (coupled_solver.h).
+  int num_equations() const { return num_rows_ + static_cast<int>(couplings_.size()); }
   /// Independent loops of the user's graph, the same number in both coordinate sets.
   int num_loops() const { return num_loops_; }
   /// Free speeds of the user's spanning forest: num_u() in joint coordinates.
@@ -105,6 +122,7 @@ class Mechanism {
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
+  const std::vector<Coupling<S>>& couplings() const { return couplings_; }
   /// Directions that constraints do not impose at first, by joint; usually empty.
   const std::vector<Released>& released() const { return released_; }
   /// Returns true if released directions are constraints that drift (self_stress.h), not rounded.
@@ -148,6 +166,7 @@ class Mechanism {
   void AddBodies(const MechanismDescription& description);
   void AddJoints(const MechanismDescription& description, const Topology& topology);
   Joint<Space, S> MakeJoint(const MechanismDescription& description, int index);
+  void AddCouplings(const MechanismDescription& description);
   void AddStopTimes();
   void AddGeometry(const MechanismDescription& description);
   void NameSpeeds(const MechanismDescription& description);
@@ -165,6 +184,7 @@ class Mechanism {
   std::vector<double> stop_times_;
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;
+  std::vector<Coupling<S>> couplings_;
   std::vector<Released> released_;
   bool rounded_ = false;
   ForceElements<Space, S> forces_;

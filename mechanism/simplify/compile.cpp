@@ -27,6 +27,15 @@ bool KeepsCuts(const MechanismDescription& before, const MechanismDescription& a
                              [&](int joint) { return was_cut[joint]; });
 }
 
+/// Returns true if a joint of a coupling is gone.
+bool LosesCoupledJoint(const MechanismDescription& before, const Renumbering& renumbering) {
+  return std::ranges::any_of(before.couplings, [&](const CouplingDescription& coupling) {
+    return std::ranges::any_of(coupling.parts, [&](const CouplingDescription::Part& part) {
+      return renumbering.joints[part.joint] < 0;
+    });
+  });
+}
+
 class Compiler {
  public:
   Compiler(const MechanismDescription& description, const CompileOptions& options)
@@ -80,6 +89,11 @@ class Compiler {
       result_.report.push_back("bodies that could be " + how +
                                " to others are kept: a joint with an initial value would have to "
                                "close a loop");
+      return false;
+    }
+    if (LosesCoupledJoint(before, renumbering)) {
+      result_.report.push_back("bodies that could be " + how +
+                               " to others are kept: they hold a joint of a coupling");
       return false;
     }
     for (std::size_t i = 1; i < attachments.size(); ++i) {

@@ -74,6 +74,17 @@ Simplified Redundant(const MechanismDescription& description, const ShortRun&,
   return result;
 }
 
+/// An approximate rule, for mechanisms without couplings.
+template <Simplified (*rule)(const MechanismDescription&, const ShortRun&, const SimplifyOptions&)>
+Simplified Uncoupled(const MechanismDescription& description, const ShortRun& run,
+                     const SimplifyOptions& options) {
+  if (description.couplings.empty()) return rule(description, run, options);
+  Simplified result;
+  result.parts = {description};
+  result.why_not = "the rule does not know couplings";
+  return result;
+}
+
 /// Appends the result of a rule on the last model, if it applies.
 void Append(const SimplificationRule& idea, const ShortRun& run, const SimplifyOptions& options,
             Simplified* model) {
@@ -114,26 +125,26 @@ const std::vector<SimplificationRule>& SimplificationRules() {
        .assumption = "their joints stay at rest after the trial run",
        .number = "relative motion in the trial run [rad, or mechanism lengths]",
        .limit = &SimplifyOptions::constant_parts,
-       .apply = FreezeConstantParts},
+       .apply = Uncoupled<FreezeConstantParts>},
       {.name = "stiff-springs",
        .sentence = "springs much faster than the motion become rods or locked joints",
        .assumption = "nothing excites them: they stay at their rest position",
        .number = "frequency divided by the rate of the motion",
        .limit = &SimplifyOptions::stiff_springs,
        .is_least = true,
-       .apply = HoldStiffSprings},
+       .apply = Uncoupled<HoldStiffSprings>},
       {.name = "light-links",
        .sentence = "links of small mass become massless rods; their mass moves to their ends",
        .assumption = "the rotational energy of the link is negligible",
        .number = "largest share of the kinetic energy in any motion at the start",
        .limit = &SimplifyOptions::light_links,
-       .apply = LightenLinks},
+       .apply = Uncoupled<LightenLinks>},
       {.name = "nearly-planar",
        .sentence = "a mechanism that nearly moves in parallel planes becomes planar",
        .assumption = "the tilt of the axes stays as small as at the start",
        .number = "tilt of the axes at the start (sine)",
        .limit = &SimplifyOptions::nearly_planar,
-       .apply = FlattenNearly},
+       .apply = Uncoupled<FlattenNearly>},
       {.name = "islands",
        .is_exact = true,
        .sentence = "parts without a connection become separate models",

@@ -84,8 +84,10 @@ Redundancy Find(const MechanismDescription& description) {
   const Start<double> start = Assemble<Space>(description, driven);
   if (start.outcome == Outcome::kInconsistentStart) return result;
 
+  // a constraint is redundant if others of joints imply it, couplings or not
   MechanismDescription free = description;
   for (JointDescription& joint : free.joints) joint.motions.clear();
+  free.couplings.clear();
   for (int index : result.cut) free.joints[index].cut = true;  // the same forest
   const Mechanism<Space, double> mechanism(free, Coordinates::kJoint);
   Kinematics<Space, double> at_start(driven);

@@ -58,7 +58,7 @@ class Analysis {
     for (int index : mechanism_.constraints()) result_.loops.push_back(FindLoop(index, kinematics));
     result_.analysed = result_.joint_u <= kMaxAnalysedSpeeds;
     if (!result_.analysed) {
-      result_.analysed = AreIndependent(kinematics);
+      result_.analysed = result_.couplings == 0 && AreIndependent(kinematics);
       if (result_.analysed) result_.rank = result_.rank_nearby = result_.loop_rows;
       return result_;
     }
@@ -74,7 +74,7 @@ class Analysis {
       }
     }
     const bool driven = !mechanism_.drives().empty();
-    const bool known = redundancy.rows > 0 && !driven;
+    const bool known = redundancy.rows > 0 && !driven && result_.couplings == 0;
     result_.rank_nearby = known ? redundancy.rank : result_.rank;
     FindFreedomOfParts();
     if (!driven) return result_;
@@ -103,8 +103,9 @@ class Analysis {
     result_.space = description_.space;
     result_.bodies = mechanism_.num_bodies() - 1;
     result_.joints = static_cast<int>(description_.joints.size());
-    result_.rows = absolute.num_rows();
-    result_.loop_rows = mechanism_.num_rows();
+    result_.couplings = static_cast<int>(mechanism_.couplings().size());
+    result_.rows = absolute.num_equations();
+    result_.loop_rows = mechanism_.num_equations();
     result_.joint_q = mechanism_.num_q();
     result_.joint_u = mechanism_.num_u();
     result_.absolute_q = absolute.num_q();

@@ -34,8 +34,9 @@ struct Structure {
   SpaceKind space = SpaceKind::kPlanar;
   int bodies = 0;                      ///< without Ground
   int joints = 0;                      ///< of the user
-  int rows = 0;                        ///< constraints of all joints
-  int loop_rows = 0;                   ///< constraints of the cut joints
+  int couplings = 0;                   ///< of the user
+  int rows = 0;                        ///< constraints of all joints and couplings
+  int loop_rows = 0;                   ///< constraints of the cut joints and couplings
   int joint_q = 0, joint_u = 0;        ///< coordinates and speeds, set joint
   int absolute_q = 0, absolute_u = 0;  ///< set absolute
   /// Freedom by counting (Gruebler, Kutzbach): 3 or 6 per body less `rows`. Wrong where constraints
@@ -48,8 +49,8 @@ struct Structure {
   Start<double> start;  ///< result of Assemble(), also if it failed
 
   bool analysed = false;  ///< true if the following members are known
-  int rank = 0;           ///< of the cut joints' constraints at the start
-  int rank_nearby = 0;    ///< at generic positions; `rank` where motions are prescribed
+  int rank = 0;           ///< of the cut joints' constraints and couplings at the start
+  int rank_nearby = 0;    ///< at generic positions; `rank` with prescribed motions or couplings
   /// Singular values of the scaled loops at the start, falling; empty above kMaxAnalysedSpeeds,
   /// where `analysed` means that all constraints are independent.
   Eigen::VectorXd singular_values;

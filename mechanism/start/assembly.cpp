@@ -65,7 +65,7 @@ class Assembler {
 
   void CloseSpeeds() {
     kinematics_.UpdatePosition(start_.q);
-    const int rows = mechanism_.num_rows(), extra = static_cast<int>(given_cut_.size());
+    const int rows = mechanism_.num_equations(), extra = static_cast<int>(given_cut_.size());
     if (rows + extra == 0) return;
     const VectorX<double> at_rest = VectorX<double>::Zero(mechanism_.num_u());
     VectorX<double> target, bias;
@@ -74,6 +74,9 @@ class Assembler {
     target.conservativeResize(rows + extra);
     const VectorX<double> units = units_.With(kinematics_, given_cut_);
     kinematics_.UpdateVelocity(at_rest);
+    for (int c = 0; c < static_cast<int>(mechanism_.couplings().size()); ++c) {
+      target[mechanism_.num_rows() + c] = -kinematics_.CouplingSpeed(c);
+    }
     for (int k = 0; k < extra; ++k) {
       const auto& [joint, component] = given_cut_[k];
       target[rows + k] = given_cut_speeds_[k] - CutJointSpeed(joint, component);

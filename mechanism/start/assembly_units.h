@@ -25,7 +25,8 @@ inline void ClearFixed(const std::vector<bool>& fixed, VectorX<double>* d) {
 }
 
 /// Units of constraint rows and of speeds: 1 for angles, and for lengths the power of two next to
-/// the mechanism's length, which causes no rounding. They do not depend on the position.
+/// the mechanism's length, which causes no rounding. A coupling has the unit of its first joint's
+/// coordinate times the ratio. They do not depend on the position.
 template <class Space>
 struct AssemblyUnits {
   double length = 1.0;            ///< [m]
@@ -42,12 +43,16 @@ struct AssemblyUnits {
       const int offset = mechanism.joints()[step.joint].u_offset;
       for (int i = 0; i < state.num_u; ++i) columns[offset + i] = Of(state.H(i));
     }
-    rows.setOnes(mechanism.num_rows());
+    rows.setOnes(mechanism.num_equations());
     for (int index : mechanism.constraints()) {
       const Joint<Space, double>& joint = mechanism.joints()[index];
       for (int r = 0; r < joint.num_constraints(); ++r) {
         rows[joint.row + r] = Of(kinematics.joints()[index].D(r));
       }
+    }
+    for (int c = 0; mechanism.num_rows() + c < rows.size(); ++c) {
+      const auto& [joint, ratio] = mechanism.couplings()[c].parts.front();
+      rows[mechanism.num_rows() + c] = std::abs(ratio) * Of(kinematics.joints()[joint].basis[0]);
     }
   }
 
@@ -69,7 +74,7 @@ struct AssemblyUnits {
   }
 };
 
-/// Returns J in units, a row per constraint and below them one per free coordinate of `cut`;
+/// Returns J in units, a row per constraint, then per coupling, then per free coordinate of `cut`;
 /// `fixed` speeds have no entries. `row_units` are the units of With().
 template <class Space>
 SparseRows LoopRows(const Kinematics<Space, double>& kinematics, const AssemblyUnits<Space>& units,
@@ -91,6 +96,13 @@ SparseRows LoopRows(const Kinematics<Space, double>& kinematics, const AssemblyU
     });
   }
   int row = mechanism.num_rows();
+  for (const Coupling<double>& coupling : mechanism.couplings()) {
+    for (const auto& [index, ratio] : coupling.parts) {
+      ForEachSpeedOfCoordinate(kinematics, index,
+                               [&](int column, double rate) { add(row, column, ratio * rate); });
+    }
+    ++row;
+  }
   for (const auto& [index, component] : cut) {
     const double inverse = mechanism.joints()[index].kind->inverse_H_squared;
     const Direction<Space, double> H = kinematics.joints()[index].H(component);

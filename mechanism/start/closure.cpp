@@ -1,6 +1,7 @@
 #include "mechanism/start/closure.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -97,6 +98,7 @@ class Closure {
         most[joint.row + i] = (turns ? 1.0 : std::min(mechanism_.length(), arm) / units_.length);
       }
     }
+    most.segment(mechanism_.num_rows(), mechanism_.couplings().size()).setOnes();
     return (e.cwiseAbs().array() <= description_.accuracy * most.array()).all();
   }
 
@@ -107,16 +109,31 @@ class Closure {
   /// Returns e in units, with a row per fixed coordinate of a cut joint.
   Vector Residual(const Vector& q) {
     Place(q);
-    Vector e(mechanism_.num_rows() + static_cast<Eigen::Index>(guesses_.held().size()));
+    const int rows_of_all = mechanism_.num_equations();
+    Vector e(rows_of_all + static_cast<Eigen::Index>(guesses_.held().size()));
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
       const int rows = joint.num_constraints();
       const Velocity<Space, double> mismatch = kinematics_.ConstraintMismatch(index);
       e.segment(joint.row, rows) = kinematics_.joints()[index].Along(mismatch, rows).head(rows);
     }
-    e.head(mechanism_.num_rows()) = e.head(mechanism_.num_rows()).cwiseQuotient(units_.rows);
+    for (int c = 0; c < static_cast<int>(mechanism_.couplings().size()); ++c) {
+      e[mechanism_.num_rows() + c] = CouplingMismatch(c);
+    }
+    e.head(rows_of_all) = e.head(rows_of_all).cwiseQuotient(units_.rows);
     e.tail(guesses_.held().size()) = guesses_.HeldApart(kinematics_);
     return e;
+  }
+
+  /// Without whole turns of angles of cut joints, which System::Start() counts.
+  double CouplingMismatch(int index) const {
+    double open = kinematics_.CouplingMismatch(index);
+    for (const auto& [joint, ratio] : mechanism_.couplings()[index].parts) {
+      const Joint<Space, double>& one = mechanism_.joints()[joint];
+      const bool is_angle = one.kind->axes[0] < Space::kRot && one.kind->parameter == 0.0;
+      if (is_angle && !one.in_tree()) open = std::remainder(open, 2 * kPi * ratio);
+    }
+    return open;
   }
 
   /// q moved by the speeds d, in units, for unit time (quaternions renormalised).
@@ -248,7 +265,8 @@ class Closure {
       const auto draw = [&](int column) {
         d[column] = (guesses_.guessed()[column] ? most : kPi) * (2.0 * random() - 1.0);
       };
-      if (start > 0 && start % 2 == 0 && least < std::numeric_limits<double>::infinity()) {
+      const bool has_best = least < std::numeric_limits<double>::infinity();
+      if (start > 0 && start % 2 == 0 && has_best && !loops.empty()) {
         q = *best;
         for (int column : ColumnsOfLoop(loops[generator() % loops.size()])) draw(column);
       } else if (start > 0) {

@@ -30,9 +30,10 @@ std::string Listed(const std::vector<std::string>& names) {
   return left == 0 ? text : text + " and " + std::to_string(left) + " more";
 }
 
-/// The largest residual of one joint.
+/// The largest residual of one joint, or of a coupling.
 struct OfJoint {
   int joint = 0;
+  int coupling = -1;
   double scaled = 0.0, value = 0.0;  ///< in units, in SI
   bool length = false;
   bool rod = false;
@@ -50,11 +51,20 @@ class Conflict {
 
   std::string Describe() {
     for (int index : mechanism_.constraints()) AddConstraint(index);
-    int row = mechanism_.num_rows();
+    std::vector<OfJoint> couplings;
+    for (int c = 0; c < static_cast<int>(mechanism_.couplings().size()); ++c) {
+      const int first = mechanism_.couplings()[c].parts.front().joint;
+      OfJoint coupling{.joint = first, .coupling = c};
+      Add(mechanism_.num_rows() + c, kinematics_.joints()[first].basis[0], coupling);
+      coupling.value /= std::abs(mechanism_.couplings()[c].parts.front().ratio);
+      couplings.push_back(coupling);
+    }
+    int row = mechanism_.num_equations();
     for (const auto& [index, component] : unmet_.extra) {
       Add(row++, kinematics_.joints()[index].H(component),
           *std::ranges::find(found_, index, &OfJoint::joint));
     }
+    found_.insert(found_.end(), couplings.begin(), couplings.end());
     double largest = 0.0;
     for (const OfJoint& one : found_) largest = std::max(largest, one.scaled);
     std::erase_if(found_, [&](const OfJoint& one) { return one.scaled < kSmallest * largest; });
@@ -88,6 +98,7 @@ class Conflict {
       const JointDescription& joint =
           description_.joints[mechanism_.joints()[one.joint].description];
       std::string name = (one.rod ? "rod \"" : "joint \"") + joint.name + '"';
+      if (one.coupling >= 0) name = "coupling \"" + mechanism_.couplings()[one.coupling].name + '"';
       if (one.rod) name += " (length " + Short(joint.parameter) + " m)";
       names.push_back(name);
       residuals.push_back(Short(one.value) + (one.length ? " m" : " rad") +
@@ -115,6 +126,12 @@ class Conflict {
   std::string Given() const {
     std::set<int> joints;  // of the description, in its order
     for (const OfJoint& one : found_) {
+      if (one.coupling >= 0) {
+        for (const auto& [index, ratio] : mechanism_.couplings()[one.coupling].parts) {
+          joints.insert(index);
+        }
+        continue;
+      }
       const Joint<Space, double>& joint = mechanism_.joints()[one.joint];
       joints.insert(joint.description);
       const std::set<int> to = PathToGround(joint.to), from = PathToGround(joint.from);

@@ -13,8 +13,8 @@ struct OfCutJoint {
   int joint, component;
 };
 
-/// Residuals of a failed assembly: a number per constraint row and, below them, one per entry of
-/// `extra`.
+/// Residuals of a failed assembly: a number per constraint row, then one per coupling and one per
+/// entry of `extra`.
 struct UnsatisfiedConstraints {
   VectorX<double> rows;                ///< in units
   VectorX<double> units;               ///< [m] or [rad] each
@@ -22,11 +22,11 @@ struct UnsatisfiedConstraints {
   std::vector<OfCutJoint> extra = {};  ///< fixed or given
 };
 
-/// Names the joints in conflict with their residuals and units, rods first, then the largest. Also
-/// names joints of their loops that the assembly may not move: prescribed, fixed or of given speed.
-/// At a least-squares solution the residuals e satisfy J^T e = 0. Joints with a residual contradict
-/// each other; joints without one are not involved. Positions of `kinematics` must belong to the
-/// residuals.
+/// Names the joints and couplings in conflict with their residuals and units, rods first, then the
+/// largest. Also names joints of their loops that the assembly may not move: prescribed, fixed or
+/// of given speed. At a least-squares solution the residuals e satisfy J^T e = 0. Joints with a
+/// residual contradict each other; joints without one are not involved. Positions of `kinematics`
+/// must belong to the residuals.
 template <class Space>
 std::string DescribeConflict(const MechanismDescription& description,
                              const Kinematics<Space, double>& kinematics,

@@ -34,6 +34,7 @@ template <class Space>
 bool IsRigidToSecondOrder(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
                           int rank) {
   const Eigen::Index free = mechanism.num_u() - rank;
+  if (!mechanism.couplings().empty()) return false;  // which gamma lacks below
   if (free > kMaxTried || mechanism.num_rows() - rank > kMaxTried) return false;
   Kinematics<Space, double> kinematics(mechanism);
   TreeDynamics<Space, double> dynamics(mechanism);
@@ -94,18 +95,22 @@ std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<do
                      double accuracy) {
   if (!mechanism.drives().empty()) return "";
   if (mechanism.num_u() == 0) return "no joint leaves a speed free";
-  if (mechanism.num_rows() == 0) return "";
+  const int rows = mechanism.num_equations();
+  if (rows == 0) return "";
   const int n = mechanism.num_u();
-  const std::string all_taken = std::to_string(mechanism.num_rows()) + " constraints take all " +
-                                std::to_string(n) + " speeds";
+  const std::string all_taken =
+      std::to_string(rows) + " constraints take all " + std::to_string(n) + " speeds";
   Kinematics<Space, double> here(mechanism);
   here.UpdatePosition(q);
-  if (AreIndependent(here)) return n > mechanism.num_rows() ? "" : all_taken;
+  // which judges the constraints of joints
+  if (AreIndependent(here) && (mechanism.couplings().empty() || n <= mechanism.num_rows())) {
+    return n > rows ? "" : all_taken;
+  }
   if (n > kMaxAnalysedSpeeds) return "";
   Excursion<Space> excursion(mechanism, q);
   const int first_order = excursion.freedom();
   if (first_order == 0) return all_taken;
-  if (excursion.rank() == mechanism.num_rows()) return "";
+  if (excursion.rank() == rows) return "";
   const int rank = excursion.rank();
   int fell_back = 0;
   for (int trial = 1; trial <= kTrials; ++trial) {

@@ -50,8 +50,8 @@ std::string TextOf(const Eigen::Vector3d& v) {
 /// joints that follow a given motion in their only coordinate say nothing, and are left out.
 std::string Everything(const MechanismDescription& d) {
   // a new member must be thought about here: this line stops compiling
-  const auto& [name, space, gravity, bodies, joints, forces, initial, independent, accuracy,
-               rounded] = d;
+  const auto& [name, space, gravity, bodies, joints, couplings, forces, initial, independent,
+               accuracy, rounded] = d;
   std::string text = fmt::format("{} {} {}\n", name, ToString(space), TextOf(gravity));
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const auto& [body_name, mass, com, inertia, points] = bodies[i];
@@ -72,6 +72,11 @@ std::string Everything(const MechanismDescription& d) {
     for (const PrescribedMotion& motion : joint.motions) {
       text += fmt::format(" [{} {}]", motion.coordinate, TextOf(motion.value));
     }
+    text += "\n";
+  }
+  for (const CouplingDescription& coupling : couplings) {
+    text += fmt::format("coupling {} {}", coupling.name, coupling.offset);
+    for (const auto& [joint, ratio] : coupling.parts) text += fmt::format(" {}*{}", ratio, joint);
     text += "\n";
   }
   for (ForceDescription force : forces) {

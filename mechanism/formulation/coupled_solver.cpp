@@ -1,0 +1,157 @@
+#include "mechanism/formulation/coupled_solver.h"
+
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "mechanism/algebra/instantiate.h"
+
+namespace loopbench {
+
+namespace {
+
+/// Pivots of the scaled X below this are round-off of the inner solver. Mass ratios of 1e9 leave
+/// pivots of 1e-9.
+template <class S>
+S LeastPivot() {
+  return S(4096) * std::numeric_limits<S>::epsilon();
+}
+
+}  // namespace
+
+template <class Space, class S>
+CoupledSolver<Space, S>::CoupledSolver(const Mechanism<Space, S>& mechanism,
+                                       std::unique_ptr<ConstraintSolver<Space, S>> inner,
+                                       SolverKind kind)
+    : mechanism_(mechanism),
+      inner_(std::move(inner)),
+      kind_(kind),
+      dynamics_(mechanism),
+      rows_(VectorX<S>::Zero(mechanism.num_rows())),
+      lambda_(rows_),
+      force_(VectorX<S>::Zero(mechanism.num_u())),
+      column_(force_) {
+  const auto couplings = static_cast<Eigen::Index>(mechanism.couplings().size());
+  G_.setZero(couplings, mechanism.num_u());
+  Y_.setZero(mechanism.num_u(), couplings);
+  X_.setZero(couplings, couplings);
+  scale_.setZero(couplings);
+  mu_ = left_ = scale_;
+  order_.resize(mechanism.couplings().size());
+}
+
+template <class Space, class S>
+Outcome CoupledSolver<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
+  using std::sqrt;
+  rank_ = static_cast<int>(order_.size());
+  const Outcome outcome = inner_->Factor(kinematics);
+  this->conditioning_ = inner_->conditioning();
+  if (outcome != Outcome::kFinished) return outcome;
+  dynamics_.CouplingJacobian(kinematics, G_);
+  rows_.setZero();
+  for (int c = 0; c < G_.rows(); ++c) {
+    force_ = G_.row(c).transpose();
+    inner_->Solve(force_, rows_, column_, nullptr);
+    Y_.col(c) = column_;
+    const S free = FreeResponseOf(kinematics, Masses::kPhysical, c);
+    scale_[c] = free > S(0) ? S(S(1) / sqrt(free)) : S(0);
+  }
+  rank_ = FactorResponse();
+  this->conditioning_.rank += rank_;
+  const bool depends = rank_ < static_cast<int>(order_.size());
+  return depends && kind_ == SolverKind::kAsPublished ? Outcome::kSingular : Outcome::kFinished;
+}
+
+template <class Space, class S>
+int CoupledSolver<Space, S>::FactorResponse() {
+  using std::sqrt;
+  const int n = static_cast<int>(order_.size());
+  X_.noalias() = G_ * Y_;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      X_(i, j) = X_(j, i) = (X_(i, j) + X_(j, i)) * S(0.5) * scale_[i] * scale_[j];
+    }
+  }
+  std::iota(order_.begin(), order_.end(), 0);
+  for (int p = 0; p < n; ++p) {
+    int best = p;
+    for (int i = p + 1; i < n; ++i) {
+      if (X_(i, i) > X_(best, best)) best = i;
+    }
+    if (!(X_(best, best) > LeastPivot<S>())) return p;
+    if (best != p) {
+      X_.row(p).swap(X_.row(best));
+      X_.col(p).swap(X_.col(best));
+      std::swap(order_[p], order_[best]);
+    }
+    X_(p, p) = sqrt(X_(p, p));
+    for (int i = p + 1; i < n; ++i) X_(i, p) /= X_(p, p);
+    for (int j = p + 1; j < n; ++j) {
+      for (int i = j; i < n; ++i) {
+        X_(i, j) -= X_(i, p) * X_(j, p);
+        X_(j, i) = X_(i, j);
+      }
+    }
+  }
+  return n;
+}
+
+template <class Space, class S>
+void CoupledSolver<Space, S>::Couple(const VectorX<S>& target, VectorX<S>& x) {
+  left_.noalias() = G_ * x;
+  left_ = -left_;
+  if (target.size() > rows_.size()) left_ += target.tail(left_.size());
+  mu_.setZero();
+  // L z = scaled left, then L^T z
+  for (int i = 0; i < rank_; ++i) {
+    S z = left_[order_[i]] * scale_[order_[i]];
+    for (int j = 0; j < i; ++j) z -= X_(i, j) * mu_[order_[j]];
+    mu_[order_[i]] = z / X_(i, i);
+  }
+  for (int i = rank_ - 1; i >= 0; --i) {
+    S z = mu_[order_[i]];
+    for (int j = i + 1; j < rank_; ++j) z -= X_(j, i) * mu_[order_[j]];
+    mu_[order_[i]] = z / X_(i, i);
+  }
+  mu_ = mu_.cwiseProduct(scale_);
+  x.noalias() += Y_ * mu_;
+}
+
+template <class Space, class S>
+void CoupledSolver<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target,
+                                    VectorX<S>& x, VectorX<S>* lambda) {
+  rows_ = target.head(rows_.size());
+  inner_->Solve(force, rows_, x, nullptr);
+  Couple(target, x);
+  if (lambda == nullptr) return;
+  force_.noalias() = G_.transpose() * mu_;
+  if (force.size() > 0) force_ += force;
+  inner_->Solve(force_, rows_, column_, &lambda_);
+  lambda->resize(lambda_.size() + mu_.size());
+  *lambda << lambda_, mu_;
+}
+
+template <class Space, class S>
+void CoupledSolver<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
+  rows_ = target.head(rows_.size());
+  inner_->Correct(rows_, x);
+  Couple(target, x);
+}
+
+template <class Space, class S>
+std::string CoupledSolver<Space, S>::WhySingular() const {
+  const std::string why = inner_->WhySingular();
+  if (!why.empty() || rank_ == static_cast<int>(order_.size())) return why;
+  std::string names;
+  for (std::size_t i = static_cast<std::size_t>(rank_); i < order_.size(); ++i) {
+    names += (names.empty() ? "\"" : ", \"") +
+             mechanism_.couplings()[static_cast<std::size_t>(order_[i])].name + '"';
+  }
+  return "coupling " + names + " depends on the other constraints";
+}
+
+#define LOOPBENCH_INSTANTIATE(Space, S) template class CoupledSolver<Space, S>;
+LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
+#undef LOOPBENCH_INSTANTIATE
+
+}  // namespace loopbench

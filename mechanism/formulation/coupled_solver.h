@@ -1,0 +1,66 @@
+// Couplings of joint coordinates (mechanism.h) with any solver of the joint constraints.
+//
+//   M x - J^T lambda - G^T mu = f,      J x = c,      G x = d
+//
+// G has a row per coupling. x0 is the inner solver's result for (f, c), and a column of Y its
+// result for a row of G as force, with c = 0. Then
+//
+//   x = x0 + Y mu,      X mu = d - G x0,      X = G Y
+//
+// X, symmetric and positive semidefinite, is the response of the mechanism to the couplings'
+// forces. It is scaled by FreeResponseOf() and factored by Cholesky with pivoting. Couplings whose
+// pivots are round-off depend on the other constraints: they carry no force. As published they end
+// the run as `singular`.
+//
+// Vectors of rows have those of the joints first, then a number per coupling; shorter ones mean
+// zeros. A position takes one solution of the inner solver per coupling.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mechanism/formulation/constraint_solver.h"
+#include "mechanism/formulation/options.h"
+#include "mechanism/loops/tree_dynamics.h"
+
+namespace loopbench {
+
+template <class Space, class S>
+class CoupledSolver final : public ConstraintSolver<Space, S> {
+ public:
+  /// `mechanism` must outlive the solver.
+  CoupledSolver(const Mechanism<Space, S>& mechanism,
+                std::unique_ptr<ConstraintSolver<Space, S>> inner, SolverKind kind);
+
+  Outcome Factor(const Kinematics<Space, S>& kinematics) override;
+  void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
+             VectorX<S>* lambda) override;
+  /// The inner solver's change, then the smallest in the metric M that satisfies the couplings.
+  void Correct(const VectorX<S>& target, VectorX<S>& x) override;
+  void Start(const Kinematics<Space, S>& kinematics) override { inner_->Start(kinematics); }
+  bool Review(const Kinematics<Space, S>& kinematics) override {
+    return inner_->Review(kinematics);
+  }
+  void AppendMode(std::vector<int>& mode) const override { inner_->AppendMode(mode); }
+  std::string WhySingular() const override;
+  std::vector<NamedCount> Counters() const override { return inner_->Counters(); }
+
+ private:
+  /// Factors the scaled X; returns its rank.
+  int FactorResponse();
+  /// Sets mu_, and adds Y mu to x = x0.
+  void Couple(const VectorX<S>& target, VectorX<S>& x);
+
+  const Mechanism<Space, S>& mechanism_;
+  std::unique_ptr<ConstraintSolver<Space, S>> inner_;
+  SolverKind kind_;
+  TreeDynamics<Space, S> dynamics_;
+  MatrixX<S> G_, Y_, X_;    ///< X_: scaled, then L by pivot order
+  VectorX<S> scale_;        ///< 1 / sqrt(FreeResponseOf())
+  std::vector<int> order_;  ///< couplings by pivot
+  int rank_ = 0;            ///< of X
+  VectorX<S> rows_, lambda_, force_, column_, mu_, left_;
+};
+
+}  // namespace loopbench

@@ -255,6 +255,7 @@ class MjcfWriter {
     for (const PointForce& force : model_.point_forces) AddPointForce(force);
     std::string bodies, world;
     for (const int index : children_[0]) AddBody(index, 2, bodies);
+    for (const Coupling& coupling : model_.couplings) AddCoupling(coupling);
     for (const std::string& site : sites_[0]) world += "    " + site;
     const double h = options_.time_step;
     const std::string closures = Attribute("solref", std::array{2.0 * h, 1.0}) +
@@ -269,7 +270,8 @@ class MjcfWriter {
         " integrator=\"RK4\" solver=\"Newton\" cone=\"elliptic\" jacobian=\"auto\" "
         "tolerance=\"1e-15\">\n    <flag contact=\"disable\" warmstart=\"disable\"/>\n  "
         "</option>\n" +
-        fmt::format("  <size njmax=\"{}\" nconmax=\"1\"/>\n", 12 * (made_.closures.size() + 1)) +
+        fmt::format("  <size njmax=\"{}\" nconmax=\"1\"/>\n",
+                    12 * (made_.closures.size() + 1) + model_.couplings.size()) +
         Section("default", "    <equality" + closures + "/>\n" + shapes) +
         Section("worldbody", world + bodies) + Section("tendon", tendons_) +
         Section("equality", equalities_) + Section("actuator", actuators_) +
@@ -358,7 +360,33 @@ class MjcfWriter {
       text += AddEfforts(index, name) + "/>\n";
       AddCoordinate(joint, chain, part);
     }
+    if (alone) alone_[index] = names.front();
     SayParts(joint, names);
+  }
+
+  /// Names of joints are known. MuJoCo counts coordinates from the start (`ref`), where it holds.
+  void AddCoupling(const Coupling& coupling) {
+    const std::string name =
+        Renamed("coupling", coupling.name, closure_names_.Take(XmlText(coupling.name)));
+    const auto ratio_of = [&](std::size_t i) {
+      const auto& [index, ratio] = coupling.parts[i];
+      return model_.tree[index].from_is_child ? -ratio : ratio;
+    };
+    if (coupling.parts.size() == 2) {
+      const std::array polynomial = {0.0, -ratio_of(1) / ratio_of(0), 0.0, 0.0, 0.0};
+      equalities_ += "    <joint" + Named("name", name) +
+                     Named("joint1", alone_.at(coupling.parts[0].first)) +
+                     Named("joint2", alone_.at(coupling.parts[1].first)) +
+                     Attribute("polycoef", polynomial) + "/>\n";
+      return;
+    }
+    tendons_ += "    <fixed" + Named("name", name) + " limited=\"false\">\n";
+    for (std::size_t i = 0; i < coupling.parts.size(); ++i) {
+      tendons_ += "      <joint" + Named("joint", alone_.at(coupling.parts[i].first)) +
+                  Attribute("coef", ratio_of(i)) + "/>\n";
+    }
+    tendons_ += "    </fixed>\n";
+    equalities_ += "    <tendon" + Named("name", name) + Named("tendon1", name) + "/>\n";
   }
 
   /// Returns springs and dampers of a tree joint as attributes; adds constants as actuator `name`.
@@ -431,7 +459,7 @@ class MjcfWriter {
 
   void AddNotes() {
     if (model_.planar) Say(kPlaneNote);
-    if (made_.closures.empty()) return;
+    if (made_.closures.empty() && model_.couplings.empty()) return;
     made_.notes.push_back(
         {true,
          fmt::format("MuJoCo's closures are soft: springs and dampers with a time constant of "
@@ -531,6 +559,7 @@ class MjcfWriter {
   std::vector<std::vector<int>> children_;                ///< tree joints below each body
   std::vector<std::vector<std::string>> sites_, shapes_;  ///< by body
   std::vector<std::string> body_names_;
+  std::map<int, std::string> alone_;  ///< MuJoCo joint of a tree joint with one coordinate
   UniqueNames site_names_, joint_names_, closure_names_;
   std::string tendons_, equalities_, actuators_;
   std::vector<double> qpos_, qvel_;

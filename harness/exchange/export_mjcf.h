@@ -2,8 +2,9 @@
 //
 // MuJoCo's body frame is the user's body frame. Tree joints become chains of slides, hinges and
 // balls of one body. Cut joints become equality constraints: coincident points (`connect`), or
-// points at a distance (a tendon). Constant efforts, point forces and preloads become actuators
-// without control (`biasprm`). Springs and dampers are MuJoCo's own.
+// points at a distance (a tendon). Couplings become constraints of two joints, or of a fixed
+// tendon. Constant efforts, point forces and preloads become actuators without control (`biasprm`).
+// Springs and dampers are MuJoCo's own.
 //
 // MuJoCo's closures are soft: a spring and damper (`solref`) hold each. Its forces leave a share 1
 // - `solimp` of the acceleration unopposed, and the acceleration term J' u is neglected. Closures

@@ -351,6 +351,7 @@ const Fields<Sidecar>& SidecarFields() {
        {"gravity", By(VectorSchema(), ReadGravityOfSidecar), "In place of the file's [m/s^2]."},
        {"loops", By(ArraySchema(LoopFields().Schema()), ReadLoops), "Joints given on one side."},
        {"joints", JointsValue(), "Joints given on both sides."},
+       {"couplings", CouplingsValue(), "Linear relations of joint coordinates."},
        {"forces", ForcesValue(), "Besides gravity."},
        {"initial", Section(InitialFields()), "In place of the file's start."},
        {"known_solution", Section(ObservationFields()),

@@ -366,6 +366,12 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
          true);
     return true;
   });
+  std::erase_if(description.couplings, [&](const CouplingDescription& coupling) {
+    const auto is_part = [&](const auto& part) { return is_in_chain(part.joint); };
+    if (std::ranges::none_of(coupling.parts, is_part)) return false;
+    Note(element, fmt::format("coupling \"{}\" {}", coupling.name, kNotCoupled), true);
+    return true;
+  });
   InitialDescription& initial = description.initial;
   std::size_t coordinates_given = 0, speeds_given = 0;
   const std::vector<double> q = TakeValues(chain, &initial.coordinates, &coordinates_given),

@@ -166,6 +166,26 @@ void ImportDraft::AddSpringAndDamper(double stiffness, double rest, double dampi
   if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
 }
 
+void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name, int follower,
+                              CouplingDescription::Part leader, double offset) {
+  const auto has_coordinate = [&](int joint) {
+    return NumValues(description.joints[joint].type, SpaceKind::kSpatial, false) == 1;
+  };
+  if (follower == leader.joint) {
+    element.Fail("a joint that follows itself", "another joint");
+  }
+  if (!has_coordinate(follower) || !has_coordinate(leader.joint)) {
+    Note(element, kNotCoupled, true);
+    return;
+  }
+  if (leader.ratio == 0.0) {
+    description.joints[follower].motions = {{0, Polynomial{{offset}}}};
+    return;
+  }
+  leader.ratio = -leader.ratio;
+  description.couplings.push_back({joints_.Take(name), {{follower, 1.0}, leader}, offset});
+}
+
 void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
   description.gravity = {0.0, 0.0, -gravity};
   assumed_gravity_ = element;

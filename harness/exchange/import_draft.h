@@ -98,6 +98,9 @@ struct DroppedReason {
 inline constexpr const char* kDryFriction = "dry friction is no force of mechanism files";
 /// Reason why springs, dampers and efforts of a joint with several coordinates are dropped.
 inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
+inline constexpr const char* kNotCoupled =
+    "dropped: only joints with one coordinate follow others: this is a freedom more than in the "
+    "file";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
 /// Returns the entry that a value names; if there is none, rejects the value with `expected`.
@@ -179,6 +182,10 @@ class ImportDraft {
   void Fix(int parent, const Placement& X, int body, const char* ending);
   /// Adds spring and damper of the joint that was added last, where they are not 0.
   void AddSpringAndDamper(double stiffness, double rest, double damping);
+  /// Adds the coupling q_follower = ratio q_leader + offset; a motion for the ratio 0. Dropped with
+  /// a note unless both joints have one coordinate.
+  void AddCoupling(const XmlElement& element, const std::string& name, int follower,
+                   CouplingDescription::Part leader, double offset);
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
   /// Calls `read` at the end, unless the body is fixed to the ground: its mass then has no effect.
@@ -241,7 +248,7 @@ class ImportDraft {
   const ImportOptions& options_;
   std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;
-  exchange::UniqueNames joints_;
+  exchange::UniqueNames joints_;                            ///< and couplings
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names
   std::vector<ImportNote> notes_;
   std::size_t rounded_ = 0, rounded_note_ = 0;  ///< number of rounded values; note of the first

@@ -91,24 +91,41 @@ void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   AddLoopJoint(equality, JointType::kWeld, *ends, model->draft);
 }
 
-/// Returns the constant coefficient of `polycoef`.
-double OffsetOf(const MjcfElement& equality) {
-  const auto coefficients = equality.Attribute("polycoef");
-  return coefficients ? coefficients->Numbers(1, 5)[0] : 0.0;
+/// Returns the coefficients of `polycoef`; missing ones have their defaults.
+std::vector<double> PolynomialOf(const MjcfElement& equality) {
+  std::vector<double> a = {0.0, 1.0, 0.0, 0.0, 0.0};
+  if (const auto given = equality.Attribute("polycoef")) {
+    std::ranges::copy(given->Numbers(1, 5), a.begin());
+  }
+  return a;
 }
 
-/// Holds a joint of one coordinate at a constant. Returns false for a coupling of two (dropped).
-bool AddConstantJoint(const MjcfElement& equality, MjcfModel* model) {
+/// Couples two joints, or holds one at a constant. Returns false if it is dropped.
+///
+/// MuJoCo: q1 - q1_0 = a_0 + a_1 (q2 - q2_0) + ..., with q_0 the coordinates in the drawn position,
+/// where those of Loopbench are 0.
+bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
   const MjcfJoint& joint = model->JointNamed(equality.Required("joint1", "the name of a joint"));
-  const double offset = OffsetOf(equality);
-  if (equality.Attribute("joint2") || !joint.has_coordinate()) {
-    model->draft->Note(equality.own(),
-                       "dropped: no joint follows another: this is a freedom more than in the file",
+  const std::vector<double> a = PolynomialOf(equality);
+  const auto other = equality.Attribute("joint2");
+  const MjcfJoint* leader = other ? &model->JointNamed(*other) : nullptr;
+  if (!joint.has_coordinate() || (leader != nullptr && !leader->has_coordinate())) {
+    model->draft->Note(equality.own(), kNotCoupled, true);
+    return false;
+  }
+  if (leader != nullptr && (a[2] != 0.0 || a[3] != 0.0 || a[4] != 0.0)) {
+    model->draft->Note(equality.own(), "polycoef",
+                       "dropped: couplings are linear: this is a freedom more than in the file",
                        true);
     return false;
   }
-  // MuJoCo: q1 - q1_0 = a_0, with q1_0 the coordinate in the drawn position
-  model->draft->description.joints[joint.joint].motions = {{0, Polynomial{{offset}}}};
+  if (leader == nullptr) {
+    model->draft->description.joints[joint.joint].motions = {{0, Polynomial{{a[0]}}}};
+    return true;
+  }
+  const auto name = equality.own().Attribute("name");
+  model->draft->AddCoupling(equality.own(), name ? name->Name() : "equality", joint.joint,
+                            {leader->joint, a[1]}, a[0]);
   return true;
 }
 
@@ -125,7 +142,7 @@ void ReadEquality(const XmlElement& root, MjcfModel* model) {
     bool is_exact = tag == "connect" || tag == "weld";
     if (tag == "connect") AddConnect(equality, model);
     if (tag == "weld") AddWeld(equality, model);
-    if (tag == "joint") is_exact = AddConstantJoint(equality, model);
+    if (tag == "joint") is_exact = AddJointEquality(equality, model);
     if (is_exact) {
       model->draft->Note(element, "imposed exactly here; MuJoCo lets it give way");
     } else if (tag != "joint" && tag != "tendon") {
@@ -202,7 +219,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
   equality.own().Attribute("name");  // the rod has the name of the tendon
-  const double length = LengthOf(*ends, model->draft->at_rest) + OffsetOf(equality);
+  const double length = LengthOf(*ends, model->draft->at_rest) + PolynomialOf(equality)[0];
   if (!(length > 0.0)) element.Fail("a length that is not > 0", "one that is");
   ImportDraft* draft = model->draft;
   const auto& [a, b] = *ends;

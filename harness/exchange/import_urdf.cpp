@@ -1,6 +1,8 @@
 // URDF (wiki.ros.org/urdf/XML): a tree of links, each in the frame of the joint that leads to it.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "harness/exchange/import_draft.h"
 
 namespace loopbench::harness {
@@ -14,7 +16,6 @@ constexpr DroppedReason kUrdfReasons[] = {
     {"collision", "there is no contact"},
     {"mujoco", "it is for another program"},
     {"limit", kNoEnds, true},
-    {"mimic", "no joint follows another: this is a freedom more than in the file", true},
     {"safety_controller", "there is no controller"},
     {"calibration", "it says where a sensor's zero is"},
     {"transmission", "there are no actuators"},
@@ -148,6 +149,20 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
   }
 }
 
+/// <mimic>: q = multiplier q_leader + offset.
+void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
+  const auto mimic = read.element.Child("mimic");
+  if (!mimic) return;
+  const std::string leader = mimic->Required("joint", "the name of a joint").Name();
+  const double multiplier = NumberOr(mimic->Attribute("multiplier"), 1.0);
+  const double offset = NumberOr(mimic->Attribute("offset"), 0.0);
+  const auto& joints = draft->description.joints;
+  const auto found = std::ranges::find(joints, leader, &JointDescription::name);
+  if (found == joints.end()) mimic->Fail('"' + leader + '"', "the name of a joint in this file");
+  draft->AddCoupling(*mimic, read.element.RequiredName() + " mimic", follower,
+                     {static_cast<int>(found - joints.begin()), multiplier}, offset);
+}
+
 }  // namespace
 
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft) {
@@ -165,7 +180,9 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   }
   const std::vector<UrdfJoint> joints = ReadJoints(root, has_world, draft);
   const int base = PlaceLinks(joints, root, has_world, draft);
+  const int first = draft->last_joint() + 1;
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
+  for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);
   draft->AssumeGravity(root, kGravity);
   if (base != kGround && !options.floats) {
     draft->Fix(kGround, {}, base, " to ground");

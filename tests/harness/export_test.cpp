@@ -101,6 +101,24 @@ TEST(Export, NamesAllThatAFormatDoesNotHave) {
   EXPECT_EQ(Missing(mechanism, simbody), expected);
 }
 
+TEST(Export, CouplingsAreConstraintsOfMjcf) {
+  MechanismDescription mechanism = Shipped("geared-five-bar");
+  const ExportFormat &mjcf = ExportFormats().front(), &simbody = ExportFormats().back();
+  // 40 A + 20 E is constant, and coordinates are counted from the start
+  EXPECT_NE(exchange::Export(mechanism, mjcf)
+                .text.find("<joint name=\"gears\" joint1=\"A\" joint2=\"E\" polycoef=\"0.0 -0.5 "
+                           "0.0 0.0 0.0\"/>"),
+            std::string::npos);
+  EXPECT_EQ(Missing(mechanism, simbody), std::vector<std::string>{"coupling \"gears\""});
+  mechanism.couplings[0].parts.push_back({3, 5.0});
+  const std::string three = exchange::Export(mechanism, mjcf).text;
+  EXPECT_NE(three.find("<joint joint=\"D\" coef=\"5.0\"/>"), std::string::npos);
+  EXPECT_NE(three.find("<tendon name=\"gears\" tendon1=\"gears\"/>"), std::string::npos);
+  mechanism.couplings[0].parts[2].joint = 4;
+  EXPECT_EQ(Missing(mechanism, mjcf),
+            std::vector<std::string>{"coupling \"gears\" of joint \"C\", which closes a loop"});
+}
+
 TEST(Export, NamesBodiesThatOtherProgramsRefuse) {
   MechanismDescription mechanism = Shipped("spatial-four-bar");
   mechanism.bodies[1].inertia = Eigen::Vector3d(1.0, 1.0, 3.0).asDiagonal();

@@ -32,8 +32,6 @@ TEST(ImportMjcf, EqualitiesCloseLoopsWhereTheFileDrawsThem) {
 
   const Imported held = Two("<equality><joint joint1=\"j\" polycoef=\"0.5 0 0 0 0\"/></equality>");
   EXPECT_EQ(std::get<Polynomial>(held.description.joints[0].motions[0].value).coefficients[0], 0.5);
-  const Imported coupled = Two("<equality><joint joint1=\"j\" joint2=\"k\"/></equality>");
-  ExpectNote(coupled, "<joint>", "a freedom more");
   const Imported off = Two("<equality><weld body1=\"a\" active=\"false\"/></equality>");
   ExpectNote(off, "<weld>", "not active");
   EXPECT_EQ(off.description.joints.size(), 2u);
@@ -101,8 +99,32 @@ TEST(ImportMjcf, TendonsBetweenTwoSitesAreSpringsOrRods) {
 TEST(ImportMjcf, CoordinatesThatStayAreImposedExactlyToo) {
   const Imported held = Two("<equality><joint name=\"e\" joint1=\"j\"/></equality>");
   ExpectNote(held, "<joint name=\"e\">", "imposed exactly");
-  const Imported coupled = Two("<equality><joint joint1=\"j\" joint2=\"k\"/></equality>");
-  EXPECT_FALSE(HasNote(coupled, "<joint>", "imposed exactly"));
+}
+
+TEST(ImportMjcf, CoupledJointsAreLinear) {
+  const auto model = [](const std::string& attributes) {
+    return Two("<equality><joint joint1=\"j\" joint2=\"k\" " + attributes + "/></equality>");
+  };
+  const Imported given = model("name=\"e\" polycoef=\"0.1 -2 0 0 0\"");
+  ASSERT_EQ(given.description.couplings.size(), 1u);
+  const CouplingDescription& coupling = given.description.couplings[0];
+  EXPECT_EQ(coupling.name, "e");
+  EXPECT_EQ(given.description.joints[coupling.parts[0].joint].name, "j");
+  EXPECT_EQ(given.description.joints[coupling.parts[1].joint].name, "k");
+  EXPECT_EQ(coupling.parts[0].ratio, 1.0);
+  EXPECT_EQ(coupling.parts[1].ratio, 2.0);
+  EXPECT_EQ(coupling.offset, 0.1);
+  ExpectNote(given, "<joint name=\"e\">", "imposed exactly");
+  // the default of MuJoCo: both alike
+  EXPECT_EQ(model("").description.couplings.at(0).parts[1].ratio, -1.0);
+  EXPECT_EQ(model("polycoef=\"0.5\"").description.couplings.at(0).parts[1].ratio, -1.0);
+  const Imported constant = model("polycoef=\"0.5 0\"");
+  EXPECT_EQ(constant.description.couplings.size(), 0u);
+  EXPECT_EQ(constant.description.joints[0].motions.size(), 1u);
+  const Imported square = model("polycoef=\"0 1 0.1\"");
+  ExpectNote(square, "<joint> polycoef", "a freedom more");
+  EXPECT_EQ(square.description.couplings.size(), 0u);
+  EXPECT_FALSE(HasNote(square, "<joint>", "imposed exactly"));
 }
 
 TEST(ImportMjcf, EqualitiesThatAreSwitchedOffSaySo) {

@@ -164,6 +164,32 @@ TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
   EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].damping, 0.5);
 }
 
+TEST(ImportUrdf, MimicsAreCouplings) {
+  const auto robot = [](const std::string& mimic) {
+    // the leader may follow in the file
+    return Robot(Link("world", "") + Link("a") + Link("b") +
+                 Joint("k", "prismatic", "world", "a", mimic) +
+                 Joint("j", "continuous", "world", "b"));
+  };
+  const Imported imported =
+      ImportText(robot("<mimic joint=\"j\" multiplier=\"0.25\" offset=\"0.1\"/>"), "file.urdf");
+  ASSERT_EQ(imported.description.couplings.size(), 1u);
+  const CouplingDescription& coupling = imported.description.couplings[0];
+  EXPECT_EQ(imported.description.joints[coupling.parts[0].joint].name, "k");
+  EXPECT_EQ(imported.description.joints[coupling.parts[1].joint].name, "j");
+  EXPECT_EQ(coupling.parts[0].ratio, 1.0);
+  EXPECT_EQ(coupling.parts[1].ratio, -0.25);
+  EXPECT_EQ(coupling.offset, 0.1);
+  EXPECT_FALSE(HasNote(imported, "<mimic>", ""));
+  EXPECT_EQ(ImportText(robot("<mimic joint=\"j\"/>"), "file.urdf")
+                .description.couplings[0]
+                .parts[1]
+                .ratio,
+            -1.0);
+  ExpectRefusal(robot("<mimic joint=\"z\"/>"), {"<mimic>: found \"z\"", "a joint in this file"});
+  ExpectRefusal(robot("<mimic joint=\"k\"/>"), {"<mimic>: found a joint that follows itself"});
+}
+
 TEST(ImportUrdf, WhatIsNoTreeIsRefusedWithItsLine) {
   const std::string a = Link("a") + "\n", b = Link("b") + "\n", c = Link("c") + "\n";
   ExpectRefusal(Robot(a + a), {"file.xml:3: <link name=\"a\">", "line 2 has it"});

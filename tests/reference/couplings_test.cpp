@@ -1,0 +1,162 @@
+// Couplings over whole runs: energy, turns without end, drift by level.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include "mechanism/description/in_space.h"
+#include "mechanism/description/library.h"
+#include "tests/reference/cases.h"
+#include "tests/reference/simulate.h"
+
+namespace loopbench::harness::reference {
+namespace couplings_test {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+MechanismDescription GearedFiveBar() {
+  return ReadMechanism(kConfigs / "mechanisms/geared-five-bar.json").description;
+}
+
+double AngleOf(const BodyState& body) { return std::atan2(body.R(1, 0), body.R(0, 0)); }
+
+TEST(Couplings, ConserveEnergyFor100Seconds) {
+  const MechanismDescription description = GearedFiveBar();
+  const int left = BodyNamed(description, "left-crank"),
+            right = BodyNamed(description, "right-crank");
+  for (const Method& method : PositionMethods()) {
+    double worst = 0.0, size = 0.0;
+    const Simulation run = Simulate(
+        description, method, Options("dormand-prince", 1e-9), 100.0, [&](const Snapshot& at) {
+          const double open =
+              std::remainder(2 * AngleOf(at.bodies[left]) + AngleOf(at.bodies[right]), kTurn);
+          worst = std::max(worst, std::abs(open));
+          size = std::max(size, at.kinetic);
+        });
+    ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(method) << run.result.message;
+    EXPECT_LE(run.energy_error, 1e-6 * size) << ToString(method);
+    // angles of about 600 rad are round to 1e-13, of which the relation takes some
+    EXPECT_LE(worst, 2e-12) << ToString(method);
+    std::cout << ToString(method) << ": energy " << run.energy_error << " J of " << size
+              << ", coupling " << worst << " rad\n";
+  }
+}
+
+/// A disc turns a smaller one 20 times as fast, and rolls along a rack, which counts its turns.
+MechanismDescription GearsAndRack() {
+  MechanismDescription d;
+  d.name = "gears-and-rack";
+  for (const auto& [name, mass, inertia] :
+       {std::tuple{"slow", 3.0, 0.4}, {"fast", 1.0, 0.001}, {"rack", 2.0, 0.1}}) {
+    BodyDescription body;
+    body.name = name;
+    body.mass = mass;
+    body.inertia = inertia * Eigen::Matrix3d::Identity();
+    d.bodies.push_back(body);
+  }
+  d.joints.push_back(Revolute("slow", 0, {0.0, 0.0, 0.0}, 1, Eigen::Vector3d::Zero()));
+  d.joints.push_back(Revolute("fast", 0, {0.6, 0.1, 0.0}, 2, Eigen::Vector3d::Zero()));
+  JointDescription slide;
+  slide.name = "rack";
+  slide.type = JointType::kPrismatic;
+  slide.to.body = 3;
+  d.joints.push_back(slide);
+  d.couplings.push_back({"mesh", {{0, 20.0}, {1, 1.0}}, 0.0});
+  d.couplings.push_back({"rack", {{2, 1.0}, {0, -0.05}}, 0.0});
+  d.initial.coordinates.push_back({0, {3.0}});  // near the end of a measured turn
+  d.initial.held.push_back(0);
+  d.initial.speeds.push_back({0, {kTurn}});
+  return d;
+}
+
+TEST(Couplings, TurnWithoutEndInAbsoluteCoordinatesOfSpace) {
+  const MechanismDescription description = InSpace(GearsAndRack(), {0.3, -0.2, 0.9});
+  constexpr double kTurns = 10.0;  // one in a second
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(Eigen::Vector3d(0.3, -0.2, 0.9).norm(),
+                                              Eigen::Vector3d(0.3, -0.2, 0.9).normalized())
+                                .toRotationMatrix();
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity,
+                                    Enforcement::kPosition, Enforcement::kBaumgarte}) {
+      const Method method{.formulation = formulation,
+                          .enforcement = level,
+                          .coordinates = Coordinates::kAbsolute,
+                          .solver = SolverKind::kRankRevealing};
+      const Simulation run = Simulate(description, method, Options("dormand-prince", 1e-7), kTurns);
+      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(method);
+      const auto angle = [&](int body) {
+        const Eigen::Matrix3d turned = R.transpose() * run.last.bodies[body].R;
+        return std::atan2(turned(1, 0), turned(0, 0));
+      };
+      const double s = (R.transpose() * run.last.bodies[3].p).x(),
+                   turns = (s - 0.15) / (kTurn * 0.05);
+      const double rack = std::remainder(s / 0.05 - angle(1), kTurn);
+      const double mesh = std::remainder(20 * angle(1) + angle(2), kTurn);
+      std::cout << ToString(method) << ": turns " << turns << ", rack " << rack << " rad, mesh "
+                << mesh << " rad\n";
+      EXPECT_NEAR(turns, kTurns, 1e-3) << ToString(method);
+      // 200 turns of the small disc: 1260 rad, round to 2e-13
+      const double most = level == Enforcement::kPosition ? 1e-10 : 2e-2;
+      EXPECT_NEAR(rack, 0.0, most) << ToString(method);
+      EXPECT_NEAR(mesh, 0.0, most) << ToString(method);
+    }
+  }
+}
+
+/// A slider-crank whose slider drives a pinion. The slide closes the loop: its shift is measured.
+MechanismFile SliderWithPinion() {
+  MechanismDescription d;
+  d.name = "slider-with-pinion";
+  d.bodies.push_back(Bar("crank", 0.1, 1.0, 0.001));
+  d.bodies.push_back(Bar("rod", 0.3, 0.5, 0.004));
+  BodyDescription body = Bar("slider", 0.1, 0.4, 0.001);
+  d.bodies.push_back(body);
+  body = Bar("pinion", 0.1, 0.3, 0.0002);
+  body.com.setZero();
+  d.bodies.push_back(body);
+  d.joints.push_back(Revolute("A", 0, {0, 0, 0}, 1, {0, 0, 0}));
+  d.joints.push_back(Revolute("B", 1, {0.1, 0, 0}, 2, {0, 0, 0}));
+  d.joints.push_back(Revolute("C", 2, {0.3, 0, 0}, 3, {0, 0, 0}));
+  d.joints.push_back(Revolute("P", 0, {0.3, -0.05, 0}, 4, {0, 0, 0}));
+  JointDescription slide;
+  slide.name = "slide";
+  slide.type = JointType::kPrismatic;
+  slide.to.body = 3;
+  slide.cut = true;
+  d.joints.push_back(slide);
+  d.couplings.push_back({"rack", {{4, 1.0}, {3, -0.05}}, 0.3});
+  d.initial.coordinates = {{0, {1.0}}, {1, {-1.3}}, {2, {0.3}}};
+  d.initial.held = {0};
+  d.initial.speeds = {{0, {10.0}}};
+  MechanismFile file;
+  file.description = d;
+  return file;
+}
+
+TEST(Couplings, DriftAsOtherConstraintsDo) {
+  const auto drift = [](const std::string& formulation, Enforcement level, double horizon) {
+    const Method method{.formulation = formulation,
+                        .enforcement = level,
+                        .coordinates = Coordinates::kJoint,
+                        .solver = SolverKind::kRankRevealing};
+    const Record record = RunFile(SliderWithPinion(), method, 1e-8, horizon);
+    EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+    return record.Number("drift.loop.rack");
+  };
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    const double square = drift(formulation, Enforcement::kAcceleration, 40.0) /
+                          drift(formulation, Enforcement::kAcceleration, 10.0),
+                 linear = drift(formulation, Enforcement::kVelocity, 40.0) /
+                          drift(formulation, Enforcement::kVelocity, 10.0),
+                 none = drift(formulation, Enforcement::kPosition, 40.0);
+    std::cout << formulation << ": " << square << " " << linear << " " << none << " m\n";
+    // 4^p over the quadruple time
+    EXPECT_NEAR(std::log(square) / std::log(4.0), 2.0, 0.3);
+    EXPECT_NEAR(std::log(linear) / std::log(4.0), 1.0, 0.5);
+    EXPECT_LE(none, 1e-14);
+  }
+}
+
+}  // namespace couplings_test
+}  // namespace loopbench::harness::reference

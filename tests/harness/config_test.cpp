@@ -55,6 +55,7 @@ TEST(ShippedMechanisms, HoldAsManyJointsAsTheyHaveDegreesOfFreedom) {
     const auto bodies = static_cast<int>(mechanism.bodies.size()) - 1;
     int freedom = 3 * bodies - 2 * static_cast<int>(mechanism.joints.size());
     for (const auto& joint : mechanism.joints) freedom -= static_cast<int>(joint.motions.size());
+    freedom -= static_cast<int>(mechanism.couplings.size());
     EXPECT_EQ(static_cast<int>(mechanism.initial.held.size()), freedom) << file;
     // One name for joint coordinates and one for absolute ones; without any they are chosen.
     if (mechanism.independent.empty()) continue;

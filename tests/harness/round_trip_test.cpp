@@ -85,7 +85,7 @@ TEST(RoundTrip, ThroughMjcfKeepsAccelerations) {
     }
     ++compared;
   }
-  EXPECT_EQ(compared, 34);
+  EXPECT_EQ(compared, 35);
 }
 
 }  // namespace round_trip_test

@@ -1,6 +1,5 @@
-// The program loopbench with a joint, a force, a level of enforcement, an observer and an
-// integrator more: their names are valid in every file that it reads, and stand in what it says and
-// writes.
+// The program loopbench with an additional joint, force, level of enforcement, observer and
+// integrator. Their names are valid in all files that it reads and appear in all its output.
 //
 //   loopbench_parts explain mechanism.json
 //   loopbench_parts run experiment.json --out run

@@ -143,7 +143,7 @@ struct Profile {
 /// Returns the profile of that name, or nullptr. References stay valid.
 const Profile* FindProfile(std::string_view name);
 
-/// Returns all profiles: those of the table above, ARKODE's tables, user-defined tables.
+/// Returns all profiles: the table above, ARKODE's tables, user-defined tables.
 const std::deque<Profile>& Profiles();
 std::vector<std::string> IntegratorNames();
 

@@ -327,7 +327,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   if (forces && !is_constant) {
     model->draft->Drop(element, "forcerange", "springs and dampers have no largest effort");
   }
-  // the coordinate of MuJoCo is that of Loopbench plus the reference
+  // MuJoCo's coordinate is Loopbench's plus the reference
   return Effort{.joint = model->joint_names.at(name->text()),
                 .constant = ratio * constant + square * force[1] * joint.reference,
                 .stiffness = -square * force[1],

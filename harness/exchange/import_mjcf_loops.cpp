@@ -102,8 +102,8 @@ std::vector<double> PolynomialOf(const MjcfElement& equality) {
 
 /// Couples two joints, or holds one at a constant. Returns false if it is dropped.
 ///
-/// MuJoCo: q1 - q1_0 = a_0 + a_1 (q2 - q2_0) + ..., with q_0 the coordinates in the drawn position,
-/// where those of Loopbench are 0.
+/// MuJoCo: q1 - q1_0 = a_0 + a_1 (q2 - q2_0) + ..., with q_0 the coordinates in the drawn position.
+/// Loopbench's coordinates are 0 there.
 bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
   const MjcfJoint& joint = model->JointNamed(equality.Required("joint1", "the name of a joint"));
   const std::vector<double> a = PolynomialOf(equality);

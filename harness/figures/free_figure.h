@@ -50,8 +50,8 @@ void RequireKeys(const FreeFigure& wanted, std::span<const Record> records);
 /// two of them share one. A failed run is a cross at its value, or at the lower edge if it has
 /// none; it is never left out. Only records of the kinds with a y value take part.
 ///
-/// @throws ConfigError if a key is in no record, y is not numeric, no record has both values, a
-/// logarithmic axis is requested and no value is positive, or a label has no axis or curve.
+/// @throws ConfigError if a key is in no record, y is not numeric, no record has both values, or no
+/// value of a logarithmic axis is positive. Labels without an axis or curve are errors, too.
 FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted);
 
 // Selection of distinguishable records if there are more records than points in a picture.

@@ -104,8 +104,8 @@ ControllerPtr SetControl(void* memory, bool implicit, SUNContext context, const 
 /// not depend on them, so the matrix is block triangular. Only the leading block is factored; its
 /// solution does not depend on the quadratures in any bit.
 ///
-/// The matrix is that of the first implicit stage of a step. A step that may shrink is shortened
-/// where this is not enough. At a fixed step the Jacobian is renewed at the iterate whenever a
+/// The matrix belongs to the first implicit stage of a step. If this is not enough, a step that may
+/// shrink is shortened. At a fixed step the Jacobian is renewed at the iterate whenever a
 /// correction is more than half of the one before.
 class Newton {
  public:

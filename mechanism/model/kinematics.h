@@ -157,7 +157,7 @@ class Kinematics {
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
-  /// Counts the turns of measured angles anew: couplings hold here. After AcceptStep() at a start.
+  /// Sets the turns of measured angles so that couplings hold. Call after AcceptStep() at a start.
   void CountTurns();
   /// Continues angles from where `other` does.
   void CountTurnsLike(const Kinematics& other);

@@ -97,8 +97,8 @@ class Mechanism {
   int num_q() const { return num_q_; }
   int num_u() const { return num_u_; }
   int num_rows() const { return num_rows_; }  ///< scalar constraints of all cut joints
-  /// Scalar constraints: those of joints, then a coupling each. Solvers know the former only
-  /// (coupled_solver.h).
+  /// Scalar constraints of joints, then one per coupling. Solvers impose the constraints of joints
+  /// only (coupled_solver.h).
   int num_equations() const { return num_rows_ + static_cast<int>(couplings_.size()); }
   /// Independent loops of the user's graph, the same number in both coordinate sets.
   int num_loops() const { return num_loops_; }

@@ -1,4 +1,4 @@
-// Butcher tables: ARKODE's, those of files and of programs, and their order conditions.
+// Butcher tables of ARKODE, of files and of programs, and their order conditions.
 #include "harness/config/butcher_table.h"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ TEST(ArkodeTables, HaveTheOrdersOfTheirNamesAndNoFault) {
   }
 }
 
-/// The same coefficients satisfy no condition of the next order: published orders are exact.
+/// Published orders are the largest: each table violates a condition of the next order.
 TEST(OrderConditions, RejectOneOrderMoreThanEveryTableHas) {
   for (ButcherTable table : ArkodeTables()) {
     const std::string order = std::to_string(table.order);

@@ -174,7 +174,7 @@ TEST(ImportMerge, LinksWithoutMassAtTheEndAreFixed) {
   ASSERT_EQ(imported.description.joints.size(), 1u);
   ExpectNote(imported, "<link name=\"tool\">", "without mass at the end of a chain");
   ExpectNote(imported, "<link name=\"wrist\">", "joint \"w\" dropped");
-  // with mass behind it, or on the ground, a link without mass is refused
+  // a link without mass is rejected if it carries mass or hangs on the ground
   ExpectRefusal(Arm(Link("wrist") + Link("tool", Inertial(1, "1 1 1")) + Link("palm") +
                     Joint("w", "continuous", "arm", "wrist", "0 0 -1") +
                     Joint("p", "continuous", "wrist", "palm", "0.1 0 0") +

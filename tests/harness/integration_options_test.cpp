@@ -35,7 +35,7 @@ Record RunFirst(const Experiment& experiment) {
   return record;
 }
 
-/// Of the state of a mechanism at its start.
+/// Returns the absolute tolerances of the components of a mechanism's state.
 std::vector<double> Atols(const Experiment& experiment) {
   const Case one = Expand(experiment).front();
   const MechanismDescription& description = experiment.problems[0].mechanism.description;

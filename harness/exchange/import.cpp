@@ -191,6 +191,13 @@ void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
          fmt::format("joint \"{}\" dropped: it leads from a body to what is fixed to it",
                      joint.name));
   }
+  for (const CouplingDescription& coupling : description.couplings) {
+    const auto lost = std::ranges::find_if(
+        coupling.parts, [&](const auto& part) { return renumbering.joints[part.joint] < 0; });
+    if (lost == coupling.parts.end()) continue;
+    const int body = description.joints[lost->joint].to.body;
+    Note(elements_[body], fmt::format("coupling \"{}\" dropped with its joint", coupling.name));
+  }
   description = std::move(merged_description);
   for (std::size_t i = 0; i < attachments.size(); ++i) {
     const int kept = renumbering.bodies[i];  // never above i
@@ -199,6 +206,19 @@ void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
     elements_[kept] = elements_[i];
   }
   at_rest.resize(description.bodies.size());
+}
+
+/// A joint that follows one other joint has no effect on it. With a motion, or with several others,
+/// it moves them.
+bool ImportDraft::CouplesOthers(int joint) const {
+  std::size_t others = description.joints[joint].motions.size();
+  bool is_coupled = false;
+  for (const CouplingDescription& coupling : description.couplings) {
+    if (std::ranges::count(coupling.parts, joint, &CouplingDescription::Part::joint) == 0) continue;
+    is_coupled = true;
+    others += coupling.parts.size() - 1;
+  }
+  return is_coupled && others > 1;
 }
 
 void ImportDraft::FixMasslessEnds() {
@@ -223,6 +243,7 @@ void ImportDraft::FixMasslessEnds() {
       const JointDescription& joint = description.joints[joints[i][0]];
       const int carrier = joint.from.body == body ? joint.to.body : joint.from.body;
       if (carrier == kGround || attachments[carrier].attached) continue;
+      if (CouplesOthers(joints[i][0])) continue;
       attachments[i] = {.carrier = carrier,
                         .X = (at_rest[carrier].Inverse() * at_rest[i]).AsFrame(),
                         .attached = true};

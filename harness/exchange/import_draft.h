@@ -238,6 +238,8 @@ class ImportDraft {
   /// Fixes bodies without mass at the ends of chains where they are drawn: their motion has no
   /// effect.
   void FixMasslessEnds();
+  /// Returns true if a joint without load moves others through couplings.
+  bool CouplesOthers(int joint) const;
   /// Rejects invalid masses and inertias of moving bodies, including their merged bodies; inertias
   /// that no body has are replaced if the options permit it.
   void CheckMasses();

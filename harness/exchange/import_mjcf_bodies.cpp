@@ -109,17 +109,16 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, P
   const MjcfElement& element = geom.element;
   const auto given = element.Attribute("type");
   const auto mesh = element.Attribute("mesh");
-  const Type type = given  ? given->Choice<Type>({{"sphere", kSphere},
-                                                  {"capsule", kCapsule},
-                                                  {"cylinder", kCylinder},
-                                                  {"box", kBox},
-                                                  {"ellipsoid", kEllipsoid},
-                                                  {"plane", kWithoutMass},
-                                                  {"hfield", kWithoutMass},
-                                                  {"mesh", kOfMesh},
-                                                  {"sdf", kOfMesh}})
-                    : mesh ? kOfMesh
-                           : kSphere;
+  const Type type = given ? given->Choice<Type>({{"sphere", kSphere},
+                                                 {"capsule", kCapsule},
+                                                 {"cylinder", kCylinder},
+                                                 {"box", kBox},
+                                                 {"ellipsoid", kEllipsoid},
+                                                 {"plane", kWithoutMass},
+                                                 {"hfield", kWithoutMass},
+                                                 {"mesh", kOfMesh},
+                                                 {"sdf", kOfMesh}})
+                          : kSphere;
   const double kg = element.Number("mass", -1.0, kNotNegative);
   const double density = element.Number("density", kDensity, kNotNegative);
   const double group = element.Number("group", 0.0);

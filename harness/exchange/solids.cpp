@@ -262,11 +262,12 @@ TriangleMesh ReadTextStl(const std::filesystem::path& path, std::string_view tex
 /// Points "v x y z" and polygons "f i j k ..." of point numbers from 1, or from -1 backwards, each
 /// with further numbers after a slash. Polygons are fans of triangles from their first corner.
 TriangleMesh ReadObj(const std::filesystem::path& path, std::string_view text) {
-  TriangleMesh mesh;
+  MeshFromCorners mesh;
+  std::vector<Vector3d> points;
   ForEachLine(text, [&](const auto& words, std::size_t line) {
-    if (words[0] == "v") mesh.points.push_back(PointOf(path, line, words));
+    if (words[0] == "v") points.push_back(PointOf(path, line, words));
     if (words[0] != "f") return;
-    const int count = static_cast<int>(mesh.points.size());
+    const int count = static_cast<int>(points.size());
     std::vector<int> corners;
     for (std::size_t k = 1; k < words.size(); ++k) {
       int number = 0;
@@ -279,10 +280,10 @@ TriangleMesh ReadObj(const std::filesystem::path& path, std::string_view text) {
     }
     if (corners.size() < 3) Fail(path, line, "a face with fewer than 3 corners", "3 or more");
     for (std::size_t k = 2; k < corners.size(); ++k) {
-      mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+      for (const std::size_t corner : {std::size_t{0}, k - 1, k}) mesh.Add(points[corners[corner]]);
     }
   });
-  return mesh;
+  return std::move(mesh).mesh();
 }
 
 }  // namespace

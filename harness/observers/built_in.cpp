@@ -83,13 +83,10 @@ struct Largest {
 template <class Space>
 double ShiftOf(const Kinematics<Space, double>& kinematics, int coupling, double mismatch,
                double* rotation) {
-  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
-  const int first = mechanism.couplings()[static_cast<std::size_t>(coupling)].parts.front().joint;
   const double by = std::abs(kinematics.OfFirstJoint(coupling, mismatch));
-  const auto& H = kinematics.joints()[static_cast<std::size_t>(first)].basis[0];
-  if (H.angular.isZero()) return by;
+  if (!kinematics.FirstTurns(coupling)) return by;
   Keep(rotation, by);
-  return by * mechanism.length();
+  return by * kinematics.mechanism().length();
 }
 
 }  // namespace

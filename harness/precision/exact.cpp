@@ -50,10 +50,15 @@ Exact::Exact(const MechanismDescription& description, Coordinates coordinates)
   if (outcome_ != Outcome::kFinished) return;
   q_ = start.system->q();
   u_ = start.system->u();
-  if (coordinates == Coordinates::kJoint) return;
-  q_ = start.system->kinematics().CoordinatesIn(mechanism_);
+  if (coordinates != Coordinates::kJoint) {
+    q_ = start.system->kinematics().CoordinatesIn(mechanism_);
+    kinematics_.UpdatePosition(q_);
+    u_ = start.system->kinematics().SpeedsIn(kinematics_);
+  }
   kinematics_.UpdatePosition(q_);
-  u_ = start.system->kinematics().SpeedsIn(kinematics_);
+  kinematics_.UpdateVelocity(u_);
+  kinematics_.AcceptStep();
+  kinematics_.CountTurns();
 }
 
 Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
@@ -69,10 +74,8 @@ Float128 Exact::Drift(const Float128& t, const VectorX<Float128>& q) {
     largest = std::max(largest, constrained.linear.norm());
   }
   for (int c = 0; c < std::ssize(mechanism_.couplings()); ++c) {
-    const int first = mechanism_.couplings()[c].parts.front().joint;
     const Float128 by = abs(kinematics_.OfFirstJoint(c, kinematics_.CouplingMismatch(c)));
-    const bool turns = !kinematics_.joints()[first].basis[0].angular.isZero();
-    largest = std::max(largest, turns ? by * mechanism_.length() : by);
+    largest = std::max(largest, kinematics_.FirstTurns(c) ? by * mechanism_.length() : by);
   }
   return largest;
 }

@@ -38,7 +38,7 @@ class Exact {
   const VectorX<Float128>& q() const { return q_; }
   const VectorX<Float128>& u() const { return u_; }
 
-  /// Largest mismatch of the points of a constraint at time t [s] and q [m].
+  /// Largest mismatch of the points of a constraint, or of a coupling, at time t [s] and q [m].
   Float128 Drift(const Float128& t, const VectorX<Float128>& q);
   /// Centres of mass at time t [s] and q [m], in ground axes, one below the other.
   VectorX<Float128> Centres(const Float128& t, const VectorX<Float128>& q);

@@ -32,6 +32,7 @@ class Follower {
   Follower(const Mechanism<Space, double>& mechanism, const VectorX<double>& q)
       : mechanism_(mechanism), kinematics_(mechanism), q_(q), units_(mechanism.num_u()) {
     kinematics_.UpdatePosition(q_);
+    kinematics_.AcceptStep();
     kinematics_.CountTurns();
     units_.setOnes();
     for (const TreeStep& step : mechanism.tree()) {
@@ -81,7 +82,11 @@ class Follower {
     Shift(*u);
     // a step that returns to its start leads nowhere
     const bool moved = Close() && (q_ - before).norm() > 0.3 * (Moved(*u, before) - before).norm();
-    if (!moved) Place(before);
+    if (moved) {
+      kinematics_.AcceptStep();
+    } else {
+      Place(before);
+    }
     return moved;
   }
 

@@ -69,7 +69,8 @@ class ConstraintSolver {
 
   /// Computes x and, unless null, lambda, from the results of Factor(). Directions in which the
   /// constraints have lost rank are regularized as Factor() found them. `force` (num_u) may be
-  /// empty, meaning zero; `target` has num_rows. Without a solution x is not finite.
+  /// empty, meaning zero; `target` has num_rows;
+  /// with couplings, then one more for each (coupled_solver.h). Without a solution x is not finite.
   virtual void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
                      VectorX<S>* lambda) = 0;
 

@@ -12,8 +12,8 @@
 // pivots are round-off depend on the other constraints: they carry no force. As published they end
 // the run as `singular`.
 //
-// Vectors of rows contain the rows of joints, then a number per coupling; missing ones are zero. A
-// position takes one solution of the inner solver per coupling.
+// Vectors of rows contain the rows of joints, then a number per coupling, which may be missing and
+// is then zero. A position takes one solution of the inner solver per coupling.
 #pragma once
 
 #include <memory>

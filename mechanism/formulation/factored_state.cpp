@@ -75,9 +75,7 @@ void PositionViolation(const Kinematics<Space, S>& kinematics, VectorX<S>& viola
   for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
     const S mismatch = kinematics.CouplingMismatch(c);
     violation[mechanism.num_rows() + c] = mismatch;
-    const int first = mechanism.couplings()[c].parts.front().joint;
-    const bool turns = !kinematics.joints()[first].basis[0].angular.isZero();
-    S& same = turns ? largest.rotation : largest.shift;
+    S& same = kinematics.FirstTurns(c) ? largest.rotation : largest.shift;
     same = max(same, S(abs(kinematics.OfFirstJoint(c, mismatch))));
   }
 }

@@ -64,6 +64,10 @@ bool System<Space, S>::IsOffBranch() const {
       const Velocity<Space, S> miss = kinematics().ConstraintMismatch(index);
       e = std::max({e, miss.angular.norm(), miss.linear.norm() / mechanism_.length()});
     }
+    for (int c = 0; c < std::ssize(mechanism_.couplings()); ++c) {
+      const double miss = std::abs(kinematics().OfFirstJoint(c, kinematics().CouplingMismatch(c)));
+      e = std::max(e, kinematics().FirstTurns(c) ? miss : miss / mechanism_.length());
+    }
     const int rank = mechanism_.num_rows() - LoopRank(mechanism_, 0) + drives_->usual_rank();
     // pivots, of the size of sigma or of its square, decide when to check
     if (rank == 0 || solver_->conditioning().rcond > 100.0 * std::sqrt(e)) return false;

@@ -25,6 +25,14 @@ S SizeOf(const Kinematics<Space, S>& kinematics, const Motion& A) {
   return max(S(A.angular.norm()), S(A.linear.norm() / kinematics.mechanism().length()));
 }
 
+/// Size of a mismatch of a coupling or of its rates, in the same units.
+template <class Space, class S>
+S SizeOfCoupling(const Kinematics<Space, S>& kinematics, int coupling, const S& mismatch) {
+  using std::abs;
+  const S size = abs(kinematics.OfFirstJoint(coupling, mismatch));
+  return kinematics.FirstTurns(coupling) ? size : S(size / kinematics.mechanism().length());
+}
+
 /// Speed of the fastest body.
 template <class Space, class S>
 S SpeedOf(const Kinematics<Space, S>& kinematics) {
@@ -59,6 +67,7 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
       size_ = max(size_, part);
     }
   }
+  std::ranges::fill(missed_, S(0));
   for (int index : mechanism.constraints()) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
@@ -73,10 +82,7 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     const int first = mechanism.couplings()[c].parts.front().joint, row = mechanism.num_rows() + c;
     S left = CouplingAcceleration<Space, S>(kinematics, c, &udot, A_);
     if (feedback.size() > row) left += feedback[row];
-    using std::abs;
-    const S missed = abs(kinematics.OfFirstJoint(c, left));
-    const bool turns = !kinematics.joints()[first].basis[0].angular.isZero();
-    missed_[first] = max(missed_[first], turns ? missed : S(missed / mechanism.length()));
+    missed_[first] = max(missed_[first], SizeOfCoupling(kinematics, c, left));
     worst_ = max(worst_, missed_[first]);
   }
   AppliedForces<Space, S>(kinematics, F_);
@@ -118,6 +124,10 @@ bool Drives<Space, S>::IsDrift(const Kinematics<Space, S>& kinematics) {
     position = max(position, SizeOf(kinematics, kinematics.ConstraintMismatch(index)));
     missed =
         max(missed, SizeOf(kinematics, state.Sum(kinematics.ConstraintSpeed(index), state.rows())));
+  }
+  for (int c = 0; c < static_cast<int>(kinematics.mechanism().couplings().size()); ++c) {
+    position = max(position, SizeOfCoupling(kinematics, c, kinematics.CouplingMismatch(c)));
+    missed = max(missed, SizeOfCoupling(kinematics, c, kinematics.CouplingSpeed(c)));
   }
   return position * fastest_ + missed <= S(kMaxDrift) * fastest_ &&
          worst_ <= S(kOfMismatch) * (position * size_ + missed * SpeedOf(kinematics));

@@ -99,13 +99,13 @@ void Kinematics<Space, S>::AcceptStep() {
 template <class Space, class S>
 void Kinematics<Space, S>::CountTurns() {
   using std::abs;
-  constexpr double kOpen = 1e-3;  // of a start that is not consistent
+  constexpr double kOpen = 1e-3;  // of the smallest turn; less is a start that is not consistent
   for (std::size_t c = 0; c < turns_.size(); ++c) {
-    const int index = static_cast<int>(c);
     turns_[c] = S(0);
-    if (!mechanism_->couplings()[c].is_measured) continue;
-    const S open = CouplingMismatch(index);
-    if (abs(OfFirstJoint(index, open)) > S(kOpen)) turns_[c] = open;
+    const S turn = mechanism_->couplings()[c].measured_turn;
+    if (turn == S(0)) continue;
+    const S open = CouplingMismatch(static_cast<int>(c));
+    if (abs(open) > S(kOpen) * turn) turns_[c] = open;
   }
 }
 

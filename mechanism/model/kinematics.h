@@ -140,6 +140,12 @@ class Kinematics {
   S OfFirstJoint(int coupling, const S& mismatch) const {
     return mismatch / mechanism_->couplings()[coupling].parts.front().ratio;
   }
+  /// Returns true if that unit is an angle.
+  bool FirstTurns(int coupling) const {
+    return !joints_[mechanism_->couplings()[coupling].parts.front().joint]
+                .basis[0]
+                .angular.isZero();
+  }
 
   /// Directions that are not imposed from now on, as many of each joint as the mechanism releases.
   /// Part of the mode; the positions must be updated afterwards.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <span>
 #include <stdexcept>
@@ -210,7 +211,11 @@ void Mechanism<Space, S>::AddCouplings(const MechanismDescription& description) 
       const Joint<Space, S>& joint = joints_[index];
       coupling.parts.push_back({index, S(ratio)});
       const bool is_angle = joint.kind->axes[0] < Space::kRot && joint.kind->parameter == S(0);
-      coupling.is_measured = coupling.is_measured || (is_angle && !joint.in_tree());
+      if (!is_angle || joint.in_tree()) continue;
+      const S turn = S(2.0 * std::numbers::pi * std::abs(ratio));
+      if (coupling.measured_turn == S(0) || turn < coupling.measured_turn) {
+        coupling.measured_turn = turn;
+      }
     }
   }
 }

@@ -64,7 +64,9 @@ struct Coupling {
   std::string name;
   std::vector<Part> parts;
   S offset = S(0);
-  bool is_measured = false;  ///< some coordinate is an angle of a cut joint, modulo a turn
+  /// Change of the sum by a turn of an angle of a cut joint, which is measured modulo a turn: the
+  /// smallest; 0 without such angles.
+  S measured_turn = S(0);
 };
 
 /// Directions that a joint does not impose (redundancy.h), ascending, counted in D behind the

@@ -27,6 +27,12 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
   std::vector<int> left(order.data() + scaled.rank, order.data() + order.size());
   std::ranges::sort(left);
   for (const int row : left) {
+    if (row >= mechanism.num_rows()) {
+      const Coupling<double>& coupling = mechanism.couplings()[row - mechanism.num_rows()];
+      dependent.push_back(
+          {coupling.parts.front().joint, "coupling \"" + coupling.name + "\"", false});
+      continue;
+    }
     for (int index : mechanism.constraints()) {
       const Joint<Space, double>& joint = mechanism.joints()[index];
       const int i = row - joint.row;

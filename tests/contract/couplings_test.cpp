@@ -378,7 +378,7 @@ TEST(Couplings, ADifferentialSplitsTheTorque) {
   }
 }
 
-TEST(Couplings, ScrewsAndRacksKeepTheirUnitsWhenLengthsScale) {
+TEST(Couplings, RacksKeepTheirUnitsWhenLengthsScale) {
   MechanismDescription d = Gripper();
   const MechanismDescription large = AtScale(d, 8.0);
   EXPECT_EQ(large.couplings[0].parts[1].ratio, 1.0);
@@ -478,7 +478,7 @@ TEST(Couplings, ContradictoryMotionsAreInconsistent) {
   EXPECT_EQ(Validate(d), "");
   d.joints[1].motions = {{0, Polynomial{{0.0, 0.0, 1.0}}}};
   EXPECT_NE(Validate(d).find("all of its joints have prescribed motions"), std::string::npos);
-  // a third gear leaves a speed, which nothing couples
+  // the motion of the first gear determines the two others
   MechanismDescription three = GearTrain({20, 35, 12}, 3.0);
   three.couplings[1].parts.push_back({0, 1.0});
   three.joints[0].motions = d.joints[0].motions;
@@ -494,6 +494,16 @@ TEST(Couplings, ContradictoryMotionsAreInconsistent) {
   MechanismDescription driven = GearTrain({20, 35, 12}, 3.0);
   driven.forces.clear();
   driven.joints[0].motions = driven.joints[2].motions = d.joints[0].motions;
+  // contradicted at 1 s, but not at 0: an evaluation does not depend on those before
+  MechanismDescription late = driven;
+  late.joints[0].motions = {{0, Polynomial{{0.0, 1.0}}}};
+  late.joints[2].motions = {{0, Polynomial{{0.0, 20.0 / 12.0, 0.0, 1.0}}}};
+  const Mechanism<Planar, double> moving(late, Coordinates::kJoint);
+  const Start<double> at_zero = Assemble<Planar>(late, moving);
+  const auto twice = harness::MakeFormulation<Planar>("odca", moving, {});
+  ASSERT_EQ(twice->Start(0.0, at_zero.q, at_zero.u), Outcome::kFinished);
+  EXPECT_EQ(twice->Evaluate(1.0, at_zero.q, at_zero.u, udot), Outcome::kInconsistentMotion);
+  EXPECT_EQ(twice->Evaluate(0.0, at_zero.q, at_zero.u, udot), Outcome::kFinished);
   const Mechanism<Planar, double> stuck(driven, Coordinates::kJoint);
   const Start<double> at_rest = Assemble<Planar>(driven, stuck);
   const auto contradicted = harness::MakeFormulation<Planar>("odca", stuck, {});

@@ -184,6 +184,21 @@ TEST(ImportMerge, LinksWithoutMassAtTheEndAreFixed) {
                 {"<link name=\"flag\">: found a body without mass that moves"});
 }
 
+TEST(ImportMerge, LinksWithoutMassThatCoupleOthersStay) {
+  const std::string dummy = Link("knob") + Joint("lead", "continuous", "arm", "knob", "0 0 -1");
+  const auto finger = [](const std::string& name) {
+    std::string joint = Joint("j" + name, "continuous", "arm", name, "0 0 -1");
+    joint.insert(joint.find("</joint>"), "<mimic joint=\"lead\"/>");
+    return Link(name, Inertial(1, "1 1 1")) + joint;
+  };
+  // one finger alone is not held by the knob, two are coupled by it
+  const Imported one = Read(Arm(dummy + finger("a")));
+  EXPECT_TRUE(one.description.couplings.empty());
+  ExpectNote(one, "<link name=\"knob\">", "coupling \"ja mimic\" dropped");
+  ExpectRefusal(Arm(dummy + finger("a") + finger("b")),
+                {"<link name=\"knob\">: found a body without mass that moves"});
+}
+
 TEST(ImportMerge, MomentsThatNoBodyHasAreBalancedOnRequest) {
   const std::string hand =
       Link("hand", Inertial(1, "0.1 0.2 0.6")) + Joint("wrist", "continuous", "arm", "hand");

@@ -234,6 +234,19 @@ TEST_F(MeshFiles, AllTypesAreTheSameSolid) {
   }
 }
 
+/// Files with own points for each triangle have no open edges either.
+TEST_F(MeshFiles, EqualPointsOfObjAreOne) {
+  const TriangleMesh mesh = Box({0.5, 1.25, 2.0});
+  TriangleMesh split;
+  for (const auto& triangle : mesh.triangles) {
+    const int first = static_cast<int>(split.points.size());
+    for (const int corner : triangle) split.points.push_back(mesh.points[corner]);
+    split.triangles.push_back({first, first + 1, first + 2});
+  }
+  Write("split.obj", AsObj(split));
+  EXPECT_EQ(NumOpenEdges(ReadMesh(top_ / "model/split.obj")), 0u);
+}
+
 TEST_F(MeshFiles, FaultsAreNamedWithTheirLine) {
   ExpectFault("a.obj", "v 0 0 0\nv 1 0\n", "a.obj:2: found a point without three numbers");
   ExpectFault("a.obj", "v 0 0 nan\n", "a.obj:1: found a point");
@@ -310,6 +323,9 @@ TEST_F(MeshFiles, MjcfGeomsTakeTheMassOfTheirMesh) {
     Write("m.xml", model(row.asset, geom));
     EXPECT_NE(refusal().find(row.words), std::string::npos) << row.asset << ": " << refusal();
   }
+  // without a type MuJoCo fits a sphere to the mesh
+  Write("m.xml", model("<mesh file=\"brick.obj\"/>", "<geom mesh=\"brick\"/>"));
+  EXPECT_NE(refusal().find("a shape is not fitted to it"), std::string::npos) << refusal();
   TriangleMesh open = Box({0.5, 1.25, 2.0});
   open.triangles.pop_back();
   Write("meshes/brick.obj", AsObj(open));

@@ -25,15 +25,17 @@ class Error(RuntimeError):
     """A command failed; the text is its message."""
 
 
-def _run(*arguments):
-    program = os.environ.get("LOOPBENCH", "loopbench")
+def _call(program, *arguments):
     try:
         done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True)
     except FileNotFoundError:
-        raise Error(f"{program}: no such program; set LOOPBENCH to its path") from None
+        raise Error(f"{program}: no such program") from None
     if done.returncode != 0:
         raise Error(done.stderr.strip() or f"{program} ended with status {done.returncode}")
-    return done.stdout
+
+
+def _run(*arguments):
+    _call(os.environ.get("LOOPBENCH", "loopbench"), *arguments)
 
 
 class Mechanism:
@@ -51,20 +53,23 @@ class Mechanism:
         return RightHandSide(self.path, formulation, enforcement, horizon, cc)
 
     def simulate(self, horizon, formulation="odca", enforcement="projection", coordinates="joint",
-                 rtol=1e-8, step=None, **integration):
+                 rtol=1e-8, step=None, **keys):
         """Integrates for `horizon` seconds and returns the trajectory (docs/trajectories.md).
 
         `step` [s]: interval of rows, by default a thousandth of the horizon. Further keys, such as
-        `integrator`, are keys of experiments. `attrs["record"]` of the frame contains drift, energy
+        `integrator`, are keys of experiments; `fixed_steps` replaces `rtol`. `attrs["record"]` of the frame contains drift, energy
         error, outcome and warnings. Raises Error if the run does not finish.
         """
+        integrator = keys.get("integrator")
+        if isinstance(integrator, str) and integrator.endswith(".json"):
+            keys["integrator"] = str(pathlib.Path(integrator).resolve())
         experiment = {
             "name": "python",
             "problems": [{"mechanism": str(self.path), "horizon": horizon}],
             "methods": [{"formulation": formulation, "enforcement": enforcement, "coordinates": coordinates}],
-            "tolerances": [rtol],
+            "tolerances": [] if "fixed_steps" in keys else [rtol],
             "output": {"step": horizon / 1000 if step is None else step},
-            **integration,
+            **keys,
         }
         with tempfile.TemporaryDirectory() as folder:
             file, store = pathlib.Path(folder, "python.json"), pathlib.Path(folder, "out")
@@ -89,7 +94,7 @@ class RightHandSide:
             (source,) = set(pathlib.Path(folder).glob("*.c")) - set(pathlib.Path(folder).glob("*_example.c"))
             library = source.with_suffix(".so")
             flags = ["-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]
-            subprocess.run([cc, *flags, "-o", library, source, "-lm"], check=True)
+            _call(cc, *flags, "-o", library, source, "-lm")
             self._library = ctypes.CDLL(str(library))
             self._states = int(re.search(r"_STATES = (\d+)", source.with_suffix(".h").read_text())[1])
         self._name = source.stem

@@ -59,6 +59,14 @@ class Motion(unittest.TestCase):
         self.assertLess(energy.max() - energy.min(), 1e-6)
         self.assertEqual(motion.attrs["record"]["formulation"], "reduction")
 
+    def test_tables_and_fixed_steps(self):
+        with tempfile.TemporaryDirectory() as folder:
+            table = pathlib.Path(folder, "midpoint.json")
+            table.write_text('{"name": "midpoint", "A": [[0, 0], [0.5, 0]], "b": [0, 1], "c": [0, 0.5], "order": 2}')
+            motion = loopbench.Mechanism(FOUR_BAR).simulate(1.0, integrator=str(table), fixed_steps=0.01)
+        self.assertEqual(motion.attrs["record"]["integrator"], "midpoint")
+        self.assertEqual(motion.attrs["record"]["steps"], 100)
+
     def test_store(self):
         with tempfile.TemporaryDirectory() as folder:
             experiment = pathlib.Path(folder, "e.json")
@@ -72,6 +80,8 @@ class Motion(unittest.TestCase):
     def test_messages(self):
         with self.assertRaisesRegex(loopbench.Error, "no-such.json"):
             loopbench.Mechanism("no-such.json")
+        with self.assertRaisesRegex(loopbench.Error, "no-such-cc: no such program"):
+            loopbench.Mechanism(FOUR_BAR).compile(cc="no-such-cc")
         with self.assertRaisesRegex(loopbench.Error, "formulation.*odca"):
             loopbench.Mechanism(FOUR_BAR).simulate(1.0, "newton")
 

@@ -25,6 +25,16 @@ constexpr std::string_view kPrefix = "series.final.";
 /// Runs of one problem, horizon and tolerance with equal final poses, by index, largest set first.
 using Clusters = std::vector<std::vector<std::size_t>>;
 
+/// Returns the largest of the relative and the absolute tolerances of a run; NaN without.
+double ToleranceOf(const Record& record) {
+  double largest = record.Number("rtol");
+  for (const char* key :
+       {"atol", "atol_length", "atol_angle", "atol_speed", "atol_angular_speed"}) {
+    largest = std::fmax(largest, record.Number(key));
+  }
+  return largest;
+}
+
 bool HasFinalPoses(const Record& record) {
   return record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
          !record.Text("problem_id").empty() && !std::isnan(record.Number("rtol")) &&
@@ -186,9 +196,8 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
   std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> problems;
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (!HasFinalPoses(records[i])) continue;
-    problems[{records[i].Text("problem_id"), records[i].Number("horizon")}]
-            [records[i].Number("rtol")]
-                .push_back(i);
+    problems[{records[i].Text("problem_id"), records[i].Number("horizon")}][ToleranceOf(records[i])]
+        .push_back(i);
   }
   std::vector<Agreement> agreements(records.size());
   for (const auto& [problem, tolerances] : problems) {
@@ -358,7 +367,7 @@ constexpr double kMaxFixedError = 1e-2;
 bool IsNear(const Record& record, const char* error, const char* accuracy, double length) {
   const double certain = record.Number(accuracy) / length + kRoundOffShare;
   const double expected =
-      record.Number("step") > 0.0 ? kMaxFixedError : kMaxTolerances * record.Number("rtol");
+      record.Number("step") > 0.0 ? kMaxFixedError : kMaxTolerances * ToleranceOf(record);
   return record.Number(error) / length <= expected + certain;
 }
 
@@ -383,7 +392,7 @@ bool IsCertified(const Record& record) {
 
 /// Returns true if a requested finer run differs by more than kMaxTolerances.
 bool IsFarFromFinerRun(const Record& record) {
-  const double most = kMaxTolerances * record.Number("rtol") + kRoundOffShare;
+  const double most = kMaxTolerances * ToleranceOf(record) + kRoundOffShare;
   return record.Find("refinement_difference") != nullptr &&
          !(record.Number("refinement_difference") <= most);
 }
@@ -397,13 +406,13 @@ std::optional<DriftGrowth> GrowthAt(const Record& record) {
 }
 
 double ExpectedEnergyShare(const Record& record) {
-  const double rtol = record.Number("rtol");
-  if (!(rtol > 0.0) || IsPeer(record)) return kMaxEnergyError;
+  const double tolerance = ToleranceOf(record);
+  if (!(tolerance > 0.0) || IsPeer(record)) return kMaxEnergyError;
   // no level puts the energy back, so that errors of all steps add up
   const double tolerances = TolerancesOfDrift(record) + kVelocity * record.Number("steps");
   const double scale = record.Number("energy_scale");
   const double per_tolerance = std::fmax(1.0, record.Number("energy_sensitivity") / scale);
-  return std::min(kMaxEnergyError, tolerances * (rtol + kEvaluation) * per_tolerance);
+  return std::min(kMaxEnergyError, tolerances * (tolerance + kEvaluation) * per_tolerance);
 }
 
 double EnergyErrorShare(const Record& record) {
@@ -420,14 +429,14 @@ double DriftShare(const Record& record) {
 }
 
 double ExpectedDriftShare(const Record& record) {
-  const double rtol = record.Number("rtol");
+  const double tolerance = ToleranceOf(record);
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
   const auto growth = GrowthAt(record);
   // the rest is due to regularized directions, or to external engines, which project to a fraction
   // of their tolerance
   const bool left = record.Number("regularized_evaluations") > 0 || IsPeer(record);
   const bool is_fixed = record.Number("step") > 0.0;
-  double promised = is_fixed ? kOpenLoop : TolerancesOfDrift(record) * rtol;
+  double promised = is_fixed ? kOpenLoop : TolerancesOfDrift(record) * tolerance;
   if (growth == DriftGrowth::kNone && !left) promised = 0.0;
   return record.Find("position_goal") == nullptr ? promised : std::max(promised, goal);
 }
@@ -510,7 +519,7 @@ std::string ColumnOf(const Record& record) {
   std::string name = record.Text("problem_id");
   for (const auto& [key, value] : record.items()) {
     if (key == "case_id" || key == "problem_id") break;
-    if (key != "rtol" && key != "atol") name += "|" + key + "=" + record.Text(key);
+    if (key != "rtol" && !key.starts_with("atol")) name += "|" + key + "=" + record.Text(key);
   }
   return name;
 }
@@ -532,14 +541,14 @@ std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
   for (std::size_t i = 0; i < records.size(); ++i) {
     const Record& record = records[i];
     const bool counts = record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
-                        !record.Text("problem_id").empty() && record.Number("rtol") > 0.0;
+                        !record.Text("problem_id").empty() && ToleranceOf(record) > 0.0;
     if (counts) columns[ColumnOf(record)].push_back(i);
   }
   std::vector<Refinement> refinements(records.size(), {false, kNaN, kNaN});
   for (auto& [name, runs] : columns) {
-    const auto rtol = [&](std::size_t run) { return records[run].Number("rtol"); };
-    std::ranges::stable_sort(runs, std::greater<>(), rtol);
-    const auto same = std::ranges::unique(runs, {}, rtol);
+    const auto tolerance = [&](std::size_t run) { return ToleranceOf(records[run]); };
+    std::ranges::stable_sort(runs, std::greater<>(), tolerance);
+    const auto same = std::ranges::unique(runs, {}, tolerance);
     runs.erase(same.begin(), same.end());
     constexpr std::size_t kFewest = 3;
     if (runs.size() < kFewest) continue;
@@ -552,8 +561,8 @@ std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
       if (SameInEveryBit(records[runs[i]], records[runs[i + 1]])) flag_from(i);
       if (i == 0) continue;
       own.off_before = refinements[runs[i - 1]].off;
-      const double shrunk = std::pow(rtol(runs[i]) / rtol(runs[i - 1]), 0.25);
-      const bool far = own.off > kMaxTolerances * rtol(runs[i]) && own.off > kRoundOffShare;
+      const double shrunk = std::pow(tolerance(runs[i]) / tolerance(runs[i - 1]), 0.25);
+      const bool far = own.off > kMaxTolerances * tolerance(runs[i]) && own.off > kRoundOffShare;
       if (far && own.off > shrunk * own.off_before) flag_from(i);
     }
   }

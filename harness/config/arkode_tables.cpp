@@ -2,6 +2,8 @@
 #include <arkode/arkode_arkstep.h>
 
 #include <span>
+#include <stdexcept>
+#include <string>
 
 #include "harness/config/butcher_table.h"
 
@@ -15,6 +17,9 @@ extern const char* const kDirkTables[];
 namespace {
 
 ButcherTable Copy(const char* name, ARKodeButcherTable table) {
+  if (table == nullptr) {
+    throw std::runtime_error(std::string(name) + ": in ARKODE's headers, not in its library");
+  }
   const auto size = static_cast<std::size_t>(table->stages);
   const auto list = [size](const sunrealtype* values) {
     return std::vector<double>(values, values + size);

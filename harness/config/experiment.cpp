@@ -32,9 +32,8 @@ std::vector<StepChoice> StepChoices(const Experiment& experiment) {
 /// Returns the integrators of a method: all of the experiment; for a peer, which has its own, only
 /// one placeholder.
 std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Method& method) {
-  const FormulationRow* row = FindFormulation(method.formulation);
   std::vector<std::string> integrators = experiment.integrators;
-  if (row != nullptr && row->is_peer() && integrators.size() > 1) integrators.resize(1);
+  if (IsPeer(method) && integrators.size() > 1) integrators.resize(1);
   return integrators;
 }
 
@@ -42,8 +41,8 @@ Case MakeCase(const Experiment& experiment, std::size_t problem, const Method& m
               const StepChoice& choice, double horizon, const std::string& integrator) {
   std::optional<AbsoluteTolerances> atols = experiment.atols;
   if (atols) {
-    for (double* one : {&atols->length, &atols->angle, &atols->speed, &atols->angular_speed}) {
-      if (*one == 0.0) *one = choice.tolerance;
+    for (double* tolerance : atols->All()) {
+      if (*tolerance == 0.0) *tolerance = choice.tolerance;
     }
   }
   Case one{.problem = problem,
@@ -92,7 +91,7 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("coordinates", std::string(ToString(one.method.coordinates)));
   keys.Set("solver", std::string(ToString(one.method.solver)));
   const FormulationRow* row = FindFormulation(one.method.formulation);
-  const bool is_peer = row != nullptr && row->is_peer();
+  const bool is_peer = IsPeer(one.method);
   keys.Set("integrator", is_peer ? row->integrator : one.integrator);
   const Profile* profile = FindProfile(one.integrator);
   const bool is_implicit = profile != nullptr && profile->is_implicit && !is_peer;
@@ -195,6 +194,11 @@ std::vector<Case> ExpandRuns(const Experiment& experiment, const std::vector<Met
 
 }  // namespace
 
+bool IsPeer(const Method& method) {
+  const FormulationRow* row = FindFormulation(method.formulation);
+  return row != nullptr && row->is_peer();
+}
+
 std::vector<Case> Expand(const Experiment& experiment) {
   std::vector<Case> cases = ExpandRuns(experiment, experiment.methods, StepChoices(experiment));
   for (Case& one : cases) {
@@ -227,7 +231,7 @@ std::vector<Case> ExpandTiming(const Experiment& experiment) {
       ExpandRuns(experiment, timing.methods, {{.tolerance = timing.tolerance}}, timing.horizon);
   std::erase_if(cases, [](const Case& one) {
     const Profile* profile = FindProfile(one.integrator);
-    return profile != nullptr && !profile->has_embedding();
+    return !IsPeer(one.method) && profile != nullptr && !profile->has_embedding();
   });
   return cases;
 }

@@ -86,6 +86,9 @@ struct Method {
   friend bool operator==(const Method&, const Method&) = default;
 };
 
+/// Returns true for a program with its own integrator.
+bool IsPeer(const Method& method);
+
 /// Maximum number of threads in files; more than processors have.
 inline constexpr int kMaxThreads = 256;
 
@@ -207,6 +210,8 @@ std::string ToString(const OutputOptions& output);
 struct AbsoluteTolerances {
   double length = 0.0, angle = 0.0;         ///< [m], [rad]; coordinates of quaternions are angles
   double speed = 0.0, angular_speed = 0.0;  ///< [m/s], [rad/s]
+
+  std::array<double*, 4> All() { return {&length, &angle, &speed, &angular_speed}; }
 };
 
 /// Options of the integrator besides its method and tolerances (IntegratorOptions).

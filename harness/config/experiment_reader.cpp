@@ -323,16 +323,15 @@ void RequireSteps(const JsonNode& node, File&) {
 
 /// Reports peers, which have their own integrators, beside options of integrators.
 void RequireNoPeerOfOptions(const JsonNode& node, File& file) {
-  const auto peer = std::ranges::find_if(file.methods, [](const Method& method) {
-    const FormulationRow* row = FindFormulation(method.formulation);
-    return row != nullptr && row->is_peer();
-  });
-  if (peer == file.methods.end()) return;
-  for (const auto& [key, what] :
-       {std::pair("fixed_steps", "fixed steps"), std::pair("atol", "absolute tolerances"),
-        std::pair("integration", "options")}) {
+  // timings have no fixed steps
+  std::vector<Method> all = file.methods;
+  all.insert(all.end(), file.timing.methods.begin(), file.timing.methods.end());
+  for (const auto& [key, what, methods] : {std::tuple("fixed_steps", "fixed steps", &file.methods),
+                                           std::tuple("atol", "absolute tolerances", &all),
+                                           std::tuple("integration", "options", &all)}) {
+    const auto peer = std::ranges::find_if(*methods, IsPeer);
     const auto option = node.Optional(key);
-    if (!option) continue;
+    if (!option || peer == methods->end()) continue;
     option->FailAs(
         fmt::format("{} of \"{}\", which has its own integrator", what, peer->formulation),
         "\"tolerances\" alone, or an experiment of its own for peers");
@@ -409,7 +408,6 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
             "Absolute tolerance of every component of the state, or by quantity; default: as the "
             "relative tolerance."},
            {"integration", Object(&File::integration, IntegrationFields())},
-           {"", By(Json::object(), RequireNoPeerOfOptions)},
            {"refine", Bool(&File::refine),
             "If true, every case with a tolerance runs again at a tenth of it. Records then "
             "contain refinement_difference, the largest difference of final poses. A difference "
@@ -425,6 +423,7 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
            {"preprocess", Object(&File::compile, CompileFields())},
            {"series", Section(SeriesFields())},
            {"timing", Object(&File::timing, TimingFields())},
+           {"", By(Json::object(), RequireNoPeerOfOptions)},
            {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
            {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
            {"output", By(OutputFields().Schema(), ReadOutputOptions)},

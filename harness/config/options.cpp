@@ -54,7 +54,8 @@ constexpr std::array<NamedProfile, 12> kNamed{{
 
 Profile MakeProfile(std::string name, ButcherTable table, bool is_own = false) {
   const bool is_ode45 = name == kNamed.front().name;
-  const bool ends_at_one = table.c.back() == 1 && table.A.back() != table.b;
+  const bool ends_at_one =
+      std::abs(table.c.back() - 1) <= kOrderTolerance && table.A.back() != table.b;
   const bool is_implicit = table.is_implicit();
   return {std::move(name), std::move(table), is_ode45 ? kMatlab : kArkode, is_ode45, is_own,
           is_implicit,     ends_at_one};

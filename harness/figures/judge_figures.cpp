@@ -582,8 +582,13 @@ std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precisio
       Rows fixed = rows;
       std::erase_if(
           fixed, [](const WorkPrecisionRow* row) { return !(row->record.Number("step") > 0.0); });
+      // a curve joins runs of one kind: at tolerances, or else at fixed steps
+      Rows adaptive = rows;
+      std::erase_if(adaptive,
+                    [](const WorkPrecisionRow* row) { return row->record.Number("step") > 0.0; });
       if (several) {
-        add("integrators-", what, IntegratorsFigure(work_precision, what, rows, false));
+        add("integrators-", what,
+            IntegratorsFigure(work_precision, what, adaptive.empty() ? fixed : adaptive, false));
       }
       if (Varies(RecordsOf(fixed), "step")) {
         add("order-", what, IntegratorsFigure(work_precision, what + ": order", fixed, true));

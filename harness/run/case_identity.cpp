@@ -78,7 +78,7 @@ Record ProblemContent(const Experiment& experiment, const Case& entry) {
   Record content = CommonContent(experiment);
   content.Set("document", experiment.problems[entry.problem].mechanism.canonical);
   const Profile* profile = FindProfile(entry.integrator);
-  if (profile != nullptr && profile->is_own) {
+  if (profile != nullptr && profile->is_own && !IsPeer(entry.method)) {
     content.Set("butcher_table", ToString(profile->table));
   }
   return content;

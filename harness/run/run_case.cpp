@@ -123,8 +123,7 @@ void WriteRefinement(const Experiment& experiment, Case entry, Record& record) {
   entry.rtol /= 10.0;
   entry.atol /= 10.0;
   if (entry.atols) {
-    AbsoluteTolerances& own = *entry.atols;
-    for (double* one : {&own.length, &own.angle, &own.speed, &own.angular_speed}) *one /= 10.0;
+    for (double* tolerance : entry.atols->All()) *tolerance /= 10.0;
   }
   const Run finer =
       RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description, nullptr);

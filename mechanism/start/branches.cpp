@@ -1,6 +1,7 @@
 #include "mechanism/start/branches.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <random>
 #include <stdexcept>
@@ -92,7 +93,10 @@ class BranchSearch {
     double apart = 0.0;
     for (std::size_t body = 0; body < poses.size(); ++body) {
       const Pose<Space, double>&a = poses[body], &b = kinematics_.poses()[body];
-      apart = std::max({apart, (a.p - b.p).norm() / units_.length, (a.R - b.R).norm()});
+      // |A - B| = 2 sqrt(2) sin(angle / 2) for rotations in space, and in the plane
+      const double chord = (a.R - b.R).norm() / (2.0 * std::numbers::sqrt2);
+      const double angle = 2.0 * std::asin(std::min(1.0, chord));
+      apart = std::max({apart, (a.p - b.p).norm() / units_.length, angle});
     }
     return apart;
   }
@@ -117,9 +121,12 @@ class BranchSearch {
       const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
       const bool is_fixed =
           std::ranges::find(initial.held, joint.description) != initial.held.end();
-      if (joint.description < 0 || is_fixed || joint.num_drives > 0 || joint.num_q() == 0) continue;
-      const auto values = q.segment(joint.q_offset, joint.num_q());
-      initial.coordinates.push_back({joint.description, {values.begin(), values.end()}});
+      if (joint.description < 0 || is_fixed || joint.num_q() == 0) continue;
+      JointValues values{joint.description, {}};
+      for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+        values.values.push_back(mechanism_.DriveOf(joint, i) < 0 ? q[next++] : 0.0);
+      }
+      initial.coordinates.push_back(std::move(values));
     }
     result->found.push_back(std::move(branch));
   }

@@ -223,6 +223,26 @@ TEST(ButcherTablesOfFiles, AreContentOfTheirCases) {
   EXPECT_THROW(content("one-stage", "0.25"), ConfigError);
 }
 
+TEST(ButcherTables, DifferAsTextInEachCoefficient) {
+  const ButcherTable table = ArkodeTables().front();
+  ButcherTable other = table;
+  const auto expect_difference = [&] {
+    EXPECT_NE(ToString(other), ToString(table));
+    other = table;
+  };
+  other.A.back().front() += 1e-15;
+  expect_difference();
+  for (std::vector<double>* list : {&other.b, &other.c, &other.b_embedded}) {
+    ASSERT_FALSE(list->empty());
+    list->back() += 1e-15;
+    expect_difference();
+  }
+  ++other.order;
+  expect_difference();
+  ++other.embedded_order;
+  expect_difference();
+}
+
 TEST(ButcherTablesOfFiles, WithoutEmbeddingHaveNoTimingAtATolerance) {
   const Experiment experiment =
       FourBar(R"("fixed_steps": 0.1, "integrator": ["ode45", "ARKODE_KNOTH_WOLKE_3_3"])");

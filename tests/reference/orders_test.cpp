@@ -145,14 +145,15 @@ TEST_P(OrdersOfTables, AreThoseOfTheirNames) {
   for (const Motion& motion : kMotions) {
     const MechanismDescription description = Shipped(motion.mechanism).description;
     for (const ButcherTable& table : ArkodeTables()) {
-      if (!steps.contains(table.order)) continue;
       const int coarse = steps.at(table.order) * motion.factor;
       const auto error = [&](int count) {
         return ErrorOf(StatesOf(description, method, table.name, motion.horizon, count),
                        Exact(motion));
       };
       const double first = error(coarse), second = error(2 * coarse);
-      EXPECT_GT(second, 1e-13) << motion.mechanism << " " << table.name;
+      // above round-off, and above the tolerance 1e-12 of Newton's iteration
+      EXPECT_GT(second, 1e-12) << motion.mechanism << " " << table.name;
+      // as above
       EXPECT_NEAR(std::log2(first / second), table.order, 0.5)
           << motion.mechanism << " " << table.name << " " << first << " " << second;
     }

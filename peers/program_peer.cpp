@@ -100,9 +100,6 @@ std::unique_ptr<harness::Peer> MakeProgramPeer(const std::string& name, const Pr
                                                const MechanismDescription& description) {
   try {
     const exchange::Model model = exchange::MakeModel(description);
-    if (!model.couplings.empty()) {
-      throw exchange::Unsupported({fmt::format("coupling \"{}\"", model.couplings.front().name)});
-    }
     return std::make_unique<ProgramPeer>(name, make(model), model);
   } catch (const exchange::Unsupported& missing) {
     throw harness::Inexpressible(fmt::format("{} does not have: {}", name, missing.what()));

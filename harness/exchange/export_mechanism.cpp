@@ -122,7 +122,7 @@ class Maker {
   std::string NameOf(int joint) const { return description_.joints[joint].name; }
 
   void Add(const CouplingDescription& coupling) {
-    Coupling made{coupling.name, {}};
+    Coupling made{coupling.name, {}, coupling.offset};
     for (const auto& [joint, ratio] : coupling.parts) {
       if (tree_of_[joint] < 0) {
         Miss("coupling \"{}\" of joint \"{}\", which closes a loop", coupling.name, NameOf(joint));

@@ -58,10 +58,11 @@ struct JointForce {
   double constant = 0.0, stiffness = 0.0, rest = 0.0, damping = 0.0;
 };
 
-/// The sum of ratio times coordinate over joints of one coordinate is constant.
+/// The sum of ratio times coordinate over joints of one coordinate is `offset`.
 struct Coupling {
   std::string name;
   std::vector<std::pair<int, double>> parts;  ///< indices into Model::tree, ratios
+  double offset = 0.0;
 };
 
 /// A material point of a body, from its centre of mass, in body axes [m].
@@ -90,7 +91,7 @@ struct Model {
   std::vector<Body> bodies;         ///< [0] is Ground
   std::vector<Joint> tree;          ///< parents before children, one per body but Ground
   std::vector<Joint> cut;           ///< joints that close loops
-  std::vector<Coupling> couplings;  ///< they hold at the assembled start
+  std::vector<Coupling> couplings;  ///< also of the assembled start
   std::vector<JointForce> joint_forces;
   std::vector<PointForce> point_forces;
   std::vector<SpringDamper> spring_dampers;

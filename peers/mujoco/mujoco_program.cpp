@@ -45,10 +45,11 @@ class MujocoProgram final : public Program {
   explicit MujocoProgram(const exchange::Model& model)
       : made_(exchange::MakeMjcf(model)), model_(Load(made_.document)) {
     if (model_->njnt != static_cast<int>(made_.coordinates.size()) ||
-        model_->neq != static_cast<int>(made_.closures.size())) {
+        model_->neq != static_cast<int>(made_.closures.size() + model.couplings.size())) {
       Throw("joints or closures were lost");
     }
     SetClosures();
+    SetCouplings(model);
     data_.reset(mj_makeData(model_.get()));
     SetTimeStep(1e-3);
   }
@@ -109,8 +110,8 @@ class MujocoProgram final : public Program {
 
   /// Corrects the second points: MuJoCo sets them so that closures hold in its reference pose.
   void SetClosures() {
-    for (int e = 0; e < model_->neq; ++e) {
-      const MjcfClosure& closure = made_.closures[static_cast<std::size_t>(e)];
+    for (std::size_t e = 0; e < made_.closures.size(); ++e) {
+      const MjcfClosure& closure = made_.closures[e];
       double* data = model_->eq_data + e * mjNEQDATA;
       if (closure.rod >= 0.0) {
         data[0] = closure.rod - model_->tendon_length0[model_->eq_obj1id[e]];
@@ -120,6 +121,21 @@ class MujocoProgram final : public Program {
         data[i] = closure.at_first[i];
         data[3 + i] = closure.at_second[i];
       }
+    }
+  }
+
+  /// Corrects constants: MuJoCo's relations hold in its reference pose, and follow the closures.
+  void SetCouplings(const exchange::Model& model) {
+    double* data = model_->eq_data + made_.closures.size() * mjNEQDATA;
+    for (const exchange::Coupling& coupling : model.couplings) {
+      double missing = coupling.offset;
+      for (const auto& [joint, ratio] : coupling.parts) {
+        missing -= ratio * model.q[static_cast<std::size_t>(model.tree[joint].q)];
+      }
+      const auto& [first, ratio] = coupling.parts[0];
+      const double sign = model.tree[first].from_is_child ? -1.0 : 1.0;
+      data[0] = coupling.parts.size() == 2 ? sign * missing / ratio : missing;
+      data += mjNEQDATA;
     }
   }
 

@@ -109,6 +109,20 @@ TEST(Warnings, EnergyIsComparedWithStepsAndTolerance) {
   EXPECT_EQ(With("velocity", {{"energy_error_max", 2e-5}, {"formulation", simbody}}), "");
 }
 
+TEST(Warnings, TheLargestToleranceCounts) {
+  const auto warnings = [](const std::vector<std::pair<std::string, Value>>& tolerances) {
+    auto changes = tolerances;
+    changes.emplace_back("rtol", 1e-12);
+    changes.emplace_back("energy_error_max", 1e-5);
+    changes.emplace_back("drift_position_max", 1e-6);
+    return With("acceleration", changes);
+  };
+  EXPECT_NE(warnings({}), "");
+  EXPECT_NE(warnings({{"atol", 1e-12}}), "");
+  EXPECT_EQ(warnings({{"atol", 1e-6}}), "");
+  EXPECT_EQ(warnings({{"atol_length", 1e-12}, {"atol_angle", 1e-6}}), "");
+}
+
 TEST(Warnings, AMeasureThatIsNoNumberIsOne) {
   EXPECT_EQ(With("velocity", {{"energy_error_max", Value()}}), "energy");
   EXPECT_EQ(With("velocity", {{"energy_scale", Value()}}), "energy");

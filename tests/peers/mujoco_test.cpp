@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "harness/exchange/import.h"
 #include "mechanism/start/assembly.h"
 #include "tests/peers/expressible.h"
 #include "tests/peers/registered.h"
@@ -11,6 +12,7 @@
 namespace loopbench::testing {
 namespace {
 
+using harness::reference::RunFile;
 using harness::reference::RunShipped;
 using harness::reference::Shipped;
 
@@ -72,7 +74,6 @@ TEST(MujocoClosures, LeaveAShareOfAccelerationsAndAllThatComesWithSpeed) {
 const std::map<std::string, std::string> kUnstable = {{"elastic-crank", "integrator-error"},
                                                       {"flyball-governor", "integrator-error"}};
 const std::map<std::string, std::string> kInexpressible = {
-    {"geared-five-bar", "peer/mujoco does not have: coupling \"gears\""},
     {"driven-four-bar", "peer/mujoco does not have: joint \"OA\": a prescribed motion"},
     {"screw-jack",
      "peer/mujoco does not have: joint_torque along joint \"bearing\", which depends on time; "
@@ -80,9 +81,9 @@ const std::map<std::string, std::string> kInexpressible = {
      "\"thread\": helical; joint \"guide\": prismatic, which closes a loop"}};
 
 /// Of the final poses from those of O-DCA.
-double EndError(const std::string& name, double tolerance, double horizon) {
-  const harness::Record theirs = RunShipped(name, kMujoco, tolerance, horizon);
-  const harness::Record ours = RunShipped(name, kOdca, 1e-10, horizon);
+double EndError(const harness::MechanismFile& file, double tolerance, double horizon) {
+  const harness::Record theirs = RunFile(file, kMujoco, tolerance, horizon);
+  const harness::Record ours = RunFile(file, kOdca, 1e-10, horizon);
   EXPECT_EQ(theirs.Text("outcome"), "finished") << theirs.Text("message");
   double difference = 0.0;
   int poses = 0;
@@ -119,8 +120,9 @@ TEST_P(ShippedMujoco, ComesCloserToOursWithTheSquareOfTheStep) {
   }
   // a hundredth of the tolerance is 10^(-1/2) of the step, which leaves a tenth; what is below
   // 1e-10 m or rad is the error of our own run
-  const double error = EndError(GetParam(), coarse, horizon);
-  EXPECT_LE(EndError(GetParam(), 0.01 * coarse, horizon), 0.2 * error + 1e-10);
+  const harness::MechanismFile file = Shipped(GetParam());
+  const double error = EndError(file, coarse, horizon);
+  EXPECT_LE(EndError(file, 0.01 * coarse, horizon), 0.2 * error + 1e-10);
   EXPECT_LE(error, 0.03);
 }
 
@@ -129,6 +131,33 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedMujoco,
                          [](const auto& name) {
                            return harness::reference::WithoutDashes(name.param);
                          });
+
+/// A palm on a turning wrist with two fingers, of which the second follows the first.
+constexpr const char* kGripper = R"(<robot name="gripper"><link name="world"/>
+<link name="palm"><inertial><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="left"><inertial><origin xyz="0.05 0 0"/><mass value="0.2"/>
+  <inertia ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="right"><inertial><origin xyz="0.05 0 0"/><mass value="0.2"/>
+  <inertia ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="wrist" type="continuous"><parent link="world"/><child link="palm"/>
+  <axis xyz="0 1 0"/></joint>
+<joint name="l" type="continuous"><origin xyz="0 0.02 0"/><parent link="palm"/><child link="left"/>
+  <axis xyz="0 0 1"/></joint>
+<joint name="r" type="continuous"><origin xyz="0 -0.02 0"/><parent link="palm"/>
+  <child link="right"/><axis xyz="0 0 1"/><mimic joint="l" multiplier="-0.8" offset="0.1"/></joint>
+</robot>)";
+
+TEST(MujocoCouplings, AGripperThatMimicsMovesLikeOurs) {
+  harness::MechanismFile file{harness::ImportText(kGripper, "gripper.urdf").description};
+  file.canonical = file.description.name;
+  file.description.initial.speeds = {{0, {1.0}}, {1, {2.0}}};
+  ASSERT_EQ(file.description.couplings.size(), 1u);
+  // as above: a tenth by a hundredth of the tolerance
+  const double error = EndError(file, 1e-6, 0.5);
+  EXPECT_LE(EndError(file, 1e-8, 0.5), 0.2 * error + 1e-10);
+  EXPECT_LE(error, 1e-3);
+}
 
 }  // namespace
 }  // namespace loopbench::testing

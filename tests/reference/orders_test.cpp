@@ -151,8 +151,9 @@ TEST_P(OrdersOfTables, AreThoseOfTheirNames) {
                        Exact(motion));
       };
       const double first = error(coarse), second = error(2 * coarse);
-      // above round-off, and above the tolerance 1e-12 of Newton's iteration
-      EXPECT_GT(second, 1e-12) << motion.mechanism << " " << table.name;
+      // above the tolerance of Newton's iteration, or the round-off of some 100 steps
+      EXPECT_GT(second, table.is_implicit() ? 1e-12 : 1e-13)
+          << motion.mechanism << " " << table.name;
       // as above
       EXPECT_NEAR(std::log2(first / second), table.order, 0.5)
           << motion.mechanism << " " << table.name << " " << first << " " << second;

@@ -312,6 +312,18 @@ Json WriteMotions(const Joint& joint) {
   return motions;
 }
 
+void ReadRotor(const JsonNode& node, Joint& joint) {
+  joint.rotor_inertia = node.Number(kNotNegative);
+  if (joint.rotor_inertia > 0.0 && NumValues(joint.type, joint.draft->space, false) != 1) {
+    node.FailAs(fmt::format("a rotor of a {} joint", ToString(joint.type)),
+                "a joint with one coordinate (revolute, prismatic or helical)");
+  }
+}
+
+Json WriteRotor(const Joint& joint) {
+  return joint.rotor_inertia > 0.0 ? Json(joint.rotor_inertia) : Json();
+}
+
 bool IsMissingInPlane(const Joint& joint) {
   return joint.draft->space == SpaceKind::kPlanar && !TraitsOf(joint.type).in_plane;
 }
@@ -366,6 +378,9 @@ Fields<Joint> MakeJointFields() {
   rows.push_back({"motion", By(motions, ReadMotions, WriteMotions),
                   "Prescribed coordinates as functions of time [rad or m]: one function for a "
                   "joint with one coordinate, otherwise a list."});
+  rows.push_back({"rotor_inertia", By(NumberSchema(kNotNegative), ReadRotor, WriteRotor),
+                  "Inertia of a rotor along the joint's one coordinate, times the square of its "
+                  "gear ratio [kg m^2, or kg]; default: 0."});
   rows.push_back({"cut", Bool(&JointDescription::cut),
                   "If true, the joint closes its loop and has no joint coordinate."});
   return {"joint", "Joint between frame F on one body and frame M on another.", std::move(rows)};

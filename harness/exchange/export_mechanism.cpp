@@ -85,6 +85,12 @@ class Maker {
     } else if (!IsBuiltIn(type)) {
       Miss("joint \"{}\": {}", made.name, ToString(type));
     }
+    if (joint.description >= 0) {
+      made.rotor_inertia = description_.joints[joint.description].rotor_inertia;
+    }
+    if (made.rotor_inertia > 0.0 && !joint.in_tree()) {
+      Miss("rotor of joint \"{}\", which closes a loop", made.name);
+    }
     made.kind = ToString(type);
     made.parameter = joint.kind->parameter;
     made.from = joint.from;

@@ -411,6 +411,7 @@ class MjcfWriter {
     if (stiffness != 0.0) {
       text = Attribute("stiffness", stiffness) + Attribute("springref", sign * pull / stiffness);
     }
+    if (joint.rotor_inertia > 0.0) text += Attribute("armature", joint.rotor_inertia);
     return damping != 0.0 ? text + Attribute("damping", damping) : text;
   }
 

@@ -161,6 +161,10 @@ SimbodyParts MakeSimbodyParts(const Model& model) {
   for (const Coupling& coupling : model.couplings) {
     missing.push_back(fmt::format("coupling \"{}\"", coupling.name));
   }
+  for (const Joint& joint : model.tree) {
+    if (joint.rotor_inertia > 0.0)
+      missing.push_back(fmt::format("rotor of joint \"{}\"", joint.name));
+  }
   SimbodyParts parts;
   for (std::size_t i = 0; i < model.tree.size(); ++i) {
     const SimbodyMobilizer& made = parts.mobilizers.emplace_back(MakeMobilizer(model, i));

@@ -372,6 +372,14 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
     Note(element, fmt::format("coupling \"{}\" {}", coupling.name, kNotCoupled), true);
     return true;
   });
+  for (const int joint : chain.joints) {
+    if (description.joints[joint].rotor_inertia == 0.0) continue;
+    Note(
+        element,
+        fmt::format("rotor of joint \"{}\" dropped: {}", description.joints[joint].name, kNoRotors),
+        true);
+    description.joints[joint].rotor_inertia = 0.0;
+  }
   InitialDescription& initial = description.initial;
   std::size_t coordinates_given = 0, speeds_given = 0;
   const std::vector<double> q = TakeValues(chain, &initial.coordinates, &coordinates_given),

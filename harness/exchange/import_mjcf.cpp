@@ -16,7 +16,6 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"sensor", "there are no sensors"},
     {"extension", "there are no plugins", true},
     {"deformable", "bodies are rigid", true},
-    {"joint@armature", kNoRotors, true},
     {"joint@frictionloss", kDryFriction, true},
     {"joint@springdamper", "stiffness and damping by frequency depend on masses of the start",
      true},

@@ -15,8 +15,6 @@
 
 namespace loopbench::harness {
 
-inline constexpr const char* kNoRotors = "rotors have no inertia beside that of the bodies";
-
 /// Attributes that limit the efforts of all actuators of a joint.
 inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange = "actuatorfrcrange";
 

@@ -17,7 +17,6 @@ using Eigen::Vector3d;
 
 void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
   const XmlElement& own = joint.element.own();
-  model.DropNonzero(joint.element, "armature", kNoRotors);
   model.DropNonzero(joint.element, "frictionloss", kDryFriction);
   model.NoteLimits(joint.element, kNoEnds);
   if (BoolOr(joint.element.Attribute("actuatorgravcomp")) &&
@@ -26,17 +25,20 @@ void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
   }
 }
 
-/// Adds springs and dampers of a joint that is a whole Loopbench joint; drops others.
+/// Adds springs, dampers and the rotor of a joint that is a whole Loopbench joint; drops others.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   const MjcfElement& element = joint.element;
   double k = element.Number("stiffness", 0.0, kNotNegative);
   double c = element.Number("damping", 0.0, kNotNegative);
   if (!model->settings.has_springs) k = 0.0;
   if (!model->settings.has_dampers) c = 0.0;
+  const double rotor = element.Number("armature", 0.0, kNotNegative);
   if (joint.has_coordinate()) {
     model->draft->AddSpringAndDamper(k, joint.spring_reference - joint.reference, c);
+    model->draft->description.joints.back().rotor_inertia = rotor;
     return;
   }
+  if (rotor > 0.0) model->draft->Drop(element.own(), "armature", kNoRotors);
   if (k > 0.0) model->draft->Drop(element.own(), "stiffness", kNeedsOneCoordinate);
   if (c > 0.0) model->draft->Drop(element.own(), "damping", kNeedsOneCoordinate);
 }

@@ -43,6 +43,7 @@ struct Joint {
   int num_q = 0, num_u = 0, q = -1, u = -1;  ///< sizes, and first index among all
   std::vector<std::string> coordinates;      ///< their names: "angle"
   bool from_is_child = false;                ///< P is the child of Q
+  double rotor_inertia = 0.0;                ///< along the one coordinate
   /// Constrained directions of a spatial cut joint that the loop does not already imply
   /// (mechanism/simplify/redundancy.h): components of a motion [w; v] in axes of F. Empty: all
   /// directions that its kind constrains.

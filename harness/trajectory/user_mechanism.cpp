@@ -416,6 +416,7 @@ void Reactions<Space>::Solve(std::span<const Acceleration<Space, double>> A,
     work.w[b] = InertialForce<Space, double>(work.user.kinematics(), b, A[b]) - applied[b];
     work.left[b] = static_cast<int>(work.joints_of[b].size());
   }
+  AddRotorWrenches<Space, double>(work.user.kinematics(), A, work.w);
   for (auto& open : work.open) open.clear();
   work.is_done.assign(work.total.size(), false);
   const bool is_coupled = !work.user.mechanism().couplings().empty();

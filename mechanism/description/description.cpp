@@ -91,6 +91,12 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
     return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) + " needs a " +
            std::string(parameter.key) + " > 0";
   }
+  if (!std::isfinite(joint.rotor_inertia) || joint.rotor_inertia < 0.0) {
+    return "joint " + Quote(joint.name) + ": rotor_inertia must be finite and not negative";
+  }
+  if (joint.rotor_inertia > 0.0 && NumValues(joint.type, description.space, false) != 1) {
+    return "joint " + Quote(joint.name) + ": a rotor needs a joint with one coordinate";
+  }
   if (const std::string error = CheckMotions(description.space, joint); !error.empty()) {
     return "joint " + Quote(joint.name) + ": " + error;
   }

@@ -54,6 +54,9 @@ struct JointDescription {
   /// impose because they are redundant (redundancy.h). Only for cut joints; never in a user's file.
   std::vector<int> released;
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
+  /// Inertia of a rotor along the one coordinate [kg m^2, or kg]: of a drive, times the square of
+  /// its gear ratio. It resists changes of the joint's speed, not of the bodies' own.
+  double rotor_inertia = 0.0;
 };
 
 /// A linear relation of joint coordinates, sum_i ratio_i q_i = offset: gears, racks, differentials,

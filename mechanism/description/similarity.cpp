@@ -35,6 +35,7 @@ class Scaling {
       joint.to.position *= factor_;
       const bool is_length = TraitsOf(joint.type).parameter.unit.starts_with('m');
       joint.parameter *= is_length ? factor_ : 1.0;
+      joint.rotor_inertia *= IsLength(index, 0, false) ? 1.0 : factor_ * factor_;
       for (PrescribedMotion& motion : joint.motions) {
         if (IsLength(index, motion.coordinate, false)) Scale(motion.value, factor_);
       }

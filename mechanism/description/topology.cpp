@@ -31,7 +31,7 @@ class DisjointSets {
 };
 
 /// Low numbers prefer the tree. 0: follows a prescribed motion or a thread exactly there, 1: fixed,
-/// 2: guessed, 3: carries a force, a coupling or a speed, 4: neutral, 5: marked "cut".
+/// 2: guessed, 3: carries a force, a rotor, a coupling or a speed, 4: neutral, 5: marked "cut".
 std::vector<int> CutPreference(const MechanismDescription& description) {
   std::vector<int> preference(description.joints.size(), 4);
   const auto keep = [&](int joint) { preference[joint] = 3; };
@@ -46,6 +46,7 @@ std::vector<int> CutPreference(const MechanismDescription& description) {
   for (int joint : description.initial.held) preference[joint] = 1;
   for (std::size_t i = 0; i < preference.size(); ++i) {
     const JointDescription& joint = description.joints[i];
+    if (joint.rotor_inertia > 0.0) preference[i] = std::min(preference[i], 3);
     if (!joint.motions.empty() || TraitsOf(joint.type).cut_last) preference[i] = 0;
     if (joint.cut) preference[i] = 5;
   }

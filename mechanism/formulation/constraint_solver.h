@@ -10,11 +10,11 @@
 //   speeds         0      minus the velocity violation: x is the impulsive velocity correction
 //   derivatives    minus derivatives of the left-hand sides (forward_jacobian.h)
 //
-// A solver implements Factor() and Solve() for the constraints of joints; couplings are added to
-// all solvers alike (coupled_solver.h). The remaining virtual functions are optional, with default
-// implementations. The given Kinematics supplies positions, speeds and time. The solver
-// keeps no state of the motion. Between calls of Start() or Review() it is a function of its
-// arguments: any order of calls gives the same bits. Only Start(), Review() and Counters() may
+// A solver implements Factor() and Solve() for the constraints of joints; couplings and
+// rotors are added to all solvers alike (coupled_solver.h). The remaining virtual functions are
+// optional, with default implementations. The given Kinematics supplies positions, speeds and time.
+// The solver keeps no state of the motion. Between calls of Start() or Review() it is a function of
+// its arguments: any order of calls gives the same bits. Only Start(), Review() and Counters() may
 // allocate.
 #pragma once
 

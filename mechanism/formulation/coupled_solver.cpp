@@ -1,5 +1,6 @@
 #include "mechanism/formulation/coupled_solver.h"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -27,17 +28,22 @@ CoupledSolver<Space, S>::CoupledSolver(const Mechanism<Space, S>& mechanism,
       inner_(std::move(inner)),
       kind_(kind),
       dynamics_(mechanism),
+      num_couplings_(std::ssize(mechanism.couplings())),
       rows_(VectorX<S>::Zero(mechanism.num_rows())),
       lambda_(rows_),
       force_(VectorX<S>::Zero(mechanism.num_u())),
       column_(force_) {
-  const auto couplings = static_cast<Eigen::Index>(mechanism.couplings().size());
-  G_.setZero(couplings, mechanism.num_u());
-  Y_.setZero(mechanism.num_u(), couplings);
-  X_.setZero(couplings, couplings);
-  scale_.setZero(couplings);
-  mu_ = left_ = scale_;
-  order_.resize(mechanism.couplings().size());
+  const std::vector<Rotor<S>>& rotors = mechanism.rotors();
+  const Eigen::Index rows = num_couplings_ + std::ssize(rotors);
+  G_.setZero(rows, mechanism.num_u());
+  Y_.setZero(mechanism.num_u(), rows);
+  X_.setZero(rows, rows);
+  scale_.setZero(rows);
+  mu_ = left_ = yield_ = scale_;
+  for (std::size_t r = 0; r < rotors.size(); ++r) {
+    yield_[num_couplings_ + static_cast<Eigen::Index>(r)] = S(1) / rotors[r].inertia;
+  }
+  order_.resize(static_cast<std::size_t>(rows));
 }
 
 template <class Space, class S>
@@ -47,18 +53,24 @@ Outcome CoupledSolver<Space, S>::Factor(const Kinematics<Space, S>& kinematics) 
   const Outcome outcome = inner_->Factor(kinematics);
   this->conditioning_ = inner_->conditioning();
   if (outcome != Outcome::kFinished) return outcome;
-  dynamics_.CouplingJacobian(kinematics, G_);
+  dynamics_.CouplingJacobian(kinematics, G_, true);
   rows_.setZero();
   for (int c = 0; c < G_.rows(); ++c) {
     force_ = G_.row(c).transpose();
     inner_->Solve(force_, rows_, column_, nullptr);
     Y_.col(c) = column_;
-    const S free = FreeResponseOf(kinematics, Masses::kPhysical, c);
+    const S free =
+        yield_[c] + (c < num_couplings_
+                         ? FreeResponseOf(kinematics, Masses::kPhysical, c)
+                         : FreeResponseOfCoordinate(kinematics, Masses::kPhysical,
+                                                    mechanism_.rotors()[c - num_couplings_].joint));
     scale_[c] = free > S(0) ? S(S(1) / sqrt(free)) : S(0);
   }
   rank_ = FactorResponse();
-  this->conditioning_.rank += rank_;
-  const bool depends = rank_ < static_cast<int>(order_.size());
+  const auto independent = std::count_if(order_.begin(), order_.begin() + rank_,
+                                         [&](int row) { return row < num_couplings_; });
+  this->conditioning_.rank += static_cast<int>(independent);
+  const bool depends = independent < num_couplings_;
   return depends && kind_ == SolverKind::kAsPublished ? Outcome::kSingular : Outcome::kFinished;
 }
 
@@ -71,6 +83,7 @@ int CoupledSolver<Space, S>::FactorResponse() {
     for (int j = 0; j <= i; ++j) {
       X_(i, j) = X_(j, i) = (X_(i, j) + X_(j, i)) * S(0.5) * scale_[i] * scale_[j];
     }
+    X_(i, i) += yield_[i] * scale_[i] * scale_[i];
   }
   std::iota(order_.begin(), order_.end(), 0);
   for (int p = 0; p < n; ++p) {
@@ -100,7 +113,7 @@ template <class Space, class S>
 void CoupledSolver<Space, S>::Couple(const VectorX<S>& target, VectorX<S>& x) {
   left_.noalias() = G_ * x;
   left_ = -left_;
-  if (target.size() > rows_.size()) left_ += target.tail(left_.size());
+  if (target.size() > rows_.size()) left_.head(num_couplings_) += target.tail(num_couplings_);
   mu_.setZero();
   // L z = scaled left, then L^T z
   for (int i = 0; i < rank_; ++i) {
@@ -127,8 +140,8 @@ void CoupledSolver<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& t
   force_.noalias() = G_.transpose() * mu_;
   if (force.size() > 0) force_ += force;
   inner_->Solve(force_, rows_, column_, &lambda_);
-  lambda->resize(lambda_.size() + mu_.size());
-  *lambda << lambda_, mu_;
+  lambda->resize(lambda_.size() + num_couplings_);
+  *lambda << lambda_, mu_.head(num_couplings_);
 }
 
 template <class Space, class S>
@@ -141,13 +154,14 @@ void CoupledSolver<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
 template <class Space, class S>
 std::string CoupledSolver<Space, S>::WhySingular() const {
   const std::string why = inner_->WhySingular();
-  if (!why.empty() || rank_ == static_cast<int>(order_.size())) return why;
+  if (!why.empty()) return why;
   std::string names;
   for (std::size_t i = static_cast<std::size_t>(rank_); i < order_.size(); ++i) {
+    if (order_[i] >= num_couplings_) continue;
     names += (names.empty() ? "\"" : ", \"") +
              mechanism_.couplings()[static_cast<std::size_t>(order_[i])].name + '"';
   }
-  return "coupling " + names + " depends on the other constraints";
+  return names.empty() ? "" : "coupling " + names + " depends on the other constraints";
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class CoupledSolver<Space, S>;

@@ -1,19 +1,21 @@
-// Couplings of joint coordinates (mechanism.h) with any solver of the joint constraints.
+// Couplings of joint coordinates and rotors (mechanism.h) with any solver of the joint constraints.
 //
-//   M x - J^T lambda - G^T mu = f,      J x = c,      G x = d
+//   (M + R^T I R) x - J^T lambda - G^T mu = f,      J x = c,      G x = d
 //
-// G has a row per coupling. x0 is the inner solver's result for (f, c), and a column of Y its
-// result for a row of G as force, with c = 0. Then
+// G has a row per coupling, R one per rotor, I are the rotors' inertias. With tau = -I R x the
+// rotors' efforts are unknowns like mu, and all rows are alike. x0 is the inner solver's result for
+// (f, c), and a column of Y its result for a row of G or R as force, with c = 0. Then
 //
-//   x = x0 + Y mu,      X mu = d - G x0,      X = G Y
+//   x = x0 + Y [mu; tau],      (X + diag(0, I^-1)) [mu; tau] = [d; 0] - [G; R] x0,      X = [G; R]
+//   Y
 //
-// X, symmetric and positive semidefinite, is the response of the mechanism to the couplings'
-// forces. It is scaled by FreeResponseOf() and factored by Cholesky with pivoting. Couplings whose
-// pivots are round-off depend on the other constraints: they carry no force. As published they end
-// the run as `singular`.
+// X, symmetric and positive semidefinite, is the response of the mechanism to these forces. The sum
+// is scaled by FreeResponseOf() and factored by Cholesky with pivoting. Couplings whose pivots are
+// round-off depend on the other constraints: they carry no force. As published they end the run as
+// `singular`. Rotors with such pivots are on coordinates that cannot move.
 //
 // Vectors of rows contain the rows of joints, then a number per coupling, which may be missing and
-// is then zero. A position takes one solution of the inner solver per coupling.
+// is then zero. A position takes one solution of the inner solver per coupling and rotor.
 #pragma once
 
 #include <memory>
@@ -36,7 +38,8 @@ class CoupledSolver final : public ConstraintSolver<Space, S> {
   Outcome Factor(const Kinematics<Space, S>& kinematics) override;
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
-  /// The inner solver's change, then the smallest in the metric M that satisfies the couplings.
+  /// The inner solver's change, then the smallest in the metric of the masses that satisfies the
+  /// couplings.
   void Correct(const VectorX<S>& target, VectorX<S>& x) override;
   void Start(const Kinematics<Space, S>& kinematics) override { inner_->Start(kinematics); }
   bool Review(const Kinematics<Space, S>& kinematics) override {
@@ -47,19 +50,21 @@ class CoupledSolver final : public ConstraintSolver<Space, S> {
   std::vector<NamedCount> Counters() const override { return inner_->Counters(); }
 
  private:
-  /// Factors the scaled X; returns its rank.
+  /// Factors the scaled sum X + diag(0, I^-1); returns its rank.
   int FactorResponse();
-  /// Sets mu_, and adds Y mu to x = x0.
+  /// Sets mu_, efforts of couplings, then of rotors, and adds Y mu to x = x0.
   void Couple(const VectorX<S>& target, VectorX<S>& x);
 
   const Mechanism<Space, S>& mechanism_;
   std::unique_ptr<ConstraintSolver<Space, S>> inner_;
   SolverKind kind_;
   TreeDynamics<Space, S> dynamics_;
-  MatrixX<S> G_, Y_, X_;    ///< X_: scaled, then L by pivot order
-  VectorX<S> scale_;        ///< 1 / sqrt(FreeResponseOf())
-  std::vector<int> order_;  ///< couplings by pivot
-  int rank_ = 0;            ///< of X
+  Eigen::Index num_couplings_;
+  MatrixX<S> G_, Y_, X_;    ///< G_: with R; X_: scaled sum, then L by pivot order
+  VectorX<S> yield_;        ///< 0 by coupling, 1 / inertia by rotor
+  VectorX<S> scale_;        ///< 1 / sqrt(FreeResponseOf() + yield_)
+  std::vector<int> order_;  ///< rows of G_ by pivot
+  int rank_ = 0;            ///< of X_
   VectorX<S> rows_, lambda_, force_, column_, mu_, left_;
 };
 

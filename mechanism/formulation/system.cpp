@@ -19,12 +19,12 @@ void SetRegularization(FactoredState<Space, S>& state, double share) {
   state.ForgetFactors();
 }
 
-/// The solver itself without couplings.
+/// The solver itself without couplings and rotors.
 template <class Space, class S>
 std::unique_ptr<ConstraintSolver<Space, S>> WithCouplings(
     const Mechanism<Space, S>& mechanism, std::unique_ptr<ConstraintSolver<Space, S>> solver,
     SolverKind kind) {
-  if (mechanism.couplings().empty()) return solver;
+  if (mechanism.couplings().empty() && mechanism.rotors().empty()) return solver;
   return std::make_unique<CoupledSolver<Space, S>>(mechanism, std::move(solver), kind);
 }
 

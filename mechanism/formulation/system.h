@@ -38,8 +38,8 @@ class Passage;
 template <class Space, class S>
 class System final : public Ode<S> {
  public:
-  /// `mechanism` must outlive the system and its solver, which was made for it. Couplings are added
-  /// to the solver (coupled_solver.h).
+  /// `mechanism` must outlive the system and its solver, which was made for it. Couplings and
+  /// rotors are added to the solver (coupled_solver.h).
   System(const Mechanism<Space, S>& mechanism, std::unique_ptr<ConstraintSolver<Space, S>> solver,
          const FormulationOptions& options);
   ~System() override;

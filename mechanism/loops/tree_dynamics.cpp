@@ -248,6 +248,7 @@ void TreeDynamics<Space, S>::NeededWrenches(const Kinematics<Space, S>& kinemati
   for (int body = 1; body < mechanism.num_bodies(); ++body) {
     F_[body] = InertialForce<Space, S>(kinematics, body, A_bias_[body]) - F_[body];
   }
+  AddRotorWrenches<Space, S>(kinematics, A_bias_, F_);
 }
 
 /// Inwards, child before parent: a joint transmits the total load of all bodies outward of it. H^T
@@ -289,16 +290,21 @@ void TreeDynamics<Space, S>::JacobianOf(const Kinematics<Space, S>& kinematics, 
 }
 
 template <class Space, class S>
-void TreeDynamics<Space, S>::CouplingJacobian(const Kinematics<Space, S>& kinematics,
-                                              MatrixX<S>& G) const {
+void TreeDynamics<Space, S>::CouplingJacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& G,
+                                              bool with_rotors) const {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  G.setZero(static_cast<Eigen::Index>(mechanism.couplings().size()), mechanism.num_u());
-  for (int c = 0; c < G.rows(); ++c) {
-    for (const auto& [index, ratio] : mechanism.couplings()[c].parts) {
-      ForEachSpeedOfCoordinate(kinematics, index,
-                               [&](int column, const S& rate) { G(c, column) += ratio * rate; });
-    }
+  const std::size_t couplings = mechanism.couplings().size(),
+                    rotors = with_rotors ? mechanism.rotors().size() : 0;
+  G.setZero(static_cast<Eigen::Index>(couplings + rotors), mechanism.num_u());
+  const auto add = [&](std::size_t row, int joint, const S& ratio) {
+    ForEachSpeedOfCoordinate(kinematics, joint, [&](int column, const S& rate) {
+      G(static_cast<Eigen::Index>(row), column) += ratio * rate;
+    });
+  };
+  for (std::size_t c = 0; c < couplings; ++c) {
+    for (const auto& [joint, ratio] : mechanism.couplings()[c].parts) add(c, joint, ratio);
   }
+  for (std::size_t r = 0; r < rotors; ++r) add(couplings + r, mechanism.rotors()[r].joint, S(1));
 }
 
 /// A joint of the forest has its udot; of a cut joint it is H^T (A_Q - A_P - g) / |H|^2, where g
@@ -323,23 +329,48 @@ S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, con
   return sum;
 }
 
+/// The acceleration along the coordinate is H^T (A_Q - A_P - g) / |H|^2, where g has a prescribed
+/// one.
+template <class Space, class S>
+void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
+                      std::span<const Acceleration<Space, S>> A,
+                      std::span<Wrench<Space, S>> wrenches) {
+  for (const auto& [index, inertia] : kinematics.mechanism().rotors()) {
+    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    const Direction<Space, S>& H = state.basis[0];
+    S acceleration =
+        joint.kind->inverse_H_squared * H.dot(RelativeAcceleration<Space, S>(kinematics, index, A));
+    if (joint.num_drives > 0) acceleration += kinematics.drives()[joint.first_drive].acceleration;
+    const Wrench<Space, S> F = H * (joint.kind->inverse_H_squared * inertia * acceleration);
+    wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
+    wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
+  }
+}
+
+template <class Space, class S>
+S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses, int index) {
+  const std::vector<Inertia<Space, S>>& inertias = kinematics.mechanism().bodies(masses);
+  const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  S sum = S(0);
+  if (joint.num_drives > 0) return sum;
+  const S scale = joint.kind->inverse_H_squared;
+  for (const auto& [body, r] : {std::pair{joint.to, kinematics.ArmQ(index, masses)},
+                                std::pair{joint.from, kinematics.ArmP(index, masses)}}) {
+    if (body == kGround) continue;
+    const Wrench<Space, S> F = ShiftForce<Space, S>(kinematics.joints()[index].basis[0], r);
+    const Acceleration<Space, S> A(kinematics.RotationalInverse(inertias[body], body) * F.angular,
+                                   F.linear / inertias[body].mass);
+    sum += scale * scale * F.dot(A);
+  }
+  return sum;
+}
+
 template <class Space, class S>
 S FreeResponseOf(const Kinematics<Space, S>& kinematics, Masses masses, int coupling) {
-  const Mechanism<Space, S>& mechanism = kinematics.mechanism();
-  const std::vector<Inertia<Space, S>>& inertias = mechanism.bodies(masses);
   S sum = S(0);
-  for (const auto& [index, ratio] : mechanism.couplings()[coupling].parts) {
-    const Joint<Space, S>& joint = mechanism.joints()[index];
-    if (joint.num_drives > 0) continue;
-    const S scale = ratio * joint.kind->inverse_H_squared;
-    for (const auto& [body, r] : {std::pair{joint.to, kinematics.ArmQ(index, masses)},
-                                  std::pair{joint.from, kinematics.ArmP(index, masses)}}) {
-      if (body == kGround) continue;
-      const Wrench<Space, S> F = ShiftForce<Space, S>(kinematics.joints()[index].basis[0], r);
-      const Acceleration<Space, S> A(kinematics.RotationalInverse(inertias[body], body) * F.angular,
-                                     F.linear / inertias[body].mass);
-      sum += scale * scale * F.dot(A);
-    }
+  for (const auto& [joint, ratio] : kinematics.mechanism().couplings()[coupling].parts) {
+    sum += ratio * ratio * FreeResponseOfCoordinate(kinematics, masses, joint);
   }
   return sum;
 }
@@ -435,6 +466,10 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
                                                   std::span<const Acceleration<Space, S>>);      \
   template S CouplingAcceleration(const Kinematics<Space, S>&, int, const VectorX<S>*,           \
                                   std::span<const Acceleration<Space, S>>);                      \
+  template void AddRotorWrenches(const Kinematics<Space, S>&,                                    \
+                                 std::span<const Acceleration<Space, S>>,                        \
+                                 std::span<Wrench<Space, S>>);                                   \
+  template S FreeResponseOfCoordinate(const Kinematics<Space, S>&, Masses, int);                 \
   template S FreeResponseOf(const Kinematics<Space, S>&, Masses, int);                           \
   template JointMatrix<S> FreeResponse(const Kinematics<Space, S>&, Masses, int, bool);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)

@@ -3,7 +3,8 @@
 //   M(q) udot + h(q, u) = J^T lambda,      J(q) udot = gamma(q, u),      J u + b(q, t) = 0.
 //
 // b, from prescribed motions, is zero without them, and h and gamma then do not depend on time.
-// Couplings (mechanism.h) add rows G to J, multipliers mu to lambda and numbers to gamma.
+// Couplings (mechanism.h) add rows G to J, multipliers mu to lambda and numbers to gamma. Rotors
+// add their accelerating forces to h. Solvers add their part of M (coupled_solver.h).
 //
 // M by the composite-rigid-body method, h by one outward and one inward pass (Featherstone, Rigid
 // Body Dynamics Algorithms, ch. 5 and 6), J row by row from D^T (V_Q - V_P) at the joint's point.
@@ -36,8 +37,10 @@ class TreeDynamics {
   void JacobianOf(const Kinematics<Space, S>& kinematics, int joint,
                   Eigen::Ref<MatrixX<S>> rows) const;
 
-  /// G (num_equations - num_rows x num_u): derivatives of the couplings' rates by u.
-  void CouplingJacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& G) const;
+  /// G: derivatives by u of the couplings' rates (num_equations - num_rows x num_u), then, if asked
+  /// for, of the rates of joints with rotors.
+  void CouplingJacobian(const Kinematics<Space, S>& kinematics, MatrixX<S>& G,
+                        bool with_rotors = false) const;
 
   /// gamma of joints and couplings (num_equations), after Bias().
   void JacobianBias(const Kinematics<Space, S>& kinematics, VectorX<S>& gamma) const;
@@ -111,8 +114,17 @@ template <class Space, class S>
 S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, const VectorX<S>* udot,
                        std::span<const Acceleration<Space, S>> A);
 
-/// Response of a coupling to its own force if only the two bodies of each joint move: the scale of
-/// its row.
+/// Adds the wrenches, at the centres of mass, that rotors need for accelerations A of these.
+template <class Space, class S>
+void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
+                      std::span<const Acceleration<Space, S>> A,
+                      std::span<Wrench<Space, S>> wrenches);
+
+/// Response of a joint's coordinate to its own force if only the two bodies of the joint move; 0 if
+/// its motion is prescribed.
+template <class Space, class S>
+S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses, int joint);
+/// The same of a coupling: the scale of its row.
 template <class Space, class S>
 S FreeResponseOf(const Kinematics<Space, S>& kinematics, Masses masses, int coupling);
 

@@ -24,7 +24,8 @@ void AppliedForces(const Kinematics<Space, S>& kinematics, std::span<Wrench<Spac
       [&](const auto& element) { element.AddWrenches(kinematics, wrenches); });
 }
 
-/// Kinetic: (m v^2 + w . I w) / 2 at the centre of mass. Potential: -m g . p and the forces' own.
+/// Kinetic: (m v^2 + w . I w) / 2 at the centre of mass, and I q'^2 / 2 of rotors. Potential:
+/// -m g . p and the forces' own.
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
@@ -36,6 +37,10 @@ Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics) {
     const Angular<Space, S> Iw = kinematics.RotationalInertia(inertia, body) * V.angular;
     energy.kinetic += half * (inertia.mass * V.linear.squaredNorm() + V.angular.dot(Iw));
     energy.potential -= inertia.mass * mechanism.gravity().dot(kinematics.poses()[body].p);
+  }
+  for (const auto& [joint, inertia] : mechanism.rotors()) {
+    const S rate = kinematics.JointSpeed(joint);
+    energy.kinetic += half * inertia * rate * rate;
   }
   mechanism.forces().ForEach(
       [&](const auto& element) { energy.potential += element.Potential(kinematics); });

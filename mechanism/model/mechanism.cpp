@@ -90,6 +90,10 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   AddBodies(description);
   AddJoints(description, BuildTopology(description, coordinates));
   AddCouplings(description);
+  for (int j = 0; j < std::ssize(description.joints); ++j) {
+    const double inertia = description.joints[j].rotor_inertia;
+    if (inertia > 0.0) rotors_.push_back({j, S(inertia)});
+  }
   forces_ = ForceElements<Space, S>(description);
   AddStopTimes();
   AddGeometry(description);

@@ -69,6 +69,13 @@ struct Coupling {
   S measured_turn = S(0);
 };
 
+/// Inertia along the coordinate of a joint, or along a rate given by a drive.
+template <class S>
+struct Rotor {
+  int joint = 0;
+  S inertia = S(0);
+};
+
 /// Directions that a joint does not impose (redundancy.h), ascending, counted in D behind the
 /// directions of prescribed coordinates.
 struct Released {
@@ -125,6 +132,7 @@ class Mechanism {
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
   const std::vector<Coupling<S>>& couplings() const { return couplings_; }
+  const std::vector<Rotor<S>>& rotors() const { return rotors_; }
   /// Directions that constraints do not impose at first, by joint; usually empty.
   const std::vector<Released>& released() const { return released_; }
   /// Returns true if released directions are constraints that drift (self_stress.h), not rounded.
@@ -187,6 +195,7 @@ class Mechanism {
   std::vector<TreeStep> tree_;
   std::vector<int> constraints_, step_of_body_;
   std::vector<Coupling<S>> couplings_;
+  std::vector<Rotor<S>> rotors_;
   std::vector<Released> released_;
   bool rounded_ = false;
   ForceElements<Space, S> forces_;

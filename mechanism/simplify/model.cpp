@@ -74,14 +74,16 @@ Simplified Redundant(const MechanismDescription& description, const ShortRun&,
   return result;
 }
 
-/// An approximate rule, for mechanisms without couplings.
+/// An approximate rule, for mechanisms without couplings and rotors.
 template <Simplified (*rule)(const MechanismDescription&, const ShortRun&, const SimplifyOptions&)>
 Simplified Uncoupled(const MechanismDescription& description, const ShortRun& run,
                      const SimplifyOptions& options) {
-  if (description.couplings.empty()) return rule(description, run, options);
+  const bool has_rotor = std::ranges::any_of(
+      description.joints, [](const JointDescription& joint) { return joint.rotor_inertia > 0.0; });
+  if (description.couplings.empty() && !has_rotor) return rule(description, run, options);
   Simplified result;
   result.parts = {description};
-  result.why_not = "the rule does not know couplings";
+  result.why_not = "the rule does not know couplings and rotors";
   return result;
 }
 

@@ -1,5 +1,5 @@
-// Couplings of joint coordinates: every formulation, level, solver, coordinate set and space
-// against an independent dense KKT system of the bodies' planar coordinates, and bad input.
+// Couplings of joint coordinates and rotors: every formulation, level, solver, coordinate set and
+// space against an independent dense KKT system of the bodies' planar coordinates, and bad input.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -68,27 +68,39 @@ MechanismDescription Gripper() {
   return d;
 }
 
+/// Rotors on a pin of Ground, a pin between moving bodies, a joint that closes a loop and the
+/// slide.
+MechanismDescription GripperWithRotors() {
+  MechanismDescription d = Gripper();
+  for (const auto& [joint, inertia] : {std::pair{0, 0.05}, {1, 0.02}, {4, 0.3}, {8, 1.5}}) {
+    d.joints[joint].rotor_inertia = inertia;
+  }
+  return d;
+}
+
 /// Accelerations [x'', y'', angle''] of all bodies: M A - C^T mu = F, C A = gamma, written for
-/// pins, slides along x of Ground, couplings and a torque on a joint, from positions and speeds
-/// alone.
+/// pins, slides along x of Ground, couplings, rotors and a torque on a joint, from positions and
+/// speeds alone.
 class Kkt {
  public:
   Kkt(const MechanismDescription& description, const Kinematics<Planar, double>& at)
       : d_(description), at_(at), n_(3 * (static_cast<int>(d_.bodies.size()) - 1)) {
-    M_.setZero(n_);
+    M_.setZero(n_, n_);
     F_.setZero(n_);
     for (int b = 1; b < static_cast<int>(d_.bodies.size()); ++b) {
-      M_.segment<3>(3 * b - 3) << d_.bodies[b].mass, d_.bodies[b].mass, d_.bodies[b].inertia(2, 2);
+      M_.diagonal().segment<3>(3 * b - 3) << d_.bodies[b].mass, d_.bodies[b].mass,
+          d_.bodies[b].inertia(2, 2);
       F_.segment<2>(3 * b - 3) = d_.bodies[b].mass * d_.gravity.head<2>();
     }
-    for (const JointDescription& joint : d_.joints) AddJoint(joint);
+    for (const JointDescription& joint : d_.joints) {
+      AddJoint(joint);
+      Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(n_);
+      AddCoordinate(row, joint, 1.0);
+      M_ += joint.rotor_inertia * row.transpose() * row;
+    }
     for (const CouplingDescription& coupling : d_.couplings) {
       Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(n_);
-      for (const auto& [j, ratio] : coupling.parts) {
-        const bool slides = d_.joints[j].type == JointType::kPrismatic;
-        AddTo(row, d_.joints[j].to.body, slides ? 0 : 2, ratio);
-        AddTo(row, d_.joints[j].from.body, slides ? 0 : 2, -ratio);
-      }
+      for (const auto& [j, ratio] : coupling.parts) AddCoordinate(row, d_.joints[j], ratio);
       Add(row, 0.0);
     }
     const auto& torque = std::get<JointTorque>(d_.forces[0]);
@@ -102,7 +114,7 @@ class Kkt {
     const int m = static_cast<int>(rows_.size());
     Eigen::MatrixXd K = Eigen::MatrixXd::Zero(n_ + m, n_ + m);
     Eigen::VectorXd rhs(n_ + m);
-    K.diagonal().head(n_) = M_;
+    K.topLeftCorner(n_, n_) = M_;
     for (int i = 0; i < m; ++i) {
       K.row(n_ + i).head(n_) = rows_[i];
       K.col(n_ + i).head(n_) = -rows_[i].transpose();
@@ -116,6 +128,12 @@ class Kkt {
  private:
   void AddTo(Eigen::RowVectorXd& row, int body, int component, double value) const {
     if (body != kGround) row[3 * body - 3 + component] += value;
+  }
+  /// Adds the derivative of a joint's coordinate, times `factor`.
+  void AddCoordinate(Eigen::RowVectorXd& row, const JointDescription& joint, double factor) const {
+    const int component = joint.type == JointType::kPrismatic ? 0 : 2;
+    AddTo(row, joint.to.body, component, factor);
+    AddTo(row, joint.from.body, component, -factor);
   }
   void Add(const Eigen::RowVectorXd& row, double gamma) {
     rows_.push_back(row);
@@ -154,7 +172,8 @@ class Kkt {
   const MechanismDescription& d_;
   const Kinematics<Planar, double>& at_;
   int n_;
-  Eigen::VectorXd M_, F_;
+  Eigen::MatrixXd M_;
+  Eigen::VectorXd F_;
   std::vector<Eigen::RowVectorXd> rows_;
   std::vector<double> gamma_;
 };
@@ -215,12 +234,16 @@ void ExpectAccelerations(const Case& c, const MechanismDescription& description,
 class CouplingTest : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CouplingTest, AccelerationsAgreeWithADenseSystemOfTheBodies) {
-  double size = 0.0;
-  const MechanismDescription planar = Gripper();
-  const Eigen::VectorXd expected = Expected(planar, &size);
   const Case& c = GetParam();
-  if (c.space == SpaceKind::kPlanar) return ExpectAccelerations<Planar>(c, planar, expected, size);
-  ExpectAccelerations<Spatial>(c, InSpace(planar, Vector3::Zero()), expected, size);
+  for (const MechanismDescription& planar : {Gripper(), GripperWithRotors()}) {
+    double size = 0.0;
+    const Eigen::VectorXd expected = Expected(planar, &size);
+    if (c.space == SpaceKind::kPlanar) {
+      ExpectAccelerations<Planar>(c, planar, expected, size);
+    } else {
+      ExpectAccelerations<Spatial>(c, InSpace(planar, Vector3::Zero()), expected, size);
+    }
+  }
 }
 
 /// As published, planar loops in space are singular.
@@ -378,6 +401,66 @@ TEST(Couplings, ADifferentialSplitsTheTorque) {
   }
 }
 
+/// A pendulum with a rotor: (J + m r^2 + I) q'' = -m g r sin q, whatever its formulation.
+TEST(Rotors, AddToTheInertiaOfAPendulum) {
+  MechanismDescription d;
+  d.name = "pendulum";
+  d.gravity = {0.0, -9.81, 0.0};
+  d.bodies.push_back(Body("rod", 2.0, 0.05, {0.3, 0.0, 0.0}));
+  d.joints.push_back(Revolute("pin", 0, Vector3::Zero(), 1, Vector3::Zero()));
+  for (const double inertia : {1e-9, 0.4, 1e9}) {
+    d.joints[0].rotor_inertia = inertia;
+    ASSERT_EQ(Validate(d), "");
+    const double wanted = -2.0 * 9.81 * 0.3 * std::cos(0.7) / (0.05 + 2.0 * 0.09 + inertia);
+    for (const std::string name : {"odca", "lagrange", "reduction"}) {
+      const Mechanism<Planar, double> mechanism(d, Coordinates::kJoint);
+      const auto system = harness::MakeFormulation<Planar>(name, mechanism, {});
+      const VectorX<double> q = VectorX<double>::Constant(1, 0.7), u = VectorX<double>::Zero(1);
+      VectorX<double> udot;
+      ASSERT_EQ(system->Start(0.0, q, u), Outcome::kFinished);
+      ASSERT_EQ(system->Evaluate(0.0, q, u, udot), Outcome::kFinished);
+      // x0 and Y mu cancel to the share of the bodies' inertia
+      const double cancelled = 1.0 + inertia / 0.23;
+      EXPECT_NEAR(udot[0], wanted, 64 * kEps * cancelled * std::abs(wanted)) << name << inertia;
+    }
+  }
+}
+
+/// The power of the torque is the rate of the energy, with the rotors' part.
+TEST(Rotors, HaveKineticEnergy) {
+  const MechanismDescription d = GripperWithRotors();
+  const Mechanism<Planar, double> mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble<Planar>(d, mechanism);
+  const auto system = harness::MakeFormulation<Planar>("odca", mechanism, {});
+  ASSERT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+  std::vector<double> y(static_cast<std::size_t>(system->state_size())), ydot(y.size());
+  system->ToState(start.q, start.u, y);
+  ASSERT_EQ(system->Examine(0.0, y, ydot), Outcome::kFinished);
+  const double power = system->TotalPower().supplied;
+  const auto energy_at = [&](double t) {
+    std::vector<double> moved = y, unused(y.size());
+    for (std::size_t i = 0; i < y.size(); ++i) moved[i] += t * ydot[i];
+    EXPECT_EQ(system->FromState(0.0, moved), Outcome::kFinished);
+    return ComputeEnergy(system->kinematics()).total();
+  };
+  const double h = 1e-5, rate = (energy_at(h) - energy_at(-h)) / (2 * h);
+  EXPECT_GT(std::abs(power), 0.01);
+  // h^2 of the third derivative, 10 eps / h of round-off of some 1 J
+  EXPECT_NEAR(rate, power, 1e-8);
+}
+
+TEST(Rotors, UnusableOnesAreRejected) {
+  MechanismDescription d = GearTrain({20, 35}, 3.0);
+  d.joints[0].rotor_inertia = -0.1;
+  EXPECT_EQ(Validate(d),
+            "gear-train: joint \"pin 1\": rotor_inertia must be finite and not negative");
+  d.joints[0].rotor_inertia = 0.1;
+  d.joints[0].type = JointType::kFree;
+  d.couplings.clear();
+  d.forces.clear();
+  EXPECT_EQ(Validate(d), "gear-train: joint \"pin 1\": a rotor needs a joint with one coordinate");
+}
+
 TEST(Couplings, RacksKeepTheirUnitsWhenLengthsScale) {
   MechanismDescription d = Gripper();
   const MechanismDescription large = AtScale(d, 8.0);
@@ -385,6 +468,9 @@ TEST(Couplings, RacksKeepTheirUnitsWhenLengthsScale) {
   EXPECT_EQ(large.couplings[1].parts[0].ratio, 1.0);
   EXPECT_EQ(large.couplings[1].parts[1].ratio, -0.32);
   EXPECT_EQ(large.couplings[1].offset, 0.08);
+  const MechanismDescription rotors = AtScale(GripperWithRotors(), 8.0);
+  EXPECT_EQ(rotors.joints[0].rotor_inertia, 64 * 0.05);
+  EXPECT_EQ(rotors.joints[8].rotor_inertia, 1.5);
 }
 
 /// The Jacobian by forward differentiation against central differences of the right-hand side.
@@ -423,6 +509,7 @@ TEST(Couplings, HaveAnExactJacobian) {
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kBaumgarte}) {
       ExpectJacobian<Planar>(Gripper(), coordinates, level);
+      ExpectJacobian<Planar>(GripperWithRotors(), coordinates, level);
     }
   }
 }

@@ -78,7 +78,7 @@ TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
       <camera name="c"/>
       <unknown/>
     </body>
-    <body name="w"><joint name="l" type="ball" damping="1" stiffness="1"/><geom size="0.1"/></body>
+    <body name="w"><joint name="l" type="ball" damping="1" stiffness="1" armature="0.2"/><geom size="0.1"/></body>
   </worldbody>
   <contact><exclude body1="b" body2="w"/></contact>
   <sensor><gyro site="s"/></sensor>
@@ -98,7 +98,8 @@ TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<geom name=\"floor\">", "no contact");
   ExpectNote(imported, "<body name=\"b\"> mocap", "stays where");
   ExpectNote(imported, "<body name=\"b\"> strange", "not known");
-  ExpectNote(imported, "<joint name=\"j\"> armature", "rotors");
+  ExpectNote(imported, "<joint name=\"l\"> armature", "rotors");
+  EXPECT_EQ(imported.description.joints[0].rotor_inertia, 0.1);
   ExpectNote(imported, "<joint name=\"j\"> frictionloss", "dry friction");
   ExpectNote(imported, "<joint name=\"j\"> range", "without ends");
   ExpectNote(imported, "<joint name=\"j\"> springdamper", "by frequency");

@@ -42,6 +42,47 @@ TEST(MujocoTrees, InSpaceHaveTheOraclesAccelerations) {
   EXPECT_GE(CompareTrees<Spatial>(SpaceKind::kSpatial), 20);  // others have helical joints
 }
 
+/// Trees with a rotor on each joint of one coordinate, `armature` for MuJoCo.
+template <class Space>
+int CompareRotors(SpaceKind space) {
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    MechanismDescription tree = AnyMechanism(6, 0, 0, space, seed);
+    KeepExpressible(tree);
+    double inertia = 0.3;
+    for (JointDescription& joint : tree.joints) {
+      if (NumValues(joint.type, space, false) == 1) joint.rotor_inertia = inertia *= 1.3;
+    }
+    std::unique_ptr<harness::Peer> peer;
+    try {
+      peer = harness::MakePeer("peer/mujoco", tree);
+    } catch (const harness::Inexpressible&) {
+      continue;  // helical
+    }
+    const Sample<Space> sample(tree, seed);
+    const State& state = sample.state(Coordinates::kJoint);
+    const Mechanism<Space, double> mechanism(tree, Coordinates::kJoint);
+    const auto system = harness::MakeFormulation<Space>("odca", mechanism, {});
+    VectorX<double> udot;
+    EXPECT_EQ(system->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+    std::vector<double> y(state.q.begin(), state.q.end());
+    y.insert(y.end(), state.u.begin(), state.u.end());
+    std::vector<double> ydot(y.size());
+    EXPECT_EQ(peer->Derivative(0.0, y, ydot), Outcome::kFinished);
+    const VectorX<double> theirs =
+        Eigen::Map<VectorX<double>>(ydot.data() + state.q.size(), state.u.size());
+    EXPECT_LE(RelativeError(theirs, udot), sample.Bound()) << tree.name;
+    EXPECT_GT(RelativeError(theirs, sample.udot(Coordinates::kJoint)), 1e-3) << tree.name;
+    ++compared;
+  }
+  return compared;
+}
+
+TEST(MujocoTrees, WithRotorsHaveOurAccelerations) {
+  EXPECT_EQ(CompareRotors<Planar>(SpaceKind::kPlanar), 30);
+  EXPECT_GE(CompareRotors<Spatial>(SpaceKind::kSpatial), 10);  // others have helical joints
+}
+
 /// Largest difference to O-DCA's accelerations, over the largest of these, at the four-bar's start
 /// with its crank turning.
 double ErrorOfFourBar(double speed) {

@@ -208,6 +208,7 @@ std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::s
 
 /// Replaces the texts of axes and curves.
 void Relabel(const FreeFigure& wanted, Figure* figure) {
+  const Figure given = *figure;  // texts are no names for later labels
   for (const std::string& label : wanted.labels) {
     const std::size_t cut = label.find('=');
     const std::string name = label.substr(0, cut);
@@ -219,9 +220,13 @@ void Relabel(const FreeFigure& wanted, Figure* figure) {
     };
     put(name == wanted.x, &figure->x_label);
     put(name == wanted.y, &figure->y_label);
-    for (Curve& curve : figure->curves) put(!name.empty() && curve.label == name, &curve.label);
-    for (LegendRow& row : figure->legend) {
-      for (LegendItem& item : row) put(!name.empty() && item.text == name, &item.text);
+    for (std::size_t i = 0; i < given.curves.size(); ++i) {
+      put(!name.empty() && given.curves[i].label == name, &figure->curves[i].label);
+    }
+    for (std::size_t r = 0; r < given.legend.size(); ++r) {
+      for (std::size_t i = 0; i < given.legend[r].size(); ++i) {
+        put(!name.empty() && given.legend[r][i].text == name, &figure->legend[r][i].text);
+      }
     }
     if (cut == std::string::npos || !found) {
       throw ConfigError(fmt::format(

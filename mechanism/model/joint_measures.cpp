@@ -102,10 +102,10 @@ void Kinematics<Space, S>::CountTurns() {
   constexpr double kOpen = 1e-3;  // of the smallest turn; less is a start that is not consistent
   for (std::size_t c = 0; c < turns_.size(); ++c) {
     turns_[c] = S(0);
-    const S turn = mechanism_->couplings()[c].measured_turn;
-    if (turn == S(0)) continue;
+    const std::vector<S>& measured = mechanism_->couplings()[c].measured_turns;
+    if (measured.empty()) continue;
     const S open = CouplingMismatch(static_cast<int>(c));
-    if (abs(open) > S(kOpen) * turn) turns_[c] = open;
+    if (abs(open) > S(kOpen) * measured.back()) turns_[c] = open;
   }
 }
 

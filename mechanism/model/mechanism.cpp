@@ -216,11 +216,9 @@ void Mechanism<Space, S>::AddCouplings(const MechanismDescription& description) 
       coupling.parts.push_back({index, S(ratio)});
       const bool is_angle = joint.kind->axes[0] < Space::kRot && joint.kind->parameter == S(0);
       if (!is_angle || joint.in_tree()) continue;
-      const S turn = S(2.0 * std::numbers::pi * std::abs(ratio));
-      if (coupling.measured_turn == S(0) || turn < coupling.measured_turn) {
-        coupling.measured_turn = turn;
-      }
+      coupling.measured_turns.push_back(S(2.0 * std::numbers::pi * std::abs(ratio)));
     }
+    std::ranges::sort(coupling.measured_turns, std::greater<>());
   }
 }
 

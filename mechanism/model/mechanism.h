@@ -64,9 +64,9 @@ struct Coupling {
   std::string name;
   std::vector<Part> parts;
   S offset = S(0);
-  /// Change of the sum by a turn of an angle of a cut joint, which is measured modulo a turn: the
-  /// smallest; 0 without such angles.
-  S measured_turn = S(0);
+  /// Changes of the sum by a turn of each angle of a cut joint, which is measured modulo a turn;
+  /// largest first.
+  std::vector<S> measured_turns;
 };
 
 /// Inertia along the coordinate of a joint, or along a rate given by a drive.

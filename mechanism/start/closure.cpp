@@ -125,13 +125,12 @@ class Closure {
     return e;
   }
 
-  /// Without whole turns of angles of cut joints, which System::Start() counts.
+  /// Without whole turns of angles of cut joints, which System::Start() counts. At most half of the
+  /// smallest turn.
   double CouplingMismatch(int index) const {
     double open = kinematics_.CouplingMismatch(index);
-    for (const auto& [joint, ratio] : mechanism_.couplings()[index].parts) {
-      const Joint<Space, double>& one = mechanism_.joints()[joint];
-      const bool is_angle = one.kind->axes[0] < Space::kRot && one.kind->parameter == 0.0;
-      if (is_angle && !one.in_tree()) open = std::remainder(open, 2 * kPi * ratio);
+    for (const double turn : mechanism_.couplings()[index].measured_turns) {
+      open = std::remainder(open, turn);
     }
     return open;
   }

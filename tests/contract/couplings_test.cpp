@@ -188,6 +188,7 @@ Eigen::VectorXd Expected(const MechanismDescription& description, double* size) 
   kinematics.UpdateVelocity(start.u);
   EXPECT_GT(start.u.norm(), 0.1);
   for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
+    // 45 eps of angles of at most 1; ten times that of speeds up to 1.5
     EXPECT_NEAR(kinematics.CouplingMismatch(c), 0.0, 1e-14);
     EXPECT_NEAR(kinematics.CouplingSpeed(c), 0.0, 1e-13);
   }
@@ -360,7 +361,7 @@ TEST(Couplings, GearTrainsHaveTheReducedInertia) {
         const double wanted = sign * teeth[0] / teeth[i] * 3.0 / inertia;
         EXPECT_NEAR(udot[static_cast<Eigen::Index>(i)], wanted, 64 * kEps * std::abs(wanted));
       }
-      // the first mesh carries all but the torque of the first gear
+      // the first mesh carries all but the torque of the first gear, up to 150 eps of 3 N m
       const double first = d.bodies[1].inertia(2, 2) * udot[0];
       EXPECT_NEAR(system->Multipliers()[0] * teeth[0], first - 3.0, 1e-13) << row.name;
     }
@@ -395,6 +396,7 @@ TEST(Couplings, ADifferentialSplitsTheTorque) {
     VectorX<double> udot;
     ASSERT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
     ASSERT_EQ(system->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+    // 450 eps: nine coordinates, two eliminations
     EXPECT_NEAR(udot[0], wanted[0], 1e-13 * wanted.norm()) << name;
     EXPECT_NEAR(udot[3], wanted[1], 1e-13 * wanted.norm()) << name;
     EXPECT_NEAR(udot[6], 0.5 * wanted.sum(), 1e-13 * wanted.norm()) << name;
@@ -575,6 +577,7 @@ TEST(Couplings, ContradictoryMotionsAreInconsistent) {
   VectorX<double> udot;
   ASSERT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
   ASSERT_EQ(system->Evaluate(0.0, start.q, start.u, udot), Outcome::kFinished);
+  // 45 eps of accelerations of 1
   EXPECT_NEAR(udot[0], -2.0 * 20 / 35, 1e-14);
   EXPECT_NEAR(udot[1], -(35 * udot[0] + 2.0) / 12, 1e-14);
   // a motion of the last gear that the meshes contradict

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mechanism/loops/excursion.h"
+#include "mechanism/start/poses.h"
 
 namespace loopbench::harness {
 
@@ -168,6 +169,14 @@ std::vector<Warning> FindGuessWarnings(const MechanismDescription& description,
       text += fmt::format("its {} starts at {:.6g} {}, guessed {:.6g} {}", word.name,
                           guess.guess + guess.by, word.unit, guess.guess, word.unit);
     }
+    warnings.push_back({WarningKind::kMissedGuess, text});
+  }
+  for (const auto& [target, shift, turn] : FindMissedPoses(description, q)) {
+    std::string text =
+        fmt::format("the target of body \"{}\" is missed:", description.bodies[target->body].name);
+    if (target->at) text += fmt::format(" its point starts {:.4g} m away", shift);
+    if (target->at && target->rotation) text += ",";
+    if (target->rotation) text += fmt::format(" its axes start {:.4g} rad away", turn);
     warnings.push_back({WarningKind::kMissedGuess, text});
   }
   return warnings;

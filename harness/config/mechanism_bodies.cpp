@@ -155,39 +155,22 @@ namespace {
 using Side = PartOf<JointSide>;
 using Joint = PartOf<JointDescription>;
 
-/// Reads an angle about z, or a rotation vector of three numbers.
-void ReadRotation(const JsonNode& node, Side& side) {
-  if (node.value().is_number()) {
-    side.rotation = {0.0, 0.0, node.Number()};
-    return;
-  }
-  if (!node.value().is_array() || node.value().size() != 3) {
-    node.Fail("a number (rotation about z) or an array of 3 numbers [rad]");
-    return;
-  }
-  side.rotation = node.Vector();
-  const bool about_z = side.rotation.x() == 0.0 && side.rotation.y() == 0.0;
-  if (side.draft->space == SpaceKind::kPlanar && !about_z) {
-    node.FailWithCure(kSpatialCure, "a rotation about z in a planar mechanism");
-  }
+void ReadSideRotation(const JsonNode& node, Side& side) {
+  side.rotation = ReadRotation(node, side.draft->space);
 }
 
-Json WriteRotation(const Side& side) {
-  const Eigen::Vector3d& turn = side.rotation;
-  if (turn.isZero(0.0)) return Json();
-  if (turn.x() == 0.0 && turn.y() == 0.0) return turn.z();
-  return {turn.x(), turn.y(), turn.z()};
+Json WriteSideRotation(const Side& side) {
+  return side.rotation.isZero(0.0) ? Json() : WriteRotation(side.rotation);
 }
 
 const Fields<Side>& SideFields() {
-  static const Json rotation = EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)});
   static const Fields<Side> fields(
       "side", "Frame of a joint, fixed to a body.",
       {{"body", BodyOf<JointSide>(&JointSide::body, true), "Name of a body, or \"ground\".",
         "the name of a body or \"ground\""},
        {"at", PlaceOf<JointSide>(&JointSide::body, &JointSide::position),
         "Origin: a point of the body by name, or body coordinates [m]. Default: body origin."},
-       {"rotation", By(rotation, ReadRotation, WriteRotation),
+       {"rotation", By(RotationSchema(), ReadSideRotation, WriteSideRotation),
         "Rotation from body to frame [rad]: angle about z, or rotation vector; default: 0."}});
   return fields;
 }

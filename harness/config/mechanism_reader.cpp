@@ -12,6 +12,7 @@
 #include "harness/json/json_document.h"
 #include "harness/text/files.h"
 #include "harness/text/words.h"
+#include "mechanism/start/poses.h"
 
 namespace loopbench::harness {
 
@@ -62,6 +63,26 @@ std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft) {
   return node.Choice(draft.joint_names, "a joint");
 }
 
+Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space) {
+  if (node.value().is_number()) return {0.0, 0.0, node.Number()};
+  if (!node.value().is_array() || node.value().size() != 3) {
+    node.Fail("a number (rotation about z) or an array of 3 numbers [rad]");
+    return Eigen::Vector3d::Zero();
+  }
+  const Eigen::Vector3d turn = node.Vector();
+  if (space == SpaceKind::kPlanar && (turn.x() != 0.0 || turn.y() != 0.0)) {
+    node.FailWithCure(kSpatialCure, "a rotation about z in a planar mechanism");
+  }
+  return turn;
+}
+
+Json WriteRotation(const Eigen::Vector3d& turn) {
+  if (turn.x() == 0.0 && turn.y() == 0.0) return turn.z();
+  return {turn.x(), turn.y(), turn.z()};
+}
+
+Json RotationSchema() { return EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 3, 3)}); }
+
 Json PlaceSchema() { return Named("place", EitherSchema({TextSchema(), VectorSchema()})); }
 
 namespace {
@@ -74,6 +95,14 @@ Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.
 
 // without bodies, every reference to a body would be a consequential error
 bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
+
+/// Assembles a file with targets, so that its coordinates are those of the result.
+void MeetTargets(const JsonNode& root, Draft& draft) {
+  if (draft.initial.poses.empty() || !root.errors().empty() || !Validate(draft).empty()) return;
+  const std::string why = ResolvePoses(&draft);
+  if (why.empty()) return;
+  root.Optional("initial")->Optional("poses")->FailAs(why, "targets that the loops allow");
+}
 
 }  // namespace
 
@@ -125,7 +154,10 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
   Draft draft;
   draft.bodies[kGround].name = "ground";
   draft.body_names.Add("ground");
-  if (ExpectDocument(root, FileKind::kMechanism)) MechanismFileFields().ReadRows(root, &draft);
+  if (ExpectDocument(root, FileKind::kMechanism)) {
+    MechanismFileFields().ReadRows(root, &draft);
+    MeetTargets(root, draft);
+  }
   result.observe = std::move(draft.observe);
   result.description = std::move(static_cast<MechanismDescription&>(draft));
   return result;
@@ -350,6 +382,77 @@ Json WriteCoordinates(const Draft& draft) {
   return WriteJointValues(draft, draft.initial.coordinates, false);
 }
 
+void ReadWeights(const JsonNode& node, Draft& draft) {
+  if (!node.ExpectObject(draft.joint_names)) return;
+  for (const auto& [name, weight] : node.Members()) {
+    const auto joint = draft.joint_names.Find(name);
+    if (!joint) continue;
+    const auto guess = std::ranges::find(draft.initial.coordinates, *joint, &JointValues::joint);
+    if (guess == draft.initial.coordinates.end()) {
+      weight.Fail("the weight of a joint with a value in /initial/coordinates");
+    } else {
+      guess->weight = weight.Number(kPositive);
+    }
+  }
+}
+
+Json WriteWeights(const Draft& draft) {
+  Json weights = Json::object();
+  for (const JointValues& guess : draft.initial.coordinates) {
+    if (guess.weight != 1.0) weights[draft.joints[guess.joint].name] = guess.weight;
+  }
+  return weights.empty() ? Json() : weights;
+}
+
+using Target = PartOf<PoseTarget>;
+
+void ReadAt(const JsonNode& node, Target& target) {
+  target.at = ReadVector(node, target.draft->space);
+}
+Json WriteAt(const Target& target) {
+  return target.at ? WriteVector(*target.at, target.draft->space) : Json();
+}
+void ReadTurn(const JsonNode& node, Target& target) {
+  target.rotation = ReadRotation(node, target.draft->space);
+}
+Json WriteTurn(const Target& target) {
+  return target.rotation ? WriteRotation(*target.rotation) : Json();
+}
+void CheckTarget(const JsonNode& node, Target& target) {
+  if (!target.at && !target.rotation) node.FailAs("neither", "\"at\", \"rotation\" or both");
+}
+
+const Fields<Target>& TargetFields() {
+  static const Fields<Target> fields(
+      "pose", "Pose of a body at the start, or position of one of its points.",
+      {{"body", BodyOf<PoseTarget>(&PoseTarget::body, false), "Name of the body.",
+        "the name of a body"},
+       {"point", PlaceOf<PoseTarget>(&PoseTarget::body, &PoseTarget::point),
+        "A point of the body by name, or body coordinates [m]. Default: body origin."},
+       {"at", By(VectorSchema(), ReadAt, WriteAt), "Position of the point in ground axes [m]."},
+       {"rotation", By(RotationSchema(), ReadTurn, WriteTurn),
+        "Rotation of the body's axes from ground axes [rad]: angle about z, or rotation vector."},
+       {"fixed", Bool<Target>(&PoseTarget::fixed), "If true, the start meets it exactly."},
+       {"weight", Number<Target>(&PoseTarget::weight, kPositive),
+        "Weight of the distance from a target that is not fixed."},
+       {"", By(Json::object(), CheckTarget)}});
+  return fields;
+}
+
+void ReadPoses(const JsonNode& node, Draft& draft) {
+  for (const JsonNode& element : node.Elements("poses")) {
+    draft.initial.poses.push_back(ReadPart(TargetFields(), element, draft));
+  }
+}
+
+Json WritePoses(const Draft& draft) {
+  Json poses = Json::array();
+  for (const PoseTarget& target : draft.initial.poses) {
+    poses.push_back(WritePart(TargetFields(), draft, target));
+  }
+  return poses.empty() ? Json() : poses;
+}
+
 void ReadSpeeds(const JsonNode& node, Draft& draft) {
   draft.initial.speeds = ReadJointValues(node, draft, true);
 }
@@ -408,7 +511,12 @@ const Fields<Draft>& InitialFields() {
        {"speeds", By(values, ReadSpeeds, WriteSpeeds),
         "Speeds by joint [rad/s or m/s]. The assembly of the loops keeps all of them."},
        {"fixed", By(NamesSchema(), ReadHeld, WriteHeld),
-        "Joints whose coordinates the assembly keeps."}});
+        "Joints whose coordinates the assembly keeps."},
+       {"weights", By(MapSchema(NumberSchema(kPositive)), ReadWeights, WriteWeights),
+        "Weights of guesses by joint; default: 1. The start minimises the sum of squares of weight "
+        "times difference [rad, or mean lengths of links]."},
+       {"poses", By(ArraySchema(TargetFields().Schema()), ReadPoses, WritePoses),
+        "Poses of bodies and positions of points that the start meets, or comes near to."}});
   return fields;
 }
 

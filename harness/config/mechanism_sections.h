@@ -62,6 +62,11 @@ Json TimeFunctionSchema();
 Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space);
 /// Writes two numbers in the plane if the third is zero, otherwise three.
 Json WriteVector(const Eigen::Vector3d& vector, SpaceKind space);
+/// Reads an angle about z, or a rotation vector of three numbers.
+Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space);
+/// Writes the angle if the rotation is about z.
+Json WriteRotation(const Eigen::Vector3d& turn);
+Json RotationSchema();
 /// Writes the name of the body's point at this position, otherwise the vector.
 Json WritePoint(const Eigen::Vector3d& at, const BodyDescription& body, SpaceKind space);
 /// Reads a point: the name of a point of the body, or a vector.

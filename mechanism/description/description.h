@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -75,6 +76,17 @@ struct CouplingDescription {
 struct JointValues {
   int joint = 0;
   std::vector<double> values;
+  double weight = 1.0;  ///< of guesses: of their differences from the start, > 0
+};
+
+/// A pose of a body, or the position of one of its points, at the start. Given in ground axes.
+struct PoseTarget {
+  int body = 0;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< from the body's origin, in its axes [m]
+  std::optional<Eigen::Vector3d> at;                ///< position of the point [m]
+  std::optional<Eigen::Vector3d> rotation;          ///< of the body's axes, as a vector [rad]
+  bool fixed = false;                               ///< the assembly must meet it
+  double weight = 1.0;                              ///< as above
 };
 
 /// Partial initial data; the rest is assembled (assembly.h).
@@ -82,6 +94,9 @@ struct InitialDescription {
   std::vector<JointValues> coordinates;  ///< guesses, or exact if the joint is fixed
   std::vector<JointValues> speeds;       ///< all of them are fixed
   std::vector<int> held;                 ///< joints whose coordinates the assembly must not move
+  /// Targets, of which `coordinates` are the result (ResolvePoses()). Copies that change bodies
+  /// leave them out.
+  std::vector<PoseTarget> poses;
 };
 
 struct MechanismDescription {

@@ -42,7 +42,9 @@ std::vector<std::string> KeptNames(const MechanismDescription& old, const Renumb
 std::vector<JointValues> KeptValues(const std::vector<JointValues>& old, const Renumbering& kept) {
   std::vector<JointValues> values;
   for (const JointValues& one : old) {
-    if (kept.joints[one.joint] >= 0) values.push_back({kept.joints[one.joint], one.values});
+    if (kept.joints[one.joint] >= 0) {
+      values.push_back({kept.joints[one.joint], one.values, one.weight});
+    }
   }
   return values;
 }

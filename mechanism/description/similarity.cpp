@@ -42,6 +42,10 @@ class Scaling {
     }
     for (CouplingDescription& coupling : description_.couplings) Coupling(coupling);
     for (ForceDescription& force : description_.forces) Force(PartsOf(force));
+    for (PoseTarget& target : description_.initial.poses) {
+      target.point *= factor_;
+      if (target.at) *target.at *= factor_;
+    }
     Values(description_.initial.coordinates, false);
     Values(description_.initial.speeds, true);
   }

@@ -128,6 +128,9 @@ class Kinematics {
   /// level. joints()[joint].rows() numbers, the others zero.
   Components<Space, S> ConstraintSpeed(int joint) const;
 
+  /// X_FM of a joint of the mechanism from the poses of its bodies.
+  Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
+
   /// Measured coordinate and speed of a joint with one coordinate (q, u for tree joints).
   S JointCoordinate(int joint) const;
   S JointSpeed(int joint) const;
@@ -186,7 +189,6 @@ class Kinematics {
   void FollowDirections(int index, const Rotation<Space, S>& R_WF);
   void SetDirections(int index, const Rotation<Space, S>& R_WF);
   void OrderDirections(int index, Basis<Space, S>& basis) const;
-  Pose<Space, S> MeasuredPose(const Joint<Space, S>& joint) const;
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Pose<Space, S>> poses_;

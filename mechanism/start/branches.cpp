@@ -9,6 +9,7 @@
 #include "mechanism/algebra/singular_values.h"
 #include "mechanism/start/closure.h"
 #include "mechanism/start/guesses.h"
+#include "mechanism/start/poses.h"
 
 namespace loopbench {
 
@@ -23,13 +24,14 @@ class BranchSearch {
  public:
   explicit BranchSearch(const MechanismDescription& description)
       : description_(description),
-        bare_(WithoutGuesses(description)),
+        whole_(WithTargets(description)),
+        bare_(WithoutGuesses(whole_)),
         mechanism_(bare_, Coordinates::kJoint),
         kinematics_(mechanism_) {}
 
   Branches Run(int starts) {
     Branches result;
-    const Start<double> own = Assemble<Space>(description_, mechanism_);
+    const Start<double> own = Assemble<Space>(whole_, mechanism_);
     if (own.outcome == Outcome::kInconsistentStart) throw std::invalid_argument(own.message);
     kinematics_.UpdatePosition(own.q);
     units_ = AssemblyUnits<Space>(kinematics_);
@@ -58,6 +60,8 @@ class BranchSearch {
       const auto& held = description.initial.held;
       return std::ranges::find(held, values.joint) == held.end();
     });
+    std::erase_if(description.initial.poses,
+                  [](const PoseTarget& target) { return !target.fixed; });
     return description;
   }
 
@@ -113,26 +117,20 @@ class BranchSearch {
       ++result->movable;
       return;
     }
-    Branch branch{.description = bare_, .times = poses_.empty() ? 0 : 1};
+    Branch branch{.description = WithoutGuesses(description_), .times = poses_.empty() ? 0 : 1};
     if (!poses_.empty()) branch.distance = Apart(poses_[0]);
     poses_.push_back(kinematics_.poses());
     InitialDescription& initial = branch.description.initial;
-    for (const TreeStep& step : mechanism_.tree()) {
-      const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
-      const bool is_fixed =
-          std::ranges::find(initial.held, joint.description) != initial.held.end();
-      if (joint.description < 0 || is_fixed || joint.num_q() == 0) continue;
-      JointValues values{joint.description, {}};
-      for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
-        values.values.push_back(mechanism_.DriveOf(joint, i) < 0 ? q[next++] : 0.0);
-      }
+    for (JointValues& values : TreeValues(mechanism_, q)) {
+      if (std::ranges::find(initial.held, values.joint) != initial.held.end()) continue;
       initial.coordinates.push_back(std::move(values));
     }
     result->found.push_back(std::move(branch));
   }
 
   const MechanismDescription& description_;
-  const MechanismDescription bare_;  ///< with fixed coordinates only
+  const MechanismDescription whole_;  ///< with targets as joints
+  const MechanismDescription bare_;   ///< with fixed coordinates only
   const Mechanism<Space, double> mechanism_;
   Kinematics<Space, double> kinematics_;
   AssemblyUnits<Space> units_;

@@ -56,7 +56,7 @@ class Closure {
     // better.
     closed_ = std::max(1e3 * goal_, kPi * eps * Depth() * extent);
     for (int i = 0; i < mechanism_.num_u(); ++i) {
-      if (!guesses_.guessed()[i]) pull_units_.columns[i] /= kFree;
+      pull_units_.columns[i] /= guesses_.guessed()[i] ? guesses_.weights()[i] : kFree;
     }
   }
 
@@ -181,26 +181,30 @@ class Closure {
                         searching_ ? LeastSquares::Care::kRough : LeastSquares::Care::kFull);
   }
 
-  /// |e|^2 + mu^2 |q - guess|^2
+  /// |e|^2 + mu^2 |w (q - guess)|^2
   double Pulled(const Vector& q, double mu) {
     const double open = Residual(q).squaredNorm();
     return open + mu * mu *
-                      (guesses_.GuessedApart(q).squaredNorm() +
-                       guesses_.LooseApart(kinematics_).squaredNorm());
+                      (guesses_.GuessedApart(q).cwiseProduct(guesses_.weights()).squaredNorm() +
+                       WeightedLoose().squaredNorm());
+  }
+  Vector WeightedLoose() const {
+    return guesses_.LooseApart(kinematics_).cwiseProduct(guesses_.loose_weights());
   }
 
   /// The step d to the minimum of Pulled(), with e linearised. In z = (d + g) / s, where g is
-  /// q - guess, 0 without a guess, and s is 1 or 1 / kFree, it is a damped least-squares problem:
+  /// q - guess, 0 without a guess, and s is 1 / w or 1 / kFree, it is a damped least-squares
+  /// problem:
   ///
-  ///   min |J s z - (J g - e)|^2 + mu^2 |z|^2       guesses of cut joints are rows of J, times mu
+  ///   min |J s z - (J g - e)|^2 + mu^2 |z|^2     guesses of cut joints are rows of J, times mu w
   Vector PullStep(const Vector& q, double mu) {
     const Vector e = Residual(q), g = guesses_.GuessedApart(q);
     std::vector<OfCutJoint> cut = guesses_.held();
     cut.insert(cut.end(), guesses_.loose().begin(), guesses_.loose().end());
     Vector row_units = units_.With(kinematics_, cut), r(row_units.size());
-    row_units.tail(guesses_.loose().size()) /= mu;
+    row_units.tail(guesses_.loose().size()).array() /= mu * guesses_.loose_weights().array();
     SparseRows J = LoopRows(kinematics_, pull_units_, row_units, cut, guesses_.fixed());
-    r << -e, -mu * guesses_.LooseApart(kinematics_);
+    r << -e, -mu * WeightedLoose();
     r += J * g;
     const Vector z = Solver(std::move(J)).Damped(r, mu);
     const Vector d = z.cwiseProduct(pull_units_.columns).cwiseQuotient(units_.columns) - g;

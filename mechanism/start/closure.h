@@ -6,7 +6,7 @@
 // branch may be nearer, or angles may have wound. A search then starts from the guesses and from
 // random positions about them and minimises
 //
-//   |e(q)|^2 + mu^2 |q - guess|^2        over the guessed coordinates, for mu falling to 1e-2
+//   |e(q)|^2 + mu^2 |w (q - guess)|^2    over the guessed coordinates, for mu falling to 1e-2
 //
 // so that guesses are kept first, coordinates without a guess adapt to them, and guesses change
 // last. The start is the closed position nearest to the guesses. Angles lie within half a turn of

@@ -40,7 +40,8 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
       guess_(GuessedPositions(description, mechanism)),
       is_held_(description.joints.size(), false),
       fixed_(mechanism.num_u(), false),
-      guessed_(mechanism.num_u(), false) {
+      guessed_(mechanism.num_u(), false),
+      weights_(VectorX<double>::Ones(mechanism.num_u())) {
   for (int index : description.initial.held) {
     is_held_[index] = true;
     SetColumns(mechanism.joints()[index], &fixed_);
@@ -53,13 +54,22 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
     const Joint<Space, double>& joint = mechanism.joints()[values.joint];
     if (joint.in_tree()) {
       if (!is_held_[values.joint]) SetColumns(joint, &guessed_);
+      weights_.segment(joint.u_offset, joint.num_u()).setConstant(values.weight);
       continue;
     }
     if (joint.num_u() == 0) continue;  // prescribed
     CutJoints& cut = is_held_[values.joint] ? held_ : loose_;
     cut.values.push_back(
         {values.joint, values.values.data(), Space::kRot == 1 && has_force[values.joint]});
-    for (int k = 0; k < joint.num_u(); ++k) cut.free.push_back({values.joint, k});
+    for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
+      if (mechanism.DriveOf(joint, i) >= 0) continue;
+      if (IsGiven(*joint.kind, values.values.data(), i)) {
+        cut.free.push_back({values.joint, free});
+        cut.weights.conservativeResize(cut.weights.size() + 1);
+        cut.weights[cut.weights.size() - 1] = values.weight;
+      }
+      ++free;
+    }
   }
 }
 
@@ -122,7 +132,8 @@ VectorX<double> Guesses<Space>::Apart(const CutJoints& cut,
     for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
       if (mechanism_.DriveOf(joint, i) >= 0) continue;
       if (IsAngle(joint, i) && !turns_count) all[i] = std::remainder(all[i], kTurn);
-      apart[row++] = all[i] / units_.Of(kinematics.joints()[index].H(free++));
+      const double unit = units_.Of(kinematics.joints()[index].H(free++));
+      if (IsGiven(*joint.kind, values, i)) apart[row++] = all[i] / unit;
     }
   }
   return apart;
@@ -131,9 +142,9 @@ VectorX<double> Guesses<Space>::Apart(const CutJoints& cut,
 template <class Space>
 double Guesses<Space>::SquaredDistance(const Kinematics<Space, double>& kinematics) const {
   const VectorX<double> all = Apart(kinematics.q());
-  double sum = LooseApart(kinematics).squaredNorm();
+  double sum = LooseApart(kinematics).cwiseProduct(loose_.weights).squaredNorm();
   for (int i = 0; i < mechanism_.num_u(); ++i) {
-    const double difference = guessed_[i] ? all[i] : kUnguessed * all[i];
+    const double difference = (guessed_[i] ? weights_[i] : kUnguessed) * all[i];
     sum += difference * difference;
   }
   return sum;
@@ -209,6 +220,22 @@ VectorX<double> GuessedPositions(const MechanismDescription& description,
   return q;
 }
 
+template <class Space>
+std::vector<JointValues> TreeValues(const Mechanism<Space, double>& mechanism,
+                                    const VectorX<double>& q) {
+  std::vector<JointValues> list;
+  for (const TreeStep& step : mechanism.tree()) {
+    const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+    if (joint.description < 0 || joint.num_q() == 0) continue;
+    JointValues values{joint.description, {}};
+    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+      values.values.push_back(mechanism.DriveOf(joint, i) < 0 ? q[next++] : 0.0);
+    }
+    list.push_back(std::move(values));
+  }
+  return list;
+}
+
 namespace {
 
 template <class Space>
@@ -229,10 +256,12 @@ std::vector<MissedGuess> FindMissedGuesses(const MechanismDescription& descripti
                                                  : MissedIn<Spatial>(description, q);
 }
 
-#define LOOPBENCH_INSTANTIATE(Space)                                     \
-  template class Guesses<Space>;                                         \
-  template VectorX<double> GuessedPositions(const MechanismDescription&, \
-                                            const Mechanism<Space, double>&);
+#define LOOPBENCH_INSTANTIATE(Space)                                            \
+  template class Guesses<Space>;                                                \
+  template VectorX<double> GuessedPositions(const MechanismDescription&,        \
+                                            const Mechanism<Space, double>&);   \
+  template std::vector<JointValues> TreeValues(const Mechanism<Space, double>&, \
+                                               const VectorX<double>&);
 LOOPBENCH_INSTANTIATE(Planar)
 LOOPBENCH_INSTANTIATE(Spatial)
 #undef LOOPBENCH_INSTANTIATE

@@ -1,9 +1,12 @@
-// Guesses of a description, and distances of positions from them.
+// Guesses of a description, and distances of positions from them. Values that are NaN are not
+// given.
 //
 // Tree joints differ from their guesses by coordinates, turns included; quaternions by the rotation
 // vector between both. Joints that close loops are measured, angles modulo a turn: in the plane
 // they have turns, which count if a force depends on them.
 #pragma once
+
+#include <cmath>
 
 #include "mechanism/start/assembly.h"
 #include "mechanism/start/assembly_units.h"
@@ -23,6 +26,9 @@ class Guesses {
   /// Free coordinates of cut joints that have values: fixed ones, and others.
   const std::vector<OfCutJoint>& held() const { return held_.free; }
   const std::vector<OfCutJoint>& loose() const { return loose_.free; }
+  /// Weights of the differences from guesses: by speed, 1 without a guess; of loose().
+  const VectorX<double>& weights() const { return weights_; }
+  const VectorX<double>& loose_weights() const { return loose_.weights; }
 
   /// q less GuessedPositions(), by speed, in units.
   VectorX<double> Apart(const VectorX<double>& q) const;
@@ -34,8 +40,8 @@ class Guesses {
     return Apart(loose_, at);
   }
 
-  /// Sum of squares in units. Coordinates without a guess have a weight that decides only between
-  /// positions which are equally far from all guesses.
+  /// Sum of weighted squares in units. Coordinates without a guess have a weight that decides only
+  /// between positions which are equally far from all guesses.
   double SquaredDistance(const Kinematics<Space, double>& at) const;
   /// The largest difference from a guess, in units.
   double Farthest(const Kinematics<Space, double>& at) const;
@@ -54,8 +60,13 @@ class Guesses {
     };
     std::vector<Values> values;
     std::vector<OfCutJoint> free;  ///< of all of them, in order
+    VectorX<double> weights;       ///< of these
   };
 
+  bool IsGiven(const JointKind<Space, double>& kind, const double* values, int speed) const {
+    return !std::isnan(
+        values[kind.has_quaternion() && speed < 3 ? 0 : speed + kind.num_q - kind.num_u]);
+  }
   void SetColumns(const Joint<Space, double>& joint, std::vector<bool>* columns) const;
   bool IsAngle(const Joint<Space, double>& joint, int coordinate) const;
   VectorX<double> Apart(const CutJoints& cut, const Kinematics<Space, double>& at) const;
@@ -66,7 +77,13 @@ class Guesses {
   VectorX<double> guess_;
   std::vector<bool> is_held_;          ///< by joint
   std::vector<bool> fixed_, guessed_;  ///< by speed
+  VectorX<double> weights_;
   CutJoints held_, loose_;
 };
+
+/// The coordinates of the user's joints in the tree, as initial values; 0 for prescribed ones.
+template <class Space>
+std::vector<JointValues> TreeValues(const Mechanism<Space, double>& mechanism,
+                                    const VectorX<double>& q);
 
 }  // namespace loopbench

@@ -83,8 +83,8 @@ struct JointValues {
 struct PoseTarget {
   int body = 0;
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< from the body's origin, in its axes [m]
-  std::optional<Eigen::Vector3d> at;                ///< position of the point [m]
-  std::optional<Eigen::Vector3d> rotation;          ///< of the body's axes, as a vector [rad]
+  std::optional<Eigen::Vector3d> at = {};           ///< position of the point [m]
+  std::optional<Eigen::Vector3d> rotation = {};     ///< of the body's axes, as a vector [rad]
   bool fixed = false;                               ///< the assembly must meet it
   double weight = 1.0;                              ///< as above
 };

@@ -62,17 +62,18 @@ class Closure {
 
   void Run(Start<double>* start) {
     Vector q = guess_, e = Residual(q);
-    if (e.size() > 0) {
+    if (e.size() > 0 || HasTargets()) {
       bool closed = Close(kMaxIterations, &q, &e);
       Vector nearest = q;
       if (closed) Unwind(&nearest);
       Place(nearest);
-      const bool near = closed && guesses_.Farthest(kinematics_) <= kNear;
+      const bool near =
+          closed && guesses_.Farthest(kinematics_) <= (HasTargets() ? closed_ : kNear);
       const bool free = std::ranges::find(guesses_.fixed(), false) != guesses_.fixed().end();
       if (!near && free && Search(closed, &nearest)) closed = true;
       e = Residual(closed ? q = nearest : q);
       const Vector row_units = units_.With(kinematics_, guesses_.held());
-      start->position_residual = InSi(e, row_units);
+      if (e.size() > 0) start->position_residual = InSi(e, row_units);
       closed = closed || IsRounded(e);
       if (!closed) {
         start->outcome = Outcome::kInconsistentStart;
@@ -85,6 +86,13 @@ class Closure {
   }
 
  private:
+  /// Returns true if guesses of joints without constraints attract the start (poses.h).
+  bool HasTargets() const {
+    return std::ranges::any_of(guesses_.loose(), [&](const OfCutJoint& coordinate) {
+      return mechanism_.joints()[coordinate.joint].num_directions() == 0;
+    });
+  }
+
   /// Returns true if a residual is within the accuracy of the input: in rad, or relative to the
   /// arms of the joints that close the loops.
   bool IsRounded(const Vector& e) const {

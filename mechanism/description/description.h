@@ -96,7 +96,7 @@ struct InitialDescription {
   std::vector<int> held;                 ///< joints whose coordinates the assembly must not move
   /// Targets, of which `coordinates` are the result (ResolvePoses()). Copies that change bodies
   /// leave them out.
-  std::vector<PoseTarget> poses;
+  std::vector<PoseTarget> poses = {};
 };
 
 struct MechanismDescription {

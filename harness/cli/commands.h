@@ -204,7 +204,8 @@ std::string Spaced(const Vector& vector) {
 }
 
 /// Prints the model, the start and the structure of a mechanism. Returns 2, after all other output,
-/// if the start cannot be assembled.
+/// if the start cannot be assembled. Degrees of freedom that the file does not expect are a
+/// ConfigError, in a document its "error" and 2.
 int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view);
 
 /// Prints the contents of a file: gravity, bodies, joints, their frames, forces.

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "harness/analysis/model_warnings.h"
+#include "harness/analysis/structure_hints.h"
 #include "harness/cli/commands.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/case_identity.h"
@@ -45,7 +46,8 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
   return table;
 }
 
-void PrintFreedom(const Structure& s, const ExplainView& view) {
+void PrintFreedom(const Structure& s, const std::vector<std::string>& idle,
+                  const ExplainView& view) {
   const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
   Say(view, "\nDegrees of freedom\n");
   Say(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
@@ -54,6 +56,7 @@ void PrintFreedom(const Structure& s, const ExplainView& view) {
   Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
       s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows,
       s.couplings > 0 ? " and couplings" : "");
+  for (const std::string& one : idle) Say(view, "  1 of them idle: {}\n", one);
   if (s.locked() && s.freedom_at_start() > 0) {
     Say(view,
         "  0 finite motions: the start is singular, and its first-order motions\n"
@@ -177,7 +180,7 @@ std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
 
 /// Prints facts that the other sections do not contain.
 void DescribeStructure(const MechanismDescription& description, const Structure& s,
-                       JsonObject* document) {
+                       const std::vector<std::string>& idle, JsonObject* document) {
   std::vector<JsonObject> redundant;
   for (const RedundantDirection& one : s.redundant) {
     redundant.push_back(JsonObject()
@@ -196,7 +199,8 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
                                      .Add("at_start", known(s.freedom_at_start()))
                                      .Add("constraints_of_loops", std::int64_t{s.loop_rows})
                                      .Add("rank", known(s.rank_nearby))
-                                     .Add("rank_at_start", known(s.rank)))
+                                     .Add("rank_at_start", known(s.rank))
+                                     .Add("idle", idle))
       .Add("loops", LoopDocuments(description, s))
       .Add("redundant", redundant);
 }
@@ -204,22 +208,25 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
 }  // namespace
 
 int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
-  const MechanismDescription description = ReadMechanism(path).description;
+  const MechanismFile file = ReadMechanism(path);
+  const MechanismDescription& description = file.description;
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
+  const std::vector<std::string> idle =
+      NamesOf(description, FindIdleFreedoms(description, structure));
   if (view.document != nullptr) {
     const bool planar = description.space == SpaceKind::kPlanar;
     view.document->Add("name", description.name)
         .Add("space", std::string(planar ? "planar" : "spatial"))
         .Add("gravity",
              std::vector<double>(description.gravity.begin(), description.gravity.end()));
-    DescribeStructure(description, structure, view.document);
+    DescribeStructure(description, structure, idle, view.document);
   }
   Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
       path.string(), description.space == SpaceKind::kPlanar ? "planar" : "spatial");
   PrintModel(description, structure, view);
   PrintStart(description, structure, view);
-  PrintFreedom(structure, view);
+  PrintFreedom(structure, idle, view);
   PrintSection("Loops", LoopTable(description, structure, view), view);
   PrintRedundant(description, structure, view);
   PrintIslands(description, structure, view);
@@ -241,7 +248,13 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   Say(view, "\nWarnings\n");
   if (warnings.empty()) Say(view, "  none\n");
   for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
-  return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  const int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  const std::string fault = FreedomFault(description, file.observe, structure);
+  if (fault.empty()) return code;
+  if (view.document == nullptr) throw ConfigError(fault);
+  view.document->Add("error", fault);
+  PrintError("{}\n", fault);
+  return 2;
 }
 
 // explain: the assembled start of a mechanism, joint by joint, and its energy.

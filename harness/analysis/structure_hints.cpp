@@ -8,6 +8,7 @@
 #include <set>
 
 #include "harness/text/words.h"
+#include "mechanism/description/joint_frames.h"
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
@@ -124,6 +125,37 @@ class IdleSearch {
   std::vector<int> group_;  ///< first body of its group, by body
 };
 
+/// Returns the extent [m] of the joints and the centre of mass of each body.
+std::vector<double> SizesOf(const MechanismDescription& description) {
+  std::vector<Eigen::AlignedBox3d> boxes;
+  for (const BodyDescription& body : description.bodies) boxes.emplace_back(body.com);
+  for (const JointDescription& joint : description.joints) {
+    if (joint.type == JointType::kFree) continue;
+    for (const JointSide& side : {joint.from, joint.to}) boxes[side.body].extend(side.position);
+  }
+  std::vector<double> sizes;
+  for (const Eigen::AlignedBox3d& box : boxes) sizes.push_back(box.diagonal().norm());
+  return sizes;
+}
+
+/// Returns true for welds, rods, and balanced rotors: a centre of mass on a hinge's axis.
+bool MayEndAt(const MechanismDescription& description, const JointDescription& joint,
+              const JointSide& side, double size) {
+  if (joint.type == JointType::kWeld || joint.type == JointType::kRod) return true;
+  if (joint.type != JointType::kRevolute) return false;
+  const Vector3d arm = description.bodies[side.body].com - side.position,
+                 axis = PoseOf(side).R * AxisAlignment(joint).col(2);
+  return arm.cross(axis).norm() <= description.accuracy * size;
+}
+
+/// Returns the root mean square distance [m] of the mass from the centre of mass, in the plane from
+/// the normal through it.
+double GyrationOf(const MechanismDescription& description, int body) {
+  const BodyDescription& of = description.bodies[body];
+  const bool planar = description.space == SpaceKind::kPlanar;
+  return std::sqrt((planar ? of.inertia(2, 2) : of.inertia.trace() / 2) / of.mass);
+}
+
 }  // namespace
 
 std::vector<IdleFreedom> FindIdleFreedoms(const MechanismDescription& description,
@@ -143,6 +175,48 @@ std::vector<std::string> NamesOf(const MechanismDescription& description,
                                 BodyNames(description, bodies), ListInWords(points)));
   }
   return names;
+}
+
+std::vector<std::string> FindHints(const MechanismDescription& description,
+                                   const Structure& structure) {
+  const std::vector<double> sizes = SizesOf(description);
+  std::vector<int> joints_of(description.bodies.size()), odd, hanging;
+  std::vector<bool> may_end(joints_of.size());  // chains end with such bodies on purpose
+  for (const JointDescription& joint : description.joints) {
+    if (joint.type == JointType::kFree) continue;
+    for (const JointSide& side : {joint.from, joint.to}) {
+      ++joints_of[side.body];
+      if (MayEndAt(description, joint, side, sizes[side.body])) may_end[side.body] = true;
+    }
+  }
+  std::vector<std::string> hints;
+  for (int body = 1; body < static_cast<int>(joints_of.size()); ++body) {
+    if (joints_of[body] == 1 && !may_end[body]) hanging.push_back(body);
+    const double size = sizes[body],
+                 ratio = size > 0.0 ? GyrationOf(description, body) / size : 1.0;
+    if (ratio > kOddGyration || ratio < 1 / kOddGyration) odd.push_back(body);
+  }
+  if (!structure.loops.empty() && !hanging.empty()) {
+    hints.push_back(
+        fmt::format("{} {} by one joint and {} no loop, though other bodies do: is a "
+                    "joint missing?",
+                    BodyNames(description, hanging), hanging.size() == 1 ? "hangs" : "hang",
+                    hanging.size() == 1 ? "closes" : "close"));
+  }
+  for (std::size_t i = 0; i < odd.size(); ++i) {
+    constexpr std::size_t kMostHints = 6;
+    if (i == kMostHints) {
+      hints.push_back(fmt::format("so it is for {} more bodies", odd.size() - i));
+      break;
+    }
+    const double size = sizes[odd[i]], gyration = GyrationOf(description, odd[i]);
+    hints.push_back(fmt::format(
+        "the radius of gyration of {} is {:.3g} m, {:.3g} times the extent {:.3g} m of its "
+        "joints and centre of mass: {}mass in g, or lengths in mm?",
+        description.bodies[odd[i]].name, gyration, gyration / size, size,
+        gyration < size ? "a point mass, " : ""));
+  }
+  return hints;
 }
 
 std::string FreedomFault(const MechanismDescription& description, const ObservedQuantities& observe,

@@ -1,4 +1,5 @@
-// Idle degrees of freedom, and the degrees of freedom that a file expects.
+// Idle degrees of freedom, hints on parts that may be mistakes, and the degrees of freedom that a
+// file expects.
 #pragma once
 
 #include <string>
@@ -28,6 +29,15 @@ std::vector<IdleFreedom> FindIdleFreedoms(const MechanismDescription& descriptio
 /// Returns a sentence for each of the freedoms: "spin of rod about the line of its joints A, B".
 std::vector<std::string> NamesOf(const MechanismDescription& description,
                                  const std::vector<IdleFreedom>& idle);
+
+/// Radius of gyration over the size of a body beyond which, or below its inverse, units may be
+/// mixed. Bodies of usual shapes have 0.1 to 1; g for kg gives 1/30, mm for m 1000 times.
+inline constexpr double kOddGyration = 100.0;
+
+/// Returns sentences on parts that are valid but unusual: bodies that hang by one joint beside
+/// loops, and radii of gyration out of proportion with the distances of joints and centres of mass.
+std::vector<std::string> FindHints(const MechanismDescription& description,
+                                   const Structure& structure);
 
 /// Returns the error message of a mechanism that does not have the expected degrees of freedom,
 /// with redundant constraints and idle freedoms; "" if it has them, if nothing is expected, or if

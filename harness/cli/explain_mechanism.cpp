@@ -213,7 +213,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
   const std::vector<std::string> idle =
-      NamesOf(description, FindIdleFreedoms(description, structure));
+                                     NamesOf(description, FindIdleFreedoms(description, structure)),
+                                 hints = FindHints(description, structure);
   if (view.document != nullptr) {
     const bool planar = description.space == SpaceKind::kPlanar;
     view.document->Add("name", description.name)
@@ -243,11 +244,15 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   if (view.document != nullptr) {
     std::vector<std::string> texts;
     for (const Warning& warning : warnings) texts.push_back(warning.text);
-    view.document->Add("simplifications", compiled.report).Add("warnings", texts);
+    view.document->Add("simplifications", compiled.report)
+        .Add("warnings", texts)
+        .Add("hints", hints);
   }
   Say(view, "\nWarnings\n");
   if (warnings.empty()) Say(view, "  none\n");
   for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
+  if (!hints.empty()) Say(view, "\nHints\n");
+  for (const std::string& hint : hints) Say(view, "  {}\n", hint);
   const int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
   const std::string fault = FreedomFault(description, file.observe, structure);
   if (fault.empty()) return code;

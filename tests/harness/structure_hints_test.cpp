@@ -1,4 +1,4 @@
-// Idle freedoms, and the degrees of freedom that a file expects.
+// Idle freedoms, hints, and the degrees of freedom that a file expects.
 #include "harness/analysis/structure_hints.h"
 
 #include <fmt/format.h>
@@ -100,6 +100,53 @@ TEST(IdleFreedomTest, MotionsWithAPurposeAreNotIdle) {
                 "to": {"body": "door", "at": [0, 0, 2]}}]})");
   EXPECT_EQ(Idle(door), std::vector<std::string>{});
   EXPECT_EQ(AnalyseStructure(door).freedom(), 1);
+}
+
+std::vector<std::string> Hints(const MechanismDescription& description) {
+  return FindHints(description, AnalyseStructure(description));
+}
+
+TEST(HintsTest, UsualMechanismsHaveNone) {
+  for (const char* name :
+       {"four-bar", "seven-bar", "andrews-squeezer", "stewart-platform", "slider-crank",
+        "locomotive", "simple-pendulum", "rod-pendulum", "double-wishbone", "bennett"}) {
+    EXPECT_EQ(Hints(Shipped(name)), std::vector<std::string>{}) << name;
+  }
+}
+
+TEST(HintsTest, BodiesThatHangAreNamed) {
+  MechanismDescription description = Shipped("four-bar");
+  BodyDescription arm = description.bodies[1];
+  arm.name = "arm";
+  JointDescription hinge = description.joints[0];
+  hinge.name = "H";
+  hinge.from = hinge.to;
+  hinge.from.body = 2;
+  hinge.to.body = static_cast<int>(description.bodies.size());
+  description.bodies.push_back(arm);
+  description.joints.push_back(hinge);
+  ASSERT_EQ(Hints(description).size(), 1u);
+  EXPECT_EQ(
+      Hints(description)[0],
+      "arm hangs by one joint and closes no loop, though other bodies do: is a joint missing?");
+  // a balanced rotor does so on purpose
+  description.bodies.back().com = hinge.to.position;
+  EXPECT_EQ(Hints(description), std::vector<std::string>{});
+  // without loops, chains end with a body
+  EXPECT_EQ(Hints(Shipped("pendulum")), std::vector<std::string>{});
+}
+
+TEST(HintsTest, UnitsThatDoNotFitAreNamed) {
+  MechanismDescription grams = Shipped("four-bar"), millimetres = grams;
+  grams.bodies[2].mass = 1e3;  // of a slender bar of 1 kg and 1 m, with its inertia in kg m^2
+  grams.bodies[2].inertia *= 1.0 / 12.0;
+  millimetres.bodies[3].inertia *= 1e6;
+  ASSERT_EQ(Hints(millimetres).size(), 1u);
+  EXPECT_NE(Hints(millimetres)[0].find("the radius of gyration of " + grams.bodies[3].name),
+            std::string::npos);
+  EXPECT_NE(Hints(millimetres)[0].find("lengths in mm?"), std::string::npos);
+  ASSERT_EQ(Hints(grams).size(), 1u);
+  EXPECT_NE(Hints(grams)[0].find("mass in g"), std::string::npos);
 }
 
 /// A planar four-bar in space: 1 degree of freedom, 3 redundant constraints.

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <map>
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/analysis/structure_hints.h"
@@ -10,6 +12,8 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/case_identity.h"
 #include "harness/text/terminal.h"
+#include "harness/text/words.h"
+#include "harness/trajectory/statics.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
 
@@ -161,6 +165,68 @@ void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView
   PrintSection("Plan of O-DCA", table, view, "odca_plan");
 }
 
+/// Prints efforts and reactions at rest; returns 2 if nothing can hold the mechanism.
+int PrintStatics(const MechanismDescription& description, const Structure& structure,
+                 const ExplainView& view) {
+  const Statics statics = FindStatics(description, structure.start);
+  if (view.document != nullptr) view.document->Add("statics_message", statics.why);
+  if (!statics.why.empty()) {
+    Say(view, "\nForces at rest: none, {}\n", statics.why);
+    return 2;
+  }
+  double largest = 0.0;
+  for (const double value : statics.values) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  const auto shown = [&](double value) {
+    if (view.document != nullptr) return Value(value);
+    if (std::isnan(value)) return Value("not unique");
+    constexpr double kRoundOff = 1e-12;
+    return Value(ShortNumber(std::abs(value) > kRoundOff * largest ? value : 0.0));
+  };
+  Table efforts, reactions;
+  efforts.columns = {{"joint", "joint", Format::kText, {}},
+                     {"coordinate", "coordinate", Format::kText, {}},
+                     {"effort", "effort", Format::kText, {}},
+                     {"unit", "unit", Format::kText, {}},
+                     {"held", "held by", Format::kText, {}}};
+  reactions.columns = {{"joint", "joint", Format::kText, {}}, {"on", "on", Format::kText, {}}};
+  std::map<std::string, std::string> second;
+  for (const JointDescription& joint : description.joints) {
+    second[LabelName(joint.name)] = description.bodies[joint.to.body].name;
+  }
+  for (std::size_t i = 1; i < statics.columns.size(); ++i) {
+    const auto& [kind, name, component, unit] = statics.columns[i];
+    if (kind == "drive") {
+      const bool is_ours =
+          std::ranges::find(statics.held, name + ":" + component) != statics.held.end();
+      AddRow(
+          {name, component, shown(statics.values[i]), unit, is_ours ? "--statics" : "its motion"},
+          &efforts);
+      continue;
+    }
+    if (component == "fx") AddRow({name, second[name]}, &reactions);
+    reactions.rows.back().Set(component, shown(statics.values[i]));
+    if (reactions.rows.size() == 1) {
+      reactions.columns.push_back(
+          {component, fmt::format("{} [{}]", component, unit), Format::kText, {}});
+    }
+  }
+  PrintSection("Efforts that hold the start at rest", efforts, view, "efforts_at_rest");
+  PrintSection("Reactions at rest", reactions, view, "reactions_at_rest");
+  Say(view,
+      "  Ground axes, on the body \"on\" at the joint's point; efforts and joint forces are not in "
+      "them.\n");
+  if (std::ranges::any_of(statics.values, [](double value) { return std::isnan(value); })) {
+    Say(view, "  not unique: redundant constraints share the load in no one way.\n");
+  }
+  if (statics.free > 0) {
+    Say(view, "  {} that no force drives {} not held.\n", WithCount(statics.free, "motion"),
+        statics.free == 1 ? "is" : "are");
+  }
+  return 0;
+}
+
 std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
                                       const Structure& structure) {
   std::vector<JsonObject> loops;
@@ -253,7 +319,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
   if (!hints.empty()) Say(view, "\nHints\n");
   for (const std::string& hint : hints) Say(view, "  {}\n", hint);
-  const int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  if (view.statics && code == 0) code = PrintStatics(description, structure, view);
   const std::string fault = FreedomFault(description, file.observe, structure);
   if (fault.empty()) return code;
   if (view.document == nullptr) throw ConfigError(fault);

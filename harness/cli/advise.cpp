@@ -18,6 +18,7 @@
 #include "harness/isolation/processes.h"
 #include "harness/run/model_error.h"
 #include "harness/run/run_case.h"
+#include "harness/suite/estimate.h"
 #include "harness/tables/fit.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -391,6 +392,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
 int GiveAdvice(const AdviseCommand& command) {
   const MechanismFile file = ReadMechanism(command.mechanism);
   if (!command.out.empty()) RequireOutput(command.out);
+  RequireFreedom(file, command.limits);
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return AdviseInChild(command, file); });
 }

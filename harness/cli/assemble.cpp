@@ -75,8 +75,10 @@ int AssembleFile(const AssembleCommand& command, const ExplainView& view) {
   for (std::size_t k = 0; k < branches.found.size() && !command.out.empty(); ++k) {
     MechanismDescription description = branches.found[k].description;
     description.name = fmt::format("{}-branch-{}", file.description.name, k + 1);
+    ObservedQuantities known;
+    known.expected = file.observe.expected;
     WriteFileAtomically(command.out / (FileName(description.name) + ".json"),
-                        MechanismText(description, {}));
+                        MechanismText(description, known));
   }
   if (!command.out.empty()) {
     Print("\nwrote {} files to {}; loopbench view shows them\n", branches.found.size(),

@@ -186,7 +186,10 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
     AddUnitWarnings(path, problem.mechanism.description, &checked);
   }
   for (const Experiment& experiment : experiments) CheckLadders(experiment);
-  if (!command.no_assembly) AddStarts(path, CheckStarts(experiments), &checked);
+  if (!command.no_assembly) {
+    AddStarts(path, CheckStarts(experiments), &checked);
+    RequireFreedom(experiments);
+  }
   const std::string& name = experiments.front().name;
   checked.sentence = fmt::format("experiment \"{}\", {} cases", name, overview.cases());
   if (overview.combinations > 1) {
@@ -215,6 +218,7 @@ Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& co
     StartReport report = CheckStart(file.description, command.limits);
     for (std::string& warning : report.warnings) warning = file.description.name + ": " + warning;
     AddStarts(path, report, &checked);
+    RequireFreedom(file, command.limits);
   }
   const auto& [name, bodies, joints] =
       std::tie(file.description.name, file.description.bodies, file.description.joints);

@@ -266,13 +266,14 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
 }
 
 /// Returns the document of a mechanism, as printed by its child process.
-std::string MechanismText(const std::filesystem::path& path, bool all, const ProcessLimits& limits,
-                          int* code) {
+std::string MechanismText(const std::filesystem::path& path, ExplainView view,
+                          const ProcessLimits& limits, int* code) {
   std::string text;
   const auto work = [&] {
     JsonObject document;
     document.Add("file", path.string()).Add("kind", std::string("mechanism"));
-    const int ended = ExplainMechanism(path, {.all = all, .document = &document});
+    view.document = &document;
+    const int ended = ExplainMechanism(path, view);
     PrintText(document.Text());
     return ended;
   };
@@ -287,10 +288,12 @@ std::string MechanismText(const std::filesystem::path& path, bool all, const Pro
 
 /// Prints runs and measures of experiments, and models of mechanisms, by the kind of each file.
 /// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it. `all`:
-/// every row of long tables.
-int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimits& limits) {
+/// every row of long tables. `statics`: forces that hold mechanisms, too.
+int Explain(const ExperimentFiles& files, bool all, bool statics, bool json,
+            const ProcessLimits& limits) {
   // the child process prints into memory, without a terminal
-  const ExplainView view = ViewOfOutput(all);
+  ExplainView view = ViewOfOutput(all);
+  view.statics = statics;
   int exit_code = 0;
   std::string documents;
   for (const auto& path : files.paths) {
@@ -299,9 +302,13 @@ int Explain(const ExperimentFiles& files, bool all, bool json, const ProcessLimi
       throw ConfigError(fmt::format(
           "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
     }
+    if (statics && !is_mechanism) {
+      throw ConfigError(
+          fmt::format("{}: --statics is for mechanisms, and this is an experiment", path.string()));
+    }
     if (json) {
       documents += (documents.empty() ? "" : ",\n") +
-                   (is_mechanism ? MechanismText(path, all, limits, &exit_code)
+                   (is_mechanism ? MechanismText(path, view, limits, &exit_code)
                                  : ExperimentDocument(path, files).Text());
     } else if (is_mechanism) {
       const int code =
@@ -401,10 +408,11 @@ void AddExplain(Commands& commands) {
   auto& files = commands.Keep<ExperimentFiles>();
   auto& limits = commands.Keep(kFileLimits);
   auto& all = commands.Keep<bool>();
+  auto& statics = commands.Keep<bool>();
   auto& json = commands.Keep<bool>();
   commands.Add("explain",
                "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)",
-               [&](const Typed&) { return Explain(files, all, json, limits); },
+               [&](const Typed&) { return Explain(files, all, statics, json, limits); },
                {{"file", "Experiment or mechanism files (JSON)", &files.paths, kRequired},
                 FilterOption(&files.filter),
                 CpuOption(&limits),
@@ -412,7 +420,8 @@ void AddExplain(Commands& commands) {
                 SetOption(&files.settings),
                 WideOption(),
                 JsonOption(&json),
-                {"--all", "Print all rows of long tables", &all}});
+                {"--all", "Print all rows of long tables", &all},
+                {"--statics", "Print the forces that hold a mechanism at its start", &statics}});
 }
 
 }  // namespace loopbench::harness

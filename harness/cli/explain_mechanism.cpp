@@ -3,12 +3,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <map>
 
 #include "harness/analysis/model_warnings.h"
+#include "harness/analysis/structure_hints.h"
 #include "harness/cli/commands.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/case_identity.h"
 #include "harness/text/terminal.h"
+#include "harness/text/words.h"
+#include "harness/trajectory/statics.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
 
@@ -45,7 +50,8 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
   return table;
 }
 
-void PrintFreedom(const Structure& s, const ExplainView& view) {
+void PrintFreedom(const Structure& s, const std::vector<std::string>& idle,
+                  const ExplainView& view) {
   const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
   Say(view, "\nDegrees of freedom\n");
   Say(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
@@ -54,6 +60,7 @@ void PrintFreedom(const Structure& s, const ExplainView& view) {
   Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
       s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows,
       s.couplings > 0 ? " and couplings" : "");
+  for (const std::string& one : idle) Say(view, "  1 of them idle: {}\n", one);
   if (s.locked() && s.freedom_at_start() > 0) {
     Say(view,
         "  0 finite motions: the start is singular, and its first-order motions\n"
@@ -158,6 +165,68 @@ void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView
   PrintSection("Plan of O-DCA", table, view, "odca_plan");
 }
 
+/// Prints efforts and reactions at rest; returns 2 if nothing can hold the mechanism.
+int PrintStatics(const MechanismDescription& description, const Structure& structure,
+                 const ExplainView& view) {
+  const Statics statics = FindStatics(description, structure.start);
+  if (view.document != nullptr) view.document->Add("statics_message", statics.why);
+  if (!statics.why.empty()) {
+    Say(view, "\nForces at rest: none, {}\n", statics.why);
+    return 2;
+  }
+  double largest = 0.0;
+  for (const double value : statics.values) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  const auto shown = [&](double value) {
+    if (view.document != nullptr) return Value(value);
+    if (std::isnan(value)) return Value("not unique");
+    constexpr double kRoundOff = 1e-12;
+    return Value(ShortNumber(std::abs(value) > kRoundOff * largest ? value : 0.0));
+  };
+  Table efforts, reactions;
+  efforts.columns = {{"joint", "joint", Format::kText, {}},
+                     {"coordinate", "coordinate", Format::kText, {}},
+                     {"effort", "effort", Format::kText, {}},
+                     {"unit", "unit", Format::kText, {}},
+                     {"held", "held by", Format::kText, {}}};
+  reactions.columns = {{"joint", "joint", Format::kText, {}}, {"on", "on", Format::kText, {}}};
+  std::map<std::string, std::string> second;
+  for (const JointDescription& joint : description.joints) {
+    second[LabelName(joint.name)] = description.bodies[joint.to.body].name;
+  }
+  for (std::size_t i = 1; i < statics.columns.size(); ++i) {
+    const auto& [kind, name, component, unit] = statics.columns[i];
+    if (kind == "drive") {
+      const bool is_ours =
+          std::ranges::find(statics.held, name + ":" + component) != statics.held.end();
+      AddRow(
+          {name, component, shown(statics.values[i]), unit, is_ours ? "--statics" : "its motion"},
+          &efforts);
+      continue;
+    }
+    if (component == "fx") AddRow({name, second[name]}, &reactions);
+    reactions.rows.back().Set(component, shown(statics.values[i]));
+    if (reactions.rows.size() == 1) {
+      reactions.columns.push_back(
+          {component, fmt::format("{} [{}]", component, unit), Format::kText, {}});
+    }
+  }
+  PrintSection("Efforts that hold the start at rest", efforts, view, "efforts_at_rest");
+  PrintSection("Reactions at rest", reactions, view, "reactions_at_rest");
+  Say(view,
+      "  Ground axes, on the body \"on\" at the joint's point; efforts and joint forces are not in "
+      "them.\n");
+  if (std::ranges::any_of(statics.values, [](double value) { return std::isnan(value); })) {
+    Say(view, "  not unique: redundant constraints share the load in no one way.\n");
+  }
+  if (statics.free > 0) {
+    Say(view, "  {} that no force drives {} not held.\n", WithCount(statics.free, "motion"),
+        statics.free == 1 ? "is" : "are");
+  }
+  return 0;
+}
+
 std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
                                       const Structure& structure) {
   std::vector<JsonObject> loops;
@@ -177,7 +246,7 @@ std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
 
 /// Prints facts that the other sections do not contain.
 void DescribeStructure(const MechanismDescription& description, const Structure& s,
-                       JsonObject* document) {
+                       const std::vector<std::string>& idle, JsonObject* document) {
   std::vector<JsonObject> redundant;
   for (const RedundantDirection& one : s.redundant) {
     redundant.push_back(JsonObject()
@@ -196,7 +265,8 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
                                      .Add("at_start", known(s.freedom_at_start()))
                                      .Add("constraints_of_loops", std::int64_t{s.loop_rows})
                                      .Add("rank", known(s.rank_nearby))
-                                     .Add("rank_at_start", known(s.rank)))
+                                     .Add("rank_at_start", known(s.rank))
+                                     .Add("idle", idle))
       .Add("loops", LoopDocuments(description, s))
       .Add("redundant", redundant);
 }
@@ -204,22 +274,26 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
 }  // namespace
 
 int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
-  const MechanismDescription description = ReadMechanism(path).description;
+  const MechanismFile file = ReadMechanism(path);
+  const MechanismDescription& description = file.description;
   const Structure structure = AnalyseStructure(description);
   const std::vector<Warning> warnings = FindWarnings(description, structure);
+  const std::vector<std::string> idle =
+                                     NamesOf(description, FindIdleFreedoms(description, structure)),
+                                 hints = FindHints(description, structure);
   if (view.document != nullptr) {
     const bool planar = description.space == SpaceKind::kPlanar;
     view.document->Add("name", description.name)
         .Add("space", std::string(planar ? "planar" : "spatial"))
         .Add("gravity",
              std::vector<double>(description.gravity.begin(), description.gravity.end()));
-    DescribeStructure(description, structure, view.document);
+    DescribeStructure(description, structure, idle, view.document);
   }
   Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
       path.string(), description.space == SpaceKind::kPlanar ? "planar" : "spatial");
   PrintModel(description, structure, view);
   PrintStart(description, structure, view);
-  PrintFreedom(structure, view);
+  PrintFreedom(structure, idle, view);
   PrintSection("Loops", LoopTable(description, structure, view), view);
   PrintRedundant(description, structure, view);
   PrintIslands(description, structure, view);
@@ -236,12 +310,23 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   if (view.document != nullptr) {
     std::vector<std::string> texts;
     for (const Warning& warning : warnings) texts.push_back(warning.text);
-    view.document->Add("simplifications", compiled.report).Add("warnings", texts);
+    view.document->Add("simplifications", compiled.report)
+        .Add("warnings", texts)
+        .Add("hints", hints);
   }
   Say(view, "\nWarnings\n");
   if (warnings.empty()) Say(view, "  none\n");
   for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
-  return structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  if (!hints.empty()) Say(view, "\nHints\n");
+  for (const std::string& hint : hints) Say(view, "  {}\n", hint);
+  int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  if (view.statics && code == 0) code = PrintStatics(description, structure, view);
+  const std::string fault = FreedomFault(description, file.observe, structure);
+  if (fault.empty()) return code;
+  if (view.document == nullptr) throw ConfigError(fault);
+  view.document->Add("error", fault);
+  PrintError("{}\n", fault);
+  return 2;
 }
 
 // explain: the assembled start of a mechanism, joint by joint, and its energy.

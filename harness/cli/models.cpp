@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Exact facts that remain valid: on bodies that still exist, and in an approximate model only its
-/// length.
+/// length. Expected degrees of freedom are those of an exact model in one part.
 ObservedQuantities ObserveIn(const MechanismDescription& description,
                              const ObservedQuantities& observe, bool keeps_facts) {
   ObservedQuantities known = observe;
@@ -57,6 +57,7 @@ void AddModels(const MechanismFile& file, const std::string& name, bool is_exact
     const bool same_axes =
         simplified.R_WC.isIdentity(0.0) && model.description.space == file.description.space;
     model.observe = ObserveIn(model.description, file.observe, is_exact && same_axes);
+    if (!is_exact || simplified.parts.size() > 1) model.observe.expected.reset();
     model.done = simplified.done;
     model.dropped = simplified.dropped;
     model.assumption = assumption;

@@ -80,6 +80,7 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
         command.gate, kLongSweep, command.gate));
   }
   RequirePeers(workload.some());
+  RequireFreedom(workload.some());
   if (command.suite.precision) {
     for (const Experiment& experiment : workload.some()) RequireLadders(experiment);
   }

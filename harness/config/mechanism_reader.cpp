@@ -134,7 +134,8 @@ const Fields<Draft>& MechanismFileFields() {
             "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. "
             "Loops with smaller gaps are closed; constraints with smaller differences are "
             "redundant."},
-           {"known_solution", Section(ObservationFields())}}));
+           {"known_solution", Section(ObservationFields())},
+           {"expect", ExpectValue()}}));
   return fields;
 }
 
@@ -189,9 +190,11 @@ std::string MechanismText(const MechanismDescription& description,
   return text;
 }
 
-// "initial", "independent" and "observe" of a mechanism file.
+// "initial", "independent", "observe" and "expect" of a mechanism file.
 
 namespace {
+
+constexpr std::int64_t kMostFreedom = 1'000'000;
 
 /// Reads one number for a joint with one coordinate, otherwise one per coordinate.
 std::vector<double> ReadJointNumbers(const JsonNode& node, const JointDescription& joint,
@@ -492,7 +495,34 @@ Json WriteLength(const Draft& draft) {
   return length == ObservedQuantities{}.length ? Json() : Json(length);
 }
 
+void ReadFreedom(const JsonNode& node, Expectation& expected) {
+  expected = {static_cast<int>(node.Integer(0, kMostFreedom)), node.Place()};
+}
+
+const Fields<Expectation>& ExpectationFields() {
+  static const Fields<Expectation> fields(
+      "expect",
+      "Properties that the mechanism must have; `check`, `explain` and `run` verify them.",
+      {{"degrees_of_freedom",
+        By<Expectation>(IntegerSchema(0, kMostFreedom), ReadFreedom,
+                        [](const Expectation& e) { return Json(e.degrees_of_freedom); }),
+        "Independent finite motions; prescribed coordinates do not count.", "an integer from 0"}});
+  return fields;
+}
+
+void ReadExpect(const JsonNode& node, Draft& draft) {
+  ExpectationFields().Read(node, &draft.observe.expected.emplace());
+}
+
+Json WriteExpect(const Draft& draft) {
+  return draft.observe.expected ? ExpectationFields().Write(*draft.observe.expected) : Json();
+}
+
 }  // namespace
+
+FieldValue<Draft> ExpectValue() {
+  return By(ExpectationFields().Schema(), ReadExpect, WriteExpect);
+}
 
 FieldValue<Draft> IndependentValue() {
   return By(NamesSchema(), ReadIndependent, WriteIndependent);

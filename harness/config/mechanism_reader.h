@@ -26,11 +26,20 @@ struct PendulumForm {
   double frequency_squared = 0.0;  ///< [1/s^2], > 0
 };
 
-/// JSON "known_solution". Empty if a problem has no such properties.
+/// JSON "expect": what the structure must have, or else the file is wrong.
+struct Expectation {
+  int degrees_of_freedom = 0;  ///< finite motions (Structure::freedom())
+  std::string place;           ///< file, line and pointer, for messages
+
+  friend bool operator==(const Expectation&, const Expectation&) = default;
+};
+
+/// JSON "known_solution" and "expect". Empty if a problem has no such properties.
 struct ObservedQuantities {
   std::vector<AngleCombination> branch_invariants;  ///< JSON "branch"
   std::optional<PendulumForm> closed_form;
   double length = 1.0;  ///< characteristic bar length, the scale of "saturated" drift [m]
+  std::optional<Expectation> expected;
 };
 
 /// Content of one mechanism file.

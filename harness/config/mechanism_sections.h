@@ -49,6 +49,7 @@ FieldValue<Draft> JointsValue();
 FieldValue<Draft> CouplingsValue();
 FieldValue<Draft> ForcesValue();
 FieldValue<Draft> IndependentValue();
+FieldValue<Draft> ExpectValue();
 const Fields<Draft>& InitialFields();
 const Fields<Draft>& ObservationFields();
 

@@ -39,7 +39,7 @@ const std::array<Kind, 6>& Kinds() {
        "a mechanism",
        {"bodies", "joints"},
        {"name", "comment", "space", "gravity", "bodies", "ground", "joints", "couplings", "forces",
-        "initial", "independent", "accuracy", "known_solution", "$schema", "format"}},
+        "initial", "independent", "accuracy", "known_solution", "expect", "$schema", "format"}},
       {FileKind::kExperiment,
        "an experiment",
        {"problems", "methods"},

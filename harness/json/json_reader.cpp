@@ -76,6 +76,17 @@ void ErrorList::AddText(const std::string& text) {
   if (!again) messages_.push_back({true, "", text});
 }
 
+std::string ErrorList::PlaceOf(const std::string& pointer) const {
+  const Origins::Place place = origins_.Find(pointer);
+  std::string line;
+  if (!place.text.empty()) {
+    const auto lines = LinesOf(place.text, {place.line_pointer});
+    if (!lines.empty()) line = fmt::format(":{}", lines.begin()->second);
+  }
+  return fmt::format("{}{}: {}{}", place.file, line, Printable(ShownPointer(place.pointer)),
+                     place.note.empty() ? "" : " (" + place.note + ")");
+}
+
 void ErrorList::ThrowIfAny(const std::string& ending) const {
   if (messages_.empty()) return;
   // one pass through each text for all its lines

@@ -105,6 +105,9 @@ class ErrorList {
   /// one invalid mechanism) are added once.
   void AddText(const std::string& text);
 
+  /// Returns the place "FILE:LINE: /json/pointer" of a value, for messages after reading.
+  std::string PlaceOf(const std::string& pointer) const;
+
   bool empty() const { return messages_.empty(); }
   /// Returns true if further errors are only counted and need no text.
   bool full() const { return messages_.size() >= kMaxMessages; }
@@ -181,6 +184,7 @@ class JsonNode {
       : value_(&value), pointer_(std::move(pointer)), errors_(&errors) {}
 
   const Json& value() const { return *value_; }
+  std::string Place() const { return errors_->PlaceOf(pointer_); }
 
   /// Reports this value as an error.
   void Fail(std::string_view expected, std::string_view suggestion = "") const;

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "harness/analysis/model_warnings.h"
+#include "harness/analysis/structure_hints.h"
 #include "harness/integrator/cpu_time.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
@@ -402,6 +403,33 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
     }
   }
   return all;
+}
+
+void RequireFreedom(const MechanismFile& file, const ProcessLimits& limits) {
+  if (!file.observe.expected) return;
+  const auto fault = [&](std::size_t) {
+    return FreedomFault(file.description, file.observe, AnalyseStructure(file.description));
+  };
+  RunInProcesses(
+      1, 1, fault, [&](std::size_t) { return limits; },
+      [&](std::size_t, const ProcessResult& result) {
+        if (result.ending != ProcessEnding::kAnswered) {
+          throw ConfigError(fmt::format("{}: degrees of freedom were not counted ({}): {}",
+                                        file.observe.expected->place, OutcomeOf(result.ending),
+                                        result.text));
+        }
+        if (!result.text.empty()) throw ConfigError(result.text);
+      });
+}
+
+void RequireFreedom(const std::vector<Experiment>& experiments) {
+  std::set<std::string> seen;
+  for (const Experiment& experiment : experiments) {
+    for (const ExperimentProblem& problem : experiment.problems) {
+      if (!seen.insert(problem.mechanism.canonical).second) continue;
+      RequireFreedom(problem.mechanism, LimitsOfRuns(experiment.limits, 1));
+    }
+  }
 }
 
 }  // namespace loopbench::harness

@@ -106,4 +106,9 @@ StartReport CheckStart(const MechanismDescription& description, const ProcessLim
 /// ensembles are not checked.
 StartReport CheckStarts(const std::vector<Experiment>& experiments);
 
+/// Throws ConfigError for mechanisms that do not have the degrees of freedom that their files
+/// expect, analysed in a child process; exceeding the limits is an error, too.
+void RequireFreedom(const MechanismFile& file, const ProcessLimits& limits);
+void RequireFreedom(const std::vector<Experiment>& experiments);
+
 }  // namespace loopbench::harness

@@ -107,8 +107,9 @@ std::string Everything(const MechanismDescription& d) {
 }
 
 std::string Everything(const ObservedQuantities& observe) {
-  const auto& [branch, form, length] = observe;
+  const auto& [branch, form, length, expected] = observe;
   std::string text = fmt::format("length {}", length);
+  if (expected) text += fmt::format(" freedom {}", expected->degrees_of_freedom);
   for (const AngleCombination& combination : branch) {
     for (const auto& [body, factor] : combination) text += fmt::format(" {}*{}", factor, body);
     text += ";";

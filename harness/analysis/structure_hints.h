@@ -1,0 +1,48 @@
+// Idle degrees of freedom, hints on parts that may be mistakes, and the degrees of freedom that a
+// file expects.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "harness/config/mechanism_reader.h"
+#include "mechanism/simplify/structure.h"
+
+namespace loopbench::harness {
+
+/// A spin of bodies about a line that moves no other body: of a rod between two spherical joints
+/// about the line of their centres. It is a finite motion. No coordinate of its own describes it.
+struct IdleFreedom {
+  std::vector<int> bodies;  ///< that turn together
+  std::vector<int> joints;  ///< whose points lie on the line
+};
+
+/// Returns the idle freedoms of a spatial mechanism at its start, none of a planar one.
+///
+/// Bodies are grouped by the joints with one speed or less. A group with joints to two or more
+/// other bodies may turn about the line of these joints' points, or of a cylindrical one's axis.
+/// The spin is idle if all points lie on the line and no constraint forbids it: D^T V = 0 at each
+/// of these joints. This needs neither rank nor matrices of the whole.
+std::vector<IdleFreedom> FindIdleFreedoms(const MechanismDescription& description,
+                                          const Structure& structure);
+
+/// Returns a sentence for each of the freedoms: "spin of rod about the line of its joints A, B".
+std::vector<std::string> NamesOf(const MechanismDescription& description,
+                                 const std::vector<IdleFreedom>& idle);
+
+/// Radius of gyration over the size of a body beyond which, or below its inverse, units may be
+/// mixed. Bodies of usual shapes have 0.1 to 1; g for kg gives 1/30, mm for m 1000 times.
+inline constexpr double kOddGyration = 100.0;
+
+/// Returns sentences on parts that are valid but unusual: bodies that hang by one joint beside
+/// loops, and radii of gyration out of proportion with the distances of joints and centres of mass.
+std::vector<std::string> FindHints(const MechanismDescription& description,
+                                   const Structure& structure);
+
+/// Returns the error message of a mechanism that does not have the expected degrees of freedom,
+/// with redundant constraints and idle freedoms; "" if it has them, if nothing is expected, or if
+/// the start cannot be assembled, which is an error of its own.
+std::string FreedomFault(const MechanismDescription& description, const ObservedQuantities& observe,
+                         const Structure& structure);
+
+}  // namespace loopbench::harness

@@ -150,6 +150,7 @@ JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type,
   joint.type = type;
   joint.from = {from, X_PF.p, RotationVector(X_PF.q)};
   joint.to = {to, X_QM.p, RotationVector(X_QM.q)};
+  if (!name.empty()) numbers_.emplace(name, static_cast<int>(description.joints.size()));
   description.joints.push_back(joint);
   return description.joints.back();
 }
@@ -184,6 +185,27 @@ void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name
   }
   leader.ratio = -leader.ratio;
   description.couplings.push_back({joints_.Take(name), {{follower, 1.0}, leader}, offset});
+}
+
+void ImportDraft::AddMimic(const XmlElement& element, int follower,
+                           CouplingDescription::Part leader, double offset) {
+  const auto next = [&](int joint) {
+    const auto found = leaders_.find(joint);
+    return found == leaders_.end() ? joint : found->second;
+  };
+  int first = leader.joint;  // the leader of all leaders; paths to it are halved
+  for (; next(first) != first; first = next(first)) leaders_[first] = next(next(first));
+  if (first == follower && leader.joint != follower) {
+    element.Fail("joints that follow each other", "no cycle");
+  }
+  AddCoupling(element, description.joints[follower].name + " mimic", follower, leader, offset);
+  leaders_[follower] = first;
+}
+
+int ImportDraft::JointNamed(const XmlValue& value, const std::string& prefix) const {
+  const auto found = numbers_.find(prefix + value.Name());
+  if (found == numbers_.end()) value.Fail("the name of a joint in this file");
+  return found->second;
 }
 
 void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {

@@ -186,6 +186,11 @@ class ImportDraft {
   /// a note unless both joints have one coordinate.
   void AddCoupling(const XmlElement& element, const std::string& name, int follower,
                    CouplingDescription::Part leader, double offset);
+  /// Adds the coupling of a joint that follows another one by its description. Rejects cycles.
+  void AddMimic(const XmlElement& element, int follower, CouplingDescription::Part leader,
+                double offset);
+  /// Returns the index of a joint from its name in the file, without `prefix`.
+  int JointNamed(const XmlValue& value, const std::string& prefix = "") const;
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
   /// Calls `read` at the end, unless the body is fixed to the ground: its mass then has no effect.
@@ -251,6 +256,8 @@ class ImportDraft {
   std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;
   exchange::UniqueNames joints_;                            ///< and couplings
+  std::map<std::string, int> numbers_;                      ///< of joints with names
+  std::map<int, int> leaders_;                              ///< of joints that follow others
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names
   std::vector<ImportNote> notes_;
   std::size_t rounded_ = 0, rounded_note_ = 0;  ///< number of rounded values; note of the first

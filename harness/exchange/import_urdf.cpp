@@ -153,14 +153,10 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
 void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
   const auto mimic = read.element.Child("mimic");
   if (!mimic) return;
-  const std::string leader = mimic->Required("joint", "the name of a joint").Name();
+  const int leader = draft->JointNamed(mimic->Required("joint", "the name of a joint"));
   const double multiplier = NumberOr(mimic->Attribute("multiplier"), 1.0);
   const double offset = NumberOr(mimic->Attribute("offset"), 0.0);
-  const auto& joints = draft->description.joints;
-  const auto found = std::ranges::find(joints, leader, &JointDescription::name);
-  if (found == joints.end()) mimic->Fail('"' + leader + '"', "the name of a joint in this file");
-  draft->AddCoupling(*mimic, read.element.RequiredName() + " mimic", follower,
-                     {static_cast<int>(found - joints.begin()), multiplier}, offset);
+  draft->AddMimic(*mimic, follower, {leader, multiplier}, offset);
 }
 
 }  // namespace

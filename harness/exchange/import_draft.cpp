@@ -155,6 +155,26 @@ JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type,
   return description.joints.back();
 }
 
+JointDescription& ImportDraft::AddLoop(const XmlElement& element, const std::string& name,
+                                       JointType type, int from, const Placement& X_PF, int to,
+                                       const Placement& X_QM) {
+  if (from == to) element.Fail("one body twice", "two different bodies");
+  JointDescription& joint = AddJoint(name, type, from, X_PF, to, X_QM);
+  joint.cut = true;
+  return joint;
+}
+
+void ImportDraft::AddBall(const XmlElement& element,
+                          const std::function<int(const XmlElement&)>& body,
+                          const std::function<XmlValue(const XmlElement&)>& point) {
+  const auto child = [&](const char* name) {
+    return element.RequiredChild((std::string(kDrakeBall) + name).c_str());
+  };
+  const int a = body(child("_body_A")), b = body(child("_body_B"));
+  const Placement P(point(child("_p_AP")).Vector()), Q(point(child("_p_BQ")).Vector());
+  AddLoop(element, NameLater("ball"), JointType::kSpherical, a, P, b, Q);
+}
+
 void ImportDraft::Fix(int parent, const Placement& X, int body, const char* ending) {
   const std::string name = description.bodies[body].name + ending;
   AddJoint(NameLater(name), JointType::kWeld, parent, X, body, {});

@@ -101,6 +101,7 @@ inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordin
 inline constexpr const char* kNotCoupled =
     "dropped: only joints with one coordinate follow others: this is a freedom more than in the "
     "file";
+inline constexpr const char* kDrakeBall = "drake:ball_constraint";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
 /// Returns the entry that a value names; if there is none, rejects the value with `expected`.
@@ -175,6 +176,13 @@ class ImportDraft {
   /// Adds a joint from X_PF on `from` to X_QM on `to`; the reference is valid until the next call.
   JointDescription& AddJoint(const std::string& name, JointType type, int from,
                              const Placement& X_PF, int to, const Placement& X_QM);
+  /// Adds a joint that closes a loop; rejects one body on both sides.
+  JointDescription& AddLoop(const XmlElement& element, const std::string& name, JointType type,
+                            int from, const Placement& X_PF, int to, const Placement& X_QM);
+  /// Adds a <drake:ball_constraint>: points of two bodies coincide. `body` and `point` read its
+  /// children.
+  void AddBall(const XmlElement& element, const std::function<int(const XmlElement&)>& body,
+               const std::function<XmlValue(const XmlElement&)>& point);
   /// Adds the joint of a series between two bodies; X_PF is its frame on the parent.
   JointDescription& AddComposed(const std::string& name, const ComposedJoint& composed, int parent,
                                 const Placement& X_PF, int child);
@@ -273,5 +281,9 @@ Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaternion
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);
 void ReadSdf(const XmlElement& root, ImportDraft* draft);
+/// Reads joints of SDF in <gazebo> elements of a URDF robot, which close loops. The draft has all
+/// bodies with their poses.
+void ReadGazeboJoints(const XmlElement& robot, const std::vector<XmlElement>& joints,
+                      ImportDraft* draft);
 
 }  // namespace loopbench::harness

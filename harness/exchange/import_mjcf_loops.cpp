@@ -41,17 +41,11 @@ Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
   return ends;
 }
 
-void RequireTwoBodies(const MjcfElement& equality, const Ends& ends) {
-  if (ends.first == ends.second) equality.own().Fail("one body twice", "two different bodies");
-}
-
 void AddLoopJoint(const MjcfElement& equality, JointType type, const Ends& ends,
                   ImportDraft* draft) {
   const auto name = equality.own().Attribute("name");
-  draft
-      ->AddJoint(draft->NameLater(name ? name->Name() : equality.own().tag()), type, ends.first,
-                 ends.X_first, ends.second, ends.X_second)
-      .cut = true;
+  draft->AddLoop(equality.own(), draft->NameLater(name ? name->Name() : equality.own().tag()), type,
+                 ends.first, ends.X_first, ends.second, ends.X_second);
 }
 
 void AddConnect(const MjcfElement& equality, MjcfModel* model) {
@@ -61,7 +55,6 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
     ends->X_first.p = equality.Required("anchor", "3 numbers").Vector();
     ends->X_second.p = AtRestOn(*model, ends->first, ends->X_first, ends->second).p;
   }
-  RequireTwoBodies(equality, *ends);
   ends->X_first.q.setIdentity();
   ends->X_second.q.setIdentity();
   AddLoopJoint(equality, JointType::kSpherical, *ends, model->draft);
@@ -85,7 +78,6 @@ Ends EndsOfBodies(const MjcfElement& equality, const MjcfModel& model) {
 void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   auto ends = EndsAtSites(*model, equality);
   if (!ends) ends = EndsOfBodies(equality, *model);
-  RequireTwoBodies(equality, *ends);
   // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
   for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
   AddLoopJoint(equality, JointType::kWeld, *ends, model->draft);

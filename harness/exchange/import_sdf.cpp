@@ -387,6 +387,28 @@ void SdfReader::ReadShapes(const XmlElement& element, const XmlElement& inertial
   body.inertia = sum.inertia;
 }
 
+// libsdformat converts a robot to SDF 1.11 and inserts <gazebo> (parser_urdf.cc,
+// InitModelString()). Links have the frames of URDF, the model has the frame of the root.
+void SdfReader::ReadGazebo(const XmlElement& robot, const std::vector<XmlElement>& joints) {
+  minor_ = 11;
+  is_urdf_ = true;
+  SdfScope scope(robot, "", false);
+  for (int i = 1; i < std::ssize(draft_->at_rest); ++i) {
+    const XmlElement& link = draft_->element(i);
+    scope.Add(link.RequiredName(), {link, draft_->at_rest[i]});
+  }
+  for (const XmlElement& joint : joints) ReadName(joint, &scope);
+  const int first = draft_->last_joint() + 1;
+  for (const XmlElement& joint : joints) ReadJoint(joint, scope);
+  for (int j = first; j <= draft_->last_joint(); ++j) draft_->description.joints[j].cut = true;
+  ReadCouplings();
+}
+
 void ReadSdf(const XmlElement& root, ImportDraft* draft) { SdfReader(draft).Read(root); }
+
+void ReadGazeboJoints(const XmlElement& robot, const std::vector<XmlElement>& joints,
+                      ImportDraft* draft) {
+  if (!joints.empty()) SdfReader(draft).ReadGazebo(robot, joints);
+}
 
 }  // namespace loopbench::harness

@@ -22,7 +22,7 @@ struct SdfFrame {
   bool is_raw_to_child = false;  ///< for joints: raw is in the frame of the child
 };
 
-/// A world or a model: its named elements, each in its own frame.
+/// A world, a model or a URDF robot: its named elements, each in its own frame.
 class SdfScope {
  public:
   SdfScope(XmlElement element_, std::string prefix_, bool is_static_)
@@ -64,6 +64,8 @@ class SdfReader {
   explicit SdfReader(ImportDraft* draft) : draft_(draft) {}
 
   void Read(const XmlElement& root);
+  /// See ReadGazeboJoints().
+  void ReadGazebo(const XmlElement& robot, const std::vector<XmlElement>& joints);
 
  private:
   /// The body that a parent or child moves with, and its pose in ground axes.
@@ -114,7 +116,8 @@ class SdfReader {
                                    const Eigen::Vector3d& axis, int reference) const;
 
   ImportDraft* draft_;
-  int minor_ = 0;  ///< of version 1.x
+  int minor_ = 0;         ///< of version 1.x
+  bool is_urdf_ = false;  ///< the joints of a URDF robot
   std::vector<Coupling> mimics_, gearboxes_;
   std::vector<int> groups_;                        ///< of bodies that are fixed together
   std::multimap<std::pair<int, int>, int> turns_;  ///< hinges and screws, by groups

@@ -1,4 +1,4 @@
-// Joints of SDF: axes, springs, starts, couplings.
+// Joints of SDF, in SDF files and in <gazebo> elements of URDF: axes, springs, starts, couplings.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -64,6 +64,11 @@ double ReadPitch(const XmlElement& joint) {
 
 void SdfReader::ReadJoints(const SdfScope& scope) {
   for (const XmlElement& joint : scope.element.Children("joint")) ReadJoint(joint, scope);
+  for (const XmlElement& ball : scope.element.Children(kDrakeBall)) {
+    draft_->AddBall(
+        ball, [&](const XmlElement& side) { return EndOf(side, scope).body; },
+        [](const XmlElement& point) { return point.Content(); });
+  }
   for (const auto& [name, model] : scope.models) ReadJoints(*model);
 }
 
@@ -160,6 +165,10 @@ Vector3d SdfReader::ReadAxis(const XmlElement& axis, const SdfScope& scope,
     }
   }
   if (BoolOr(axis.Content("use_parent_model_frame"))) in_joint = false;
+  if (is_urdf_ && in_joint && !(X_model_joint.q * xyz).isApprox(xyz, kSameAxis)) {
+    draft_->Note(axis,
+                 "in axes of the joint, as in SDF 1.11; before SDF 1.5, axes were the model's");
+  }
   if (in_joint) return xyz;
   return X_model_joint.q.conjugate() * (scope.Resolve(frame, axis).q * xyz);
 }

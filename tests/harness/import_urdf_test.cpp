@@ -158,7 +158,7 @@ TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<dynamics> damping", "one coordinate");
   ExpectNote(imported, "<mimic>", "a freedom more");
   ExpectNote(imported, "<transmission>", "no actuators");
-  ExpectNote(imported, "<gazebo>", "sidecar");
+  ExpectNote(imported, "<gazebo>", "another program");
   ExpectNote(imported, "<sensor>", "no sensors");
   ASSERT_EQ(ForcesOf<JointDamper>(imported).size(), 1u);
   EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].damping, 0.5);

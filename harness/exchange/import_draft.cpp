@@ -114,8 +114,13 @@ int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
 }
 
 int ImportDraft::BodyNamed(const XmlValue& value, const std::set<std::string>& also) const {
-  if (also.contains(value.Name())) return kGround;
-  return Named(bodies_, value, "the name of a body in this file");
+  return also.contains(value.Name()) ? kGround : BodyNamed(value.Name(), value);
+}
+
+int ImportDraft::BodyNamed(const std::string& name, const XmlValue& user) const {
+  const auto found = bodies_.find(name);
+  if (found == bodies_.end()) user.Fail("the name of a body in this file");
+  return found->second;
 }
 
 int ImportDraft::BodyNamed(const std::string& name, const XmlElement& user) const {
@@ -463,7 +468,9 @@ List ImportDraft::Numbers(const XmlValue& value, std::string_view kinds) {
     at = std::ranges::copy(stands ? exact : given, at).out;
     if (stands && !shown) shown = differs;
   }
-  if (shown && rounded_++ == 0) {
+  if (!shown) return numbers;
+  rounded_.emplace(value.element().id(), value.attribute());
+  if (rounded_.size() == 1) {
     rounded_note_ = notes_.size();
     Note(value.element(), value.attribute(), *shown);
   }

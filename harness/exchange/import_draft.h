@@ -157,6 +157,7 @@ class ImportDraft {
   ImportDraft(const XmlFile& file, const ImportOptions& options);
 
   MechanismDescription description;
+  bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
   std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
 
   /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
@@ -165,6 +166,8 @@ class ImportDraft {
   /// Returns the index of an existing body; `also`: further names of Ground.
   int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
   int BodyNamed(const std::string& name, const XmlElement& user) const;
+  /// As above; a failure shows the value as in the file.
+  int BodyNamed(const std::string& name, const XmlValue& user) const;
   /// Returns the element of a body; the root element for Ground.
   const XmlElement& element(int body) const { return elements_[body]; }
 
@@ -268,7 +271,9 @@ class ImportDraft {
   std::map<int, int> leaders_;                              ///< of joints that follow others
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names
   std::vector<ImportNote> notes_;
-  std::size_t rounded_ = 0, rounded_note_ = 0;  ///< number of rounded values; note of the first
+  std::set<std::pair<const void*, std::string>>
+      rounded_;                   ///< elements and attributes of rounded values
+  std::size_t rounded_note_ = 0;  ///< the note of the first
   std::vector<std::pair<int, double>> lifts_;
   std::vector<std::pair<int, std::function<void()>>> late_masses_;
   std::optional<XmlElement> assumed_gravity_;  ///< element that lacks the gravity

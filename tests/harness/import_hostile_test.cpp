@@ -58,6 +58,19 @@ std::vector<std::string> Files() {
   </joint>
 </gazebo>
 )"));
+  texts.push_back(R"(<mujoco>
+<worldbody>
+  <replicate count="2" offset="0 1 0" euler="90 0 0" sep="-">
+    <body name="a"><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <replicate count="3" offset="1 0 0">
+        <body name="b"><joint name="k"/><geom size="0.1"/><site name="s"/></body>
+      </replicate>
+    </body>
+  </replicate>
+</worldbody>
+<equality><joint joint1="j" joint2="k"/><connect body1="b" body2="a" anchor="0 0 0"/></equality>
+<actuator><motor joint="k" ctrlrange="0 1"/></actuator>
+</mujoco>)");
   return texts;
 }
 

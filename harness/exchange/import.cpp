@@ -422,9 +422,10 @@ Imported ImportDraft::Finish(const std::string& format) {
     description.forces.emplace_back(
         PointForce{{body, lifted.com}, -share * lifted.mass * description.gravity, false});
   }
-  if (rounded_ > 0) {
-    notes_[rounded_note_].reason += fmt::format(
-        "; values with rounded angles or directions: {} (--keep-digits keeps them)", rounded_);
+  if (!rounded_.empty()) {
+    notes_[rounded_note_].reason +=
+        fmt::format("; values with rounded angles or directions: {} (--keep-digits keeps them)",
+                    rounded_.size());
   }
   HoldFloatingParts();
   MergeFixed(false);
@@ -441,6 +442,12 @@ Imported ImportDraft::Finish(const std::string& format) {
   std::ranges::stable_sort(notes_, {}, [&](const ImportNote& note) {
     return std::tuple(note.file != file_.name(), note.file, note.line);
   });
+  if (has_replicas) {
+    std::set<std::tuple<std::string, int, std::string, std::string>> seen;
+    std::erase_if(notes_, [&](const ImportNote& note) {
+      return !seen.emplace(note.file, note.line, note.element, note.reason).second;
+    });
+  }
   imported.description = std::move(description);
   imported.notes = std::move(notes_);
   return imported;

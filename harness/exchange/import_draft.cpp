@@ -114,8 +114,13 @@ int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
 }
 
 int ImportDraft::BodyNamed(const XmlValue& value, const std::set<std::string>& also) const {
-  if (also.contains(value.Name())) return kGround;
-  return Named(bodies_, value, "the name of a body in this file");
+  return also.contains(value.Name()) ? kGround : BodyNamed(value.Name(), value);
+}
+
+int ImportDraft::BodyNamed(const std::string& name, const XmlValue& user) const {
+  const auto found = bodies_.find(name);
+  if (found == bodies_.end()) user.Fail("the name of a body in this file");
+  return found->second;
 }
 
 int ImportDraft::BodyNamed(const std::string& name, const XmlElement& user) const {
@@ -150,8 +155,29 @@ JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type,
   joint.type = type;
   joint.from = {from, X_PF.p, RotationVector(X_PF.q)};
   joint.to = {to, X_QM.p, RotationVector(X_QM.q)};
+  if (!name.empty()) numbers_.emplace(name, static_cast<int>(description.joints.size()));
   description.joints.push_back(joint);
   return description.joints.back();
+}
+
+JointDescription& ImportDraft::AddLoop(const XmlElement& element, const std::string& name,
+                                       JointType type, int from, const Placement& X_PF, int to,
+                                       const Placement& X_QM) {
+  if (from == to) element.Fail("one body twice", "two different bodies");
+  JointDescription& joint = AddJoint(name, type, from, X_PF, to, X_QM);
+  joint.cut = true;
+  return joint;
+}
+
+void ImportDraft::AddBall(const XmlElement& element,
+                          const std::function<int(const XmlElement&)>& body,
+                          const std::function<XmlValue(const XmlElement&)>& point) {
+  const auto child = [&](const char* name) {
+    return element.RequiredChild((std::string(kDrakeBall) + name).c_str());
+  };
+  const int a = body(child("_body_A")), b = body(child("_body_B"));
+  const Placement P(point(child("_p_AP")).Vector()), Q(point(child("_p_BQ")).Vector());
+  AddLoop(element, NameLater("ball"), JointType::kSpherical, a, P, b, Q);
 }
 
 void ImportDraft::Fix(int parent, const Placement& X, int body, const char* ending) {
@@ -184,6 +210,27 @@ void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name
   }
   leader.ratio = -leader.ratio;
   description.couplings.push_back({joints_.Take(name), {{follower, 1.0}, leader}, offset});
+}
+
+void ImportDraft::AddMimic(const XmlElement& element, int follower,
+                           CouplingDescription::Part leader, double offset) {
+  const auto next = [&](int joint) {
+    const auto found = leaders_.find(joint);
+    return found == leaders_.end() ? joint : found->second;
+  };
+  int first = leader.joint;  // the leader of all leaders; paths to it are halved
+  for (; next(first) != first; first = next(first)) leaders_[first] = next(next(first));
+  if (first == follower && leader.joint != follower) {
+    element.Fail("joints that follow each other", "no cycle");
+  }
+  AddCoupling(element, description.joints[follower].name + " mimic", follower, leader, offset);
+  leaders_[follower] = first;
+}
+
+int ImportDraft::JointNamed(const XmlValue& value, const std::string& prefix) const {
+  const auto found = numbers_.find(prefix + value.Name());
+  if (found == numbers_.end()) value.Fail("the name of a joint in this file");
+  return found->second;
 }
 
 void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
@@ -421,7 +468,9 @@ List ImportDraft::Numbers(const XmlValue& value, std::string_view kinds) {
     at = std::ranges::copy(stands ? exact : given, at).out;
     if (stands && !shown) shown = differs;
   }
-  if (shown && rounded_++ == 0) {
+  if (!shown) return numbers;
+  rounded_.emplace(value.element().id(), value.attribute());
+  if (rounded_.size() == 1) {
     rounded_note_ = notes_.size();
     Note(value.element(), value.attribute(), *shown);
   }

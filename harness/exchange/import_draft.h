@@ -102,6 +102,7 @@ inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordin
 inline constexpr const char* kNotCoupled =
     "dropped: only joints with one coordinate follow others: this is a freedom more than in the "
     "file";
+inline constexpr const char* kDrakeBall = "drake:ball_constraint";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
 /// Returns the entry that a value names; if there is none, rejects the value with `expected`.
@@ -157,6 +158,7 @@ class ImportDraft {
   ImportDraft(const XmlFile& file, const ImportOptions& options);
 
   MechanismDescription description;
+  bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
   std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
 
   /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
@@ -165,6 +167,8 @@ class ImportDraft {
   /// Returns the index of an existing body; `also`: further names of Ground.
   int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
   int BodyNamed(const std::string& name, const XmlElement& user) const;
+  /// As above; a failure shows the value as in the file.
+  int BodyNamed(const std::string& name, const XmlValue& user) const;
   /// Returns the element of a body; the root element for Ground.
   const XmlElement& element(int body) const { return elements_[body]; }
 
@@ -176,6 +180,13 @@ class ImportDraft {
   /// Adds a joint from X_PF on `from` to X_QM on `to`; the reference is valid until the next call.
   JointDescription& AddJoint(const std::string& name, JointType type, int from,
                              const Placement& X_PF, int to, const Placement& X_QM);
+  /// Adds a joint that closes a loop; rejects one body on both sides.
+  JointDescription& AddLoop(const XmlElement& element, const std::string& name, JointType type,
+                            int from, const Placement& X_PF, int to, const Placement& X_QM);
+  /// Adds a <drake:ball_constraint>: points of two bodies coincide. `body` and `point` read its
+  /// children.
+  void AddBall(const XmlElement& element, const std::function<int(const XmlElement&)>& body,
+               const std::function<XmlValue(const XmlElement&)>& point);
   /// Adds the joint of a series between two bodies; X_PF is its frame on the parent.
   JointDescription& AddComposed(const std::string& name, const ComposedJoint& composed, int parent,
                                 const Placement& X_PF, int child);
@@ -187,6 +198,11 @@ class ImportDraft {
   /// a note unless both joints have one coordinate.
   void AddCoupling(const XmlElement& element, const std::string& name, int follower,
                    CouplingDescription::Part leader, double offset);
+  /// Adds the coupling of a joint that follows another one by its description. Rejects cycles.
+  void AddMimic(const XmlElement& element, int follower, CouplingDescription::Part leader,
+                double offset);
+  /// Returns the index of a joint from its name in the file, without `prefix`.
+  int JointNamed(const XmlValue& value, const std::string& prefix = "") const;
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
   /// Calls `read` at the end, unless the body is fixed to the ground: its mass then has no effect.
@@ -252,9 +268,13 @@ class ImportDraft {
   std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;
   exchange::UniqueNames joints_;                            ///< and couplings
+  std::map<std::string, int> numbers_;                      ///< of joints with names
+  std::map<int, int> leaders_;                              ///< of joints that follow others
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names
   std::vector<ImportNote> notes_;
-  std::size_t rounded_ = 0, rounded_note_ = 0;  ///< number of rounded values; note of the first
+  std::set<std::pair<const void*, std::string>>
+      rounded_;                   ///< elements and attributes of rounded values
+  std::size_t rounded_note_ = 0;  ///< the note of the first
   std::vector<std::pair<int, double>> lifts_;
   std::vector<std::pair<int, std::function<void()>>> late_masses_;
   std::optional<XmlElement> assumed_gravity_;  ///< element that lacks the gravity
@@ -267,5 +287,9 @@ Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaternion
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);
 void ReadSdf(const XmlElement& root, ImportDraft* draft);
+/// Reads joints of SDF in <gazebo> elements of a URDF robot, which close loops. The draft has all
+/// bodies with their poses.
+void ReadGazeboJoints(const XmlElement& robot, const std::vector<XmlElement>& joints,
+                      ImportDraft* draft);
 
 }  // namespace loopbench::harness

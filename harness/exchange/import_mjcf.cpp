@@ -49,7 +49,9 @@ void RefuseMacros(const XmlElement& root) {
   std::vector<XmlElement> found = root.Children(macros);
   for (const XmlElement& section : root.Children({"compiler", "option", "default", "worldbody",
                                                   "equality", "tendon", "actuator", "keyframe"})) {
-    if (const auto macro = section.Within(macros)) found.push_back(*macro);
+    std::vector<std::string_view> wrong = macros;
+    if (section.tag() == "worldbody") std::erase(wrong, "replicate");
+    if (const auto macro = section.Within(wrong)) found.push_back(*macro);
   }
   if (found.empty()) return;
   found[0].Fail("an element that stands for other parts of a model",

@@ -3,7 +3,9 @@
 // Internal to import_mjcf*.cpp.
 #pragma once
 
+#include <deque>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "harness/exchange/import_draft.h"
+#include "harness/exchange/solids.h"
 
 namespace loopbench::harness {
 
@@ -117,6 +120,18 @@ struct MjcfSite : BodyPoint {
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
 };
 
+/// One copy of the contents of a <replicate>, within a copy of each <replicate> around it.
+struct MjcfReplica {
+  std::size_t replicate = 0;  ///< index into MjcfModel::replicates
+  const MjcfReplica* around = nullptr;
+  std::string suffix;  ///< of names: its own, then that of the replica around it
+};
+
+struct MjcfReplicate {
+  std::optional<std::size_t> around;  ///< the next <replicate> around it
+  std::vector<const MjcfReplica*> replicas;
+};
+
 class MjcfModel {
  public:
   explicit MjcfModel(ImportDraft* draft_) : draft(draft_) {}
@@ -128,8 +143,27 @@ class MjcfModel {
   std::vector<MjcfChain> chains;  ///< of all bodies, in the order of the file
   std::map<std::string, MjcfSite> sites;
   std::map<std::string, MjcfElement> meshes;
+  mutable std::map<std::string, Solid> mesh_solids;  ///< of meshes that have been read
   std::map<std::string, std::size_t> joint_names;
   std::set<int> links;  ///< bodies without mass between two hinges of one body of MuJoCo
+  std::vector<MjcfReplicate> replicates;
+
+  // import_mjcf_replicas.cpp
+  /// Returns the next copy of the contents of a <replicate>; nullptr stands for no replica.
+  const MjcfReplica* AddReplica(const XmlElement& element, const MjcfReplica* around,
+                                const std::string& suffix);
+  /// Counts an element that is read in a replica; rejects too many.
+  void CountCopy(const XmlElement& element);
+  /// Returns a new name of this kind ("joint"), with the suffix of its replica.
+  std::string NewName(const std::string& kind, const XmlValue& name, const MjcfReplica* replica);
+  /// Returns the name that a reference stands for in the replica that is read at present.
+  std::string NameOf(const std::string& kind, const XmlValue& reference) const;
+  /// Returns the suffix of names in the replica that is read at present.
+  std::string Suffix() const { return present_ == nullptr ? "" : present_->suffix; }
+  using References = std::vector<std::pair<std::string, std::optional<XmlValue>>>;
+  /// Calls `read` once, or for each replica of the innermost <replicate> that contains a name of
+  /// `references`. Rejects names in different ones.
+  void ForReplicas(const References& references, const std::function<void()>& read);
 
   /// Returns the orientation of the element in any notation; by default the one of its class.
   Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
@@ -147,11 +181,25 @@ class MjcfModel {
   /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
   const MjcfSite& SiteNamed(const XmlValue& value) const {
-    return Named(sites, value, "the name of a site");
+    const auto found = sites.find(NameOf("site", value));
+    if (found == sites.end()) value.Fail("the name of a site");
+    return found->second;
   }
-  MjcfJoint& JointNamed(const XmlValue& value) {
-    return joints[Named(joint_names, value, "the name of a joint")];
+  std::size_t JointNamed(const XmlValue& value) const {
+    const auto found = joint_names.find(NameOf("joint", value));
+    if (found == joint_names.end()) value.Fail("the name of a joint");
+    return found->second;
   }
+  int BodyNamed(const XmlValue& value) const {
+    return value.text() == "world" ? kGround : draft->BodyNamed(NameOf("body", value), value);
+  }
+
+ private:
+  std::deque<MjcfReplica> replicas_;
+  std::map<const void*, std::size_t> known_;       ///< replicates by element
+  std::map<std::string, std::size_t> replicated_;  ///< replicates by kind and name
+  const MjcfReplica* present_ = nullptr;           ///< the replica that is read
+  std::size_t num_copies_ = 0;
 };
 
 /// Reads <worldbody>.
@@ -163,6 +211,7 @@ struct MjcfPlaced {
   XmlElement element;
   Placement X;
   std::string childclass;
+  const MjcfReplica* replica = nullptr;
 };
 /// Makes one Loopbench joint from the joints of a body; X_PB is the drawn pose of the body.
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,

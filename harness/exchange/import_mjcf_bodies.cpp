@@ -58,9 +58,8 @@ Solid ShapeOf(Type type, const Eigen::Vector3d& size) {
   return EllipsoidOf(type == kSphere ? Eigen::Vector3d(size[0], size[0], size[0]) : size);
 }
 
-/// Returns a mesh of <asset> as a solid in its own frame.
-Solid MeshSolid(const MjcfModel& model, const XmlValue& name) {
-  const MjcfElement& asset = Named(model.meshes, name, "the name of a mesh");
+/// Reads a mesh of <asset> as a solid in its own frame.
+Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
   const auto file = asset.Attribute("file");
   if (!file) {
     asset.own().Fail("a mesh without a file", "\"file\", an .stl or .obj with triangles");
@@ -102,6 +101,13 @@ Solid MeshSolid(const MjcfModel& model, const XmlValue& name) {
                       fmt::format("not closed at {} edges: mass by MuJoCo's legacy rule", open));
   }
   return solid;
+}
+
+const Solid& MeshSolid(const MjcfModel& model, const XmlValue& name) {
+  const MjcfElement& asset = Named(model.meshes, name, "the name of a mesh");
+  const auto known = model.mesh_solids.find(name.text());
+  if (known != model.mesh_solids.end()) return known->second;
+  return model.mesh_solids.emplace(name.text(), ReadMeshSolid(model, asset)).first->second;
 }
 
 /// Reads a geom; returns false if it has no mass.
@@ -184,23 +190,68 @@ std::string ClassWithin(const MjcfModel& model, const XmlElement& element,
   return given->text();
 }
 
+void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents);
+
+/// Collects the contents of all copies. As in MuJoCo (xml_native_reader.cc), copy i is turned by i
+/// times the angles, and shifted from copy i - 1 by the offset in the axes of that copy.
+void GatherReplicas(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
+  const XmlElement& element = placed.element;
+  constexpr double kMostReplicas = 1e5;
+  const XmlValue given = element.Required("count", "a whole number from 1 to 100000");
+  const double count = given.Number();
+  if (!(count >= 1.0 && count <= kMostReplicas) || count != std::floor(count)) {
+    given.Fail("a whole number from 1 to 100000");
+  }
+  constexpr std::size_t kMostLetters = 32;
+  const auto separator = element.Attribute("sep"), shift = element.Attribute("offset"),
+             euler = element.Attribute("euler");
+  if (separator && !separator->text().empty() && separator->Name().size() > kMostLetters) {
+    separator->Fail(fmt::format("at most {} bytes", kMostLetters));
+  }
+  const bool degrees = model->settings.degrees;
+  const Eigen::Vector3d offset = shift ? shift->Vector() : Eigen::Vector3d::Zero();
+  const Eigen::Vector3d angles =
+      euler ? model->draft->Vector(*euler, degrees ? "nnn" : "aaa") : Eigen::Vector3d::Zero();
+  const auto digits = fmt::format("{}", count).size();
+  Placement X;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d turned = (degrees ? kDegree : 1.0) * i * angles;
+    X.q = FromEuler(model->settings.euler, turned);
+    const std::string suffix =
+        fmt::format("{}{:0{}}", separator ? separator->text() : "", i, digits);
+    const MjcfReplica* replica = model->AddReplica(element, placed.replica, suffix);
+    Gather(model, {element, placed.X * X, placed.childclass, replica}, contents);
+    X.p += X.q * offset;
+  }
+}
+
 /// Collects contents in file order, inside and outside of frames; this is the order of qpos.
-void Gather(const MjcfModel& model, const XmlElement& element, const Placement& X,
-            const std::string& childclass, Contents* contents) {
+void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
   std::map<std::string, std::vector<MjcfPlaced>*> lists = {{"body", &contents->bodies},
                                                            {"geom", &contents->geoms},
                                                            {"site", &contents->sites},
                                                            {"joint", &contents->joints},
                                                            {"freejoint", &contents->joints}};
-  for (const XmlElement& child :
-       element.Children({"body", "geom", "site", "joint", "freejoint", "frame"})) {
-    if (std::vector<MjcfPlaced>* list = lists[child.tag()]) {
-      list->push_back({child, X, childclass});
+  for (const XmlElement& child : placed.element.Children(
+           {"body", "geom", "site", "joint", "freejoint", "frame", "replicate"})) {
+    const std::string tag = child.tag();
+    if (placed.replica != nullptr) model->CountCopy(child);
+    if (tag.ends_with("joint") && placed.element.tag() == "replicate") {
+      child.Fail("a joint in a <replicate>", "joints in its bodies");
+    }
+    if (std::vector<MjcfPlaced>* list = lists[tag]) {
+      list->push_back({child, placed.X, placed.childclass, placed.replica});
       continue;
     }
     child.Attribute("name");
-    const Placement within = X * model.PlacementOf(MjcfElement(child));
-    Gather(model, child, within, ClassWithin(model, child, childclass), contents);
+    MjcfPlaced within{child, placed.X, ClassWithin(*model, child, placed.childclass),
+                      placed.replica};
+    if (tag == "replicate") {
+      GatherReplicas(model, within, contents);
+    } else {
+      within.X = placed.X * model->PlacementOf(MjcfElement(child));
+      Gather(model, within, contents);
+    }
   }
 }
 
@@ -210,7 +261,7 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
     const auto given = site.element.Attribute("name");
     const Placement X = site.X * model->PlacementOf(element);
     if (!given) continue;
-    const std::string name = given->Name();
+    const std::string name = model->NewName("site", *given, site.replica);
     if (!model->sites.emplace(name, MjcfSite{{body, X.p}, X.q}).second) {
       given->Fail("a name that no other site has");
     }
@@ -271,11 +322,12 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   ImportDraft* draft = model->draft;
   const std::string childclass = ClassWithin(*model, element, placed.childclass);
   const auto name = element.Attribute("name");
-  const int body = draft->AddBody(element, name ? name->Name() : "");
+  const int body =
+      draft->AddBody(element, name ? model->NewName("body", *name, placed.replica) : "");
   const Placement X_PB = placed.X * model->PlacementOf(MjcfElement(element));
   draft->at_rest[body] = draft->at_rest[parent] * X_PB;
   Contents contents;
-  Gather(*model, element, {}, childclass, &contents);
+  Gather(model, {element, {}, childclass, placed.replica}, &contents);
   is_fixed = is_fixed && contents.joints.empty();
   ReadMasses(element, contents, body, is_fixed, model);
   ReadSites(contents.sites, body, model);
@@ -302,7 +354,7 @@ void BoundBelow(double least, Eigen::Matrix3d* inertia) {
 
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model) {
   Contents contents;
-  Gather(*model, world, {}, ClassWithin(*model, world, ""), &contents);
+  Gather(model, {world, {}, ClassWithin(*model, world, "")}, &contents);
   for (const MjcfPlaced& geom : contents.geoms) {
     IgnoreGeom(model->defaults.Of(geom.element, geom.childclass), "dropped: ", model);
   }

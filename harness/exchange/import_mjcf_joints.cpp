@@ -44,10 +44,13 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
 }
 
 /// Reads a <joint> or <freejoint>, but not its springs and dampers.
-MjcfJoint ReadJoint(const MjcfModel& model, const MjcfPlaced& placed) {
-  const auto& [element, X, childclass] = placed;
+MjcfJoint ReadJoint(MjcfModel* written, const MjcfPlaced& placed) {
+  const MjcfModel& model = *written;
+  const auto& [element, X, childclass, replica] = placed;
   MjcfJoint joint(model.defaults.Of(element, childclass));
-  if (const auto name = element.Attribute("name")) joint.name = name->Name();
+  if (const auto name = element.Attribute("name")) {
+    joint.name = written->NewName("joint", *name, replica);
+  }
   if (element.tag() == "freejoint") {
     joint.kind = SerialKind::kFree;
     return joint;
@@ -151,7 +154,7 @@ void AddChain(MjcfModel* model, const XmlElement& body, int parent, int child,
 void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
                   const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
   std::vector<MjcfJoint> joints;
-  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(*model, joint));
+  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(model, joint));
   // two hinges that are no joint together: a link without mass is between them
   const bool has_link = joints.size() == 2 && !Compose({joints.begin(), joints.end()}) &&
                         std::ranges::count(joints, SerialKind::kHinge, &MjcfJoint::kind) == 2;
@@ -302,7 +305,8 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   const bool is_known =
       law.is_linear() && std::ranges::find(kActuators, element.tag()) != std::end(kActuators);
   if (!is_known || !name) return drop(kNoMotor, true);
-  const MjcfJoint& joint = model->JointNamed(*name);
+  const std::size_t index = model->JointNamed(*name);
+  const MjcfJoint& joint = model->joints[index];
   const auto controls = ControlRange(peeked, law, joint, *model);
   const Linear3 force = law.ForceAt(settings.clamps_controls ? Within(controls, control) : control);
   const bool is_constant = force[1] == 0.0 && force[2] == 0.0;
@@ -330,7 +334,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
     model->draft->Drop(element, "forcerange", "springs and dampers have no largest effort");
   }
   // MuJoCo's coordinate is Loopbench's plus the reference
-  return Effort{.joint = model->joint_names.at(name->text()),
+  return Effort{.joint = index,
                 .constant = ratio * constant + square * force[1] * joint.reference,
                 .stiffness = -square * force[1],
                 .damping = -square * force[2]};
@@ -344,17 +348,21 @@ void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& co
   std::vector<double> ctrl(actuators.size(), 0.0);
   if (controls) ctrl = controls->Numbers(ctrl.size(), ctrl.size());
   std::vector<Effort> efforts;  // summed for each joint, in the order of their first actuators
+  std::map<std::size_t, std::size_t> places;  // of joints in `efforts`
   for (std::size_t i = 0; i < actuators.size(); ++i) {
-    const auto effort = ReadActuator(actuators[i], ctrl[i], model);
-    if (!effort) continue;
-    const auto known = std::ranges::find(efforts, effort->joint, &Effort::joint);
-    if (known == efforts.end()) {
-      efforts.push_back(*effort);
-    } else {
-      known->constant += effort->constant;
-      known->stiffness += effort->stiffness;
-      known->damping += effort->damping;
-    }
+    model->ForReplicas({{"joint", actuators[i].Attribute("joint")}}, [&] {
+      const auto effort = ReadActuator(actuators[i], ctrl[i], model);
+      if (!effort) return;
+      const auto [known, is_new] = places.emplace(effort->joint, efforts.size());
+      if (is_new) {
+        efforts.push_back(*effort);
+        return;
+      }
+      Effort& sum = efforts[known->second];
+      sum.constant += effort->constant;
+      sum.stiffness += effort->stiffness;
+      sum.damping += effort->damping;
+    });
   }
   for (const Effort& effort : efforts) {
     const MjcfJoint& joint = model->joints[effort.joint];

@@ -10,8 +10,6 @@ namespace loopbench::harness {
 
 namespace {
 
-constexpr const char* kMjcfWorld = "world";
-
 /// Two frames of a loop, each on its body, coincident at zero coordinates.
 struct Ends {
   int first = kGround, second = kGround;
@@ -35,23 +33,18 @@ std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equal
 Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
   Ends ends;
   const auto body2 = equality.Attribute("body2");
-  ends.first =
-      model.draft->BodyNamed(equality.Required("body1", "the name of a body"), {kMjcfWorld});
-  if (body2) ends.second = model.draft->BodyNamed(*body2, {kMjcfWorld});
+  ends.first = model.BodyNamed(equality.Required("body1", "the name of a body"));
+  if (body2) ends.second = model.BodyNamed(*body2);
   return ends;
 }
 
-void RequireTwoBodies(const MjcfElement& equality, const Ends& ends) {
-  if (ends.first == ends.second) equality.own().Fail("one body twice", "two different bodies");
-}
-
 void AddLoopJoint(const MjcfElement& equality, JointType type, const Ends& ends,
-                  ImportDraft* draft) {
+                  const MjcfModel& model) {
   const auto name = equality.own().Attribute("name");
-  draft
-      ->AddJoint(draft->NameLater(name ? name->Name() : equality.own().tag()), type, ends.first,
-                 ends.X_first, ends.second, ends.X_second)
-      .cut = true;
+  model.draft->AddLoop(
+      equality.own(),
+      model.draft->NameLater((name ? name->Name() : equality.own().tag()) + model.Suffix()), type,
+      ends.first, ends.X_first, ends.second, ends.X_second);
 }
 
 void AddConnect(const MjcfElement& equality, MjcfModel* model) {
@@ -61,10 +54,9 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
     ends->X_first.p = equality.Required("anchor", "3 numbers").Vector();
     ends->X_second.p = AtRestOn(*model, ends->first, ends->X_first, ends->second).p;
   }
-  RequireTwoBodies(equality, *ends);
   ends->X_first.q.setIdentity();
   ends->X_second.q.setIdentity();
-  AddLoopJoint(equality, JointType::kSpherical, *ends, model->draft);
+  AddLoopJoint(equality, JointType::kSpherical, *ends, *model);
 }
 
 /// Returns the ends of a weld of bodies. `relpose`: pose of the second body in the first, from the
@@ -85,10 +77,9 @@ Ends EndsOfBodies(const MjcfElement& equality, const MjcfModel& model) {
 void AddWeld(const MjcfElement& equality, MjcfModel* model) {
   auto ends = EndsAtSites(*model, equality);
   if (!ends) ends = EndsOfBodies(equality, *model);
-  RequireTwoBodies(equality, *ends);
   // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
   for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
-  AddLoopJoint(equality, JointType::kWeld, *ends, model->draft);
+  AddLoopJoint(equality, JointType::kWeld, *ends, *model);
 }
 
 /// Returns the coefficients of `polycoef`; missing ones have their defaults.
@@ -105,10 +96,11 @@ std::vector<double> PolynomialOf(const MjcfElement& equality) {
 /// MuJoCo: q1 - q1_0 = a_0 + a_1 (q2 - q2_0) + ..., with q_0 the coordinates in the drawn position.
 /// Loopbench's coordinates are 0 there.
 bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
-  const MjcfJoint& joint = model->JointNamed(equality.Required("joint1", "the name of a joint"));
+  const MjcfJoint& joint =
+      model->joints[model->JointNamed(equality.Required("joint1", "the name of a joint"))];
   const std::vector<double> a = PolynomialOf(equality);
   const auto other = equality.Attribute("joint2");
-  const MjcfJoint* leader = other ? &model->JointNamed(*other) : nullptr;
+  const MjcfJoint* leader = other ? &model->joints[model->JointNamed(*other)] : nullptr;
   if (!joint.has_coordinate() || (leader != nullptr && !leader->has_coordinate())) {
     model->draft->Note(equality.own(), kNotCoupled, true);
     return false;
@@ -124,8 +116,8 @@ bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
     return true;
   }
   const auto name = equality.own().Attribute("name");
-  model->draft->AddCoupling(equality.own(), name ? name->Name() : "equality", joint.joint,
-                            {leader->joint, a[1]}, a[0]);
+  model->draft->AddCoupling(equality.own(), (name ? name->Name() : "equality") + model->Suffix(),
+                            joint.joint, {leader->joint, a[1]}, a[0]);
   return true;
 }
 
@@ -140,9 +132,21 @@ void ReadEquality(const XmlElement& root, MjcfModel* model) {
     for (const char* name : {"solref", "solimp"}) equality.Attribute(name);
     const std::string tag = element.tag();
     bool is_exact = tag == "connect" || tag == "weld";
-    if (tag == "connect") AddConnect(equality, model);
-    if (tag == "weld") AddWeld(equality, model);
-    if (tag == "joint") is_exact = AddJointEquality(equality, model);
+    MjcfModel::References references;
+    if (tag == "joint") {
+      for (const char* name : {"joint1", "joint2"}) {
+        references.emplace_back("joint", element.Attribute(name));
+      }
+    } else if (is_exact) {
+      for (const char* name : {"body1", "body2", "site1", "site2"}) {
+        references.emplace_back(std::string(name, 4), element.Attribute(name));
+      }
+    }
+    model->ForReplicas(references, [&] {
+      if (tag == "connect") AddConnect(equality, model);
+      if (tag == "weld") AddWeld(equality, model);
+      if (tag == "joint") is_exact = AddJointEquality(equality, model);
+    });
     if (is_exact) {
       model->draft->Note(element, "imposed exactly here; MuJoCo lets it give way");
     } else if (tag != "joint" && tag != "tendon") {
@@ -224,8 +228,8 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   ImportDraft* draft = model->draft;
   const auto& [a, b] = *ends;
   draft
-      ->AddJoint(draft->NameLater(name->Name()), JointType::kRod, a.body, Placement(a.at), b.body,
-                 Placement(b.at))
+      ->AddJoint(draft->NameLater(name->Name() + model->Suffix()), JointType::kRod, a.body,
+                 Placement(a.at), b.body, Placement(b.at))
       .parameter = length;
   draft->Note(equality.own(), "a rod here, exactly of its length");
 }
@@ -237,7 +241,11 @@ void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
   ReadEquality(root, model);
   const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
   for (const XmlElement& element : root.InSections("tendon")) {
-    ReadTendon(element, held, free_poses, model);
+    MjcfModel::References sites;
+    for (const XmlElement& site : element.Children("site")) {
+      sites.emplace_back("site", site.Attribute("site"));
+    }
+    model->ForReplicas(sites, [&] { ReadTendon(element, held, free_poses, model); });
   }
 }
 
@@ -337,7 +345,8 @@ std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
   const std::vector<XmlElement> keys = root.InSections("keyframe", "key");
   std::optional<XmlValue> controls;
-  if (!keys.empty()) {
+  const bool has_start = !keys.empty() && model->replicates.empty();
+  if (has_start) {
     std::vector<double> qpos = DrawnCoordinates(*model), qvel;
     for (const MjcfJoint& joint : model->joints) {
       qvel.insert(qvel.end(), static_cast<std::size_t>(joint.num_u()), 0.0);
@@ -354,8 +363,11 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
     keys[0].Attribute("name");
     keys[0].Attribute("time");
   }
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    model->draft->DropWhole(keys[i], "the first <key> is the start");
+  for (std::size_t i = has_start ? 1 : 0; i < keys.size(); ++i) {
+    model->draft->DropWhole(keys[i],
+                            has_start ? "the first <key> is the start"
+                                      : "with <replicate>, a <key> holds values of one replica",
+                            !has_start);
   }
   ReadMjcfActuators(root, controls, model);
 }

@@ -11,27 +11,33 @@ namespace {
 
 constexpr double kGravity = 9.81;  // [m/s^2]: default, since URDF specifies none
 
+constexpr const char* kOtherProgram = "it is for another program";
+
 constexpr DroppedReason kUrdfReasons[] = {
     {"visual", "shapes do not move anything"},
     {"collision", "there is no contact"},
-    {"mujoco", "it is for another program"},
+    {"mujoco", kOtherProgram},
     {"limit", kNoEnds, true},
     {"safety_controller", "there is no controller"},
     {"calibration", "it says where a sensor's zero is"},
     {"transmission", "there are no actuators"},
-    {"gazebo", "it is for another program; loops in it belong in a sidecar (--loops)", true},
+    {"gazebo", "it is for another program, and no child of <robot>", true},
     {"sensor", "there are no sensors"},
     {"dynamics@friction", kDryFriction, true},
     // without influence on the motion
     {"material robot@version link@type", ""}};
 
-Placement OriginOf(const XmlElement& element, ImportDraft* draft) {
+/// Returns the pose in the attributes of an element.
+Placement PoseIn(const XmlElement& element, ImportDraft* draft) {
   Placement X;
-  const auto origin = element.Child("origin");
-  if (!origin) return X;
-  if (const auto xyz = origin->Attribute("xyz")) X.p = xyz->Vector();
-  if (const auto rpy = origin->Attribute("rpy")) X.q = FromRollPitchYaw(draft->Vector(*rpy, "aaa"));
+  if (const auto xyz = element.Attribute("xyz")) X.p = xyz->Vector();
+  if (const auto rpy = element.Attribute("rpy")) X.q = FromRollPitchYaw(draft->Vector(*rpy, "aaa"));
   return X;
+}
+
+Placement OriginOf(const XmlElement& element, ImportDraft* draft) {
+  const auto origin = element.Child("origin");
+  return origin ? PoseIn(*origin, draft) : Placement();
 }
 
 void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
@@ -58,10 +64,12 @@ struct UrdfJoint {
   JointType type = JointType::kRevolute;
 };
 
-std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world, ImportDraft* draft) {
+/// Names of Ground.
+using GroundNames = std::set<std::string>;
+
+std::vector<UrdfJoint> ReadJoints(const XmlElement& root, const GroundNames& ground,
+                                  ImportDraft* draft) {
   std::vector<UrdfJoint> joints;
-  const std::set<std::string> ground =
-      has_world ? std::set<std::string>{"world"} : std::set<std::string>{};
   const auto link = [&](const XmlElement& element, const char* side) {
     return draft->BodyNamed(element.RequiredChild(side).Required("link", "the name of a link"),
                             ground);
@@ -85,7 +93,8 @@ std::vector<UrdfJoint> ReadJoints(const XmlElement& root, bool has_world, Import
 /// Sets the poses of all links and returns the root of the tree. Rejects joints that are no tree.
 int PlaceLinks(const std::vector<UrdfJoint>& joints, const XmlElement& root, bool has_world,
                ImportDraft* draft) {
-  constexpr const char* kTree = "a tree: joints that close loops stand in a sidecar (--loops)";
+  constexpr const char* kTree =
+      "a tree: joints that close loops are a <loop_joint>, or stand in a sidecar (--loops)";
   const int count = static_cast<int>(draft->at_rest.size());
   std::vector<const UrdfJoint*> leading(count, nullptr);  // the joint to each link
   std::vector<std::vector<const UrdfJoint*>> below(count);
@@ -124,18 +133,21 @@ int PlaceLinks(const std::vector<UrdfJoint>& joints, const XmlElement& root, boo
   return roots[0];
 }
 
-void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
-  const XmlElement& element = read.element;
-  const std::string name = draft->NewJointName(element, element.RequiredName());
-  JointDescription& joint =
-      draft->AddJoint(name, read.type, read.parent, read.X_PC, read.child, {});
-  const bool has_axis = TraitsOf(read.type).own_axis != '-';
-  if (has_axis) joint.axis = Eigen::Vector3d::UnitX();  // the default of URDF
+void ReadAxis(const XmlElement& element, JointDescription* joint, ImportDraft* draft) {
+  const bool has_axis = TraitsOf(joint->type).own_axis != '-';
+  if (has_axis) joint->axis = Eigen::Vector3d::UnitX();  // the default of URDF
   if (const auto axis = element.Child("axis")) {
     const Eigen::Vector3d xyz = draft->Vector(axis->Required("xyz", "3 numbers"), "d");
     if (has_axis && xyz.isZero()) axis->Fail("an axis of length 0", "one that is not zero");
-    if (has_axis) joint.axis = xyz;
+    if (has_axis) joint->axis = xyz;
   }
+}
+
+void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
+  const XmlElement& element = read.element;
+  const std::string name = draft->NewJointName(element, element.RequiredName());
+  ReadAxis(element, &draft->AddJoint(name, read.type, read.parent, read.X_PC, read.child, {}),
+           draft);
   const auto dynamics = element.Child("dynamics");
   if (!dynamics) return;
   const double c = NumberOr(dynamics->Attribute("damping"), 0.0, kNotNegative);
@@ -153,14 +165,50 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
 void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
   const auto mimic = read.element.Child("mimic");
   if (!mimic) return;
-  const std::string leader = mimic->Required("joint", "the name of a joint").Name();
+  const int leader = draft->JointNamed(mimic->Required("joint", "the name of a joint"));
   const double multiplier = NumberOr(mimic->Attribute("multiplier"), 1.0);
   const double offset = NumberOr(mimic->Attribute("offset"), 0.0);
-  const auto& joints = draft->description.joints;
-  const auto found = std::ranges::find(joints, leader, &JointDescription::name);
-  if (found == joints.end()) mimic->Fail('"' + leader + '"', "the name of a joint in this file");
-  draft->AddCoupling(*mimic, read.element.RequiredName() + " mimic", follower,
-                     {static_cast<int>(found - joints.begin()), multiplier}, offset);
+  draft->AddMimic(*mimic, follower, {leader, multiplier}, offset);
+}
+
+// Loops, which URDF itself excludes: extensions of other programs.
+
+/// Reads a <loop_joint>. Drake's RigidBodyTree (parseLoop): frames on `link1` and `link2` with one
+/// origin and one axis, in axes of both frames; type continuous. Isaac Sim: type spherical, and
+/// both sides may be called `link1`.
+void AddLoop(const XmlElement& element, const GroundNames& ground, ImportDraft* draft) {
+  const auto type = element.Required("type", "a joint type")
+                        .Choice<JointType>({{"continuous", JointType::kRevolute},
+                                            {"revolute", JointType::kRevolute},
+                                            {"spherical", JointType::kSpherical},
+                                            {"prismatic", JointType::kPrismatic},
+                                            {"fixed", JointType::kWeld}});
+  const std::vector<XmlElement> sides = element.Children({"link1", "link2"});
+  if (sides.size() != 2) {
+    element.Fail(fmt::format("{} of <link1> and <link2>", sides.size()), "two, its sides");
+  }
+  const auto body = [&](const XmlElement& side) {
+    return draft->BodyNamed(side.Required("link", "the name of a link"), ground);
+  };
+  const std::string name = draft->NewJointName(element, element.RequiredName());
+  const int first = body(sides[0]), second = body(sides[1]);
+  JointDescription& joint = draft->AddLoop(element, name, type, first, PoseIn(sides[0], draft),
+                                           second, PoseIn(sides[1], draft));
+  ReadAxis(element, &joint, draft);
+}
+
+/// Reads joints of SDF; other contents of <gazebo> are dropped.
+void ReadGazebo(const XmlElement& root, ImportDraft* draft) {
+  std::vector<XmlElement> joints;
+  for (const XmlElement& gazebo : root.Children("gazebo")) {
+    const bool is_model = !gazebo.Attribute("reference") && !gazebo.Children("joint").empty();
+    if (!is_model) draft->DropWhole(gazebo, kOtherProgram, true);
+    for (const XmlElement& child : is_model ? gazebo.Children() : std::vector<XmlElement>()) {
+      if (child.tag() == "joint") joints.push_back(child);
+      if (child.tag() != "joint") draft->DropWhole(child, kOtherProgram, true);
+    }
+  }
+  ReadGazeboJoints(root, joints, draft);
 }
 
 }  // namespace
@@ -178,13 +226,29 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
     }
     ReadInertial(link, draft->AddBody(link, name.Name()), draft);
   }
-  const std::vector<UrdfJoint> joints = ReadJoints(root, has_world, draft);
+  const GroundNames ground = has_world ? GroundNames{"world"} : GroundNames();
+  const std::vector<UrdfJoint> joints = ReadJoints(root, ground, draft);
   const int base = PlaceLinks(joints, root, has_world, draft);
   const int first = draft->last_joint() + 1;
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);
+  for (const XmlElement& loop : root.Children("loop_joint")) AddLoop(loop, ground, draft);
+  for (const XmlElement& ball : root.Children(kDrakeBall)) {
+    draft->AddBall(
+        ball,
+        [&](const XmlElement& side) {
+          return draft->BodyNamed(side.Required("name", "the name of a link"), ground);
+        },
+        [](const XmlElement& point) { return point.Required("value", "3 numbers [m]"); });
+  }
+  ReadGazebo(root, draft);
   draft->AssumeGravity(root, kGravity);
-  if (base != kGround && !options.floats) {
+  const bool is_joined =
+      std::ranges::any_of(draft->description.joints, [&](const JointDescription& joint) {
+        return std::min(joint.from.body, joint.to.body) == kGround &&
+               std::max(joint.from.body, joint.to.body) == base;
+      });
+  if (base != kGround && !options.floats && !is_joined) {
     draft->Fix(kGround, {}, base, " to ground");
     draft->Note(draft->element(base),
                 "the root link is taken as fixed to the ground (--floating leaves it free)");

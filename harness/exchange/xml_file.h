@@ -35,6 +35,8 @@ class XmlElement {
  public:
   XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XMLElement* element);
 
+  /// Returns an identity that no other element has.
+  const void* id() const { return element_; }
   std::string tag() const;
   int line() const;
   /// Returns the name of its file.

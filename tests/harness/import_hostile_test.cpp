@@ -36,6 +36,41 @@ std::vector<std::string> Files() {
   for (const auto& entry : fs::directory_iterator(kConfigs / "imports")) {
     if (entry.path().extension() != ".json") texts.push_back(ReadFile(entry.path()));
   }
+  const auto with = [](const std::string& file, const std::string& inside) {
+    std::string text = ReadFile(kConfigs / "imports" / file);
+    return text.insert(text.find("<joint"), inside);
+  };
+  texts.push_back(with("one-four-bar.urdf", R"(<loop_joint name="l" type="continuous">
+  <link1 link="right" xyz="0 0 1" rpy="0 0 0"/><link2 link="coupler" xyz="1 0 0"/><axis xyz="0 1 0"/>
+</loop_joint>
+<drake:ball_constraint>
+  <drake:ball_constraint_body_A name="right"/><drake:ball_constraint_p_AP value="0 0 1"/>
+  <drake:ball_constraint_body_B name="coupler"/><drake:ball_constraint_p_BQ value="1 0 0"/>
+</drake:ball_constraint>
+<gazebo>
+  <joint name="B" type="revolute">
+    <parent>right</parent><child>coupler</child><pose>1 0 0 0 0 0</pose>
+    <axis><xyz>0 1 0</xyz><mimic joint="A"><multiplier>-1</multiplier><offset>0</offset></mimic></axis>
+  </joint>
+  <joint name="gears" type="gearbox">
+    <parent>left</parent><child>right</child><axis><xyz>0 1 0</xyz></axis>
+    <gearbox_reference_body>world</gearbox_reference_body><gearbox_ratio>-1</gearbox_ratio>
+  </joint>
+</gazebo>
+)"));
+  texts.push_back(R"(<mujoco>
+<worldbody>
+  <replicate count="2" offset="0 1 0" euler="90 0 0" sep="-">
+    <body name="a"><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <replicate count="3" offset="1 0 0">
+        <body name="b"><joint name="k"/><geom size="0.1"/><site name="s"/></body>
+      </replicate>
+    </body>
+  </replicate>
+</worldbody>
+<equality><joint joint1="j" joint2="k"/><connect body1="b" body2="a" anchor="0 0 0"/></equality>
+<actuator><motor joint="k" ctrlrange="0 1"/></actuator>
+</mujoco>)");
   return texts;
 }
 

@@ -58,8 +58,6 @@ TEST(ImportSdf, JointsAreTheKindsOfOurs) {
     const Imported imported = Read(Link("a") + Joint("j", theirs, "world", "a", inside));
     EXPECT_EQ(ToString(JointNamed(imported, "j").type), ours);
   }
-  ExpectNote(Read(Link("a") + Joint("j", "gearbox", "world", "a")), "<joint name=\"j\">",
-             "a freedom more");
   ExpectRefusal(
       Sdf(Link("a") + Joint("j", "universal", "world", "a",
                             "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>1 1 0</xyz></axis2>")),

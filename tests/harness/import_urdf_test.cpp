@@ -158,7 +158,7 @@ TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<dynamics> damping", "one coordinate");
   ExpectNote(imported, "<mimic>", "a freedom more");
   ExpectNote(imported, "<transmission>", "no actuators");
-  ExpectNote(imported, "<gazebo>", "sidecar");
+  ExpectNote(imported, "<gazebo>", "another program");
   ExpectNote(imported, "<sensor>", "no sensors");
   ASSERT_EQ(ForcesOf<JointDamper>(imported).size(), 1u);
   EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].damping, 0.5);
@@ -186,8 +186,18 @@ TEST(ImportUrdf, MimicsAreCouplings) {
                 .parts[1]
                 .ratio,
             -1.0);
-  ExpectRefusal(robot("<mimic joint=\"z\"/>"), {"<mimic>: found \"z\"", "a joint in this file"});
+  ExpectRefusal(robot("<mimic joint=\"z\"/>"),
+                {"<mimic> joint: found \"z\"", "a joint in this file"});
   ExpectRefusal(robot("<mimic joint=\"k\"/>"), {"<mimic>: found a joint that follows itself"});
+}
+
+TEST(ImportUrdf, CyclesOfMimicsAreRefused) {
+  const auto joint = [](const std::string& name, const std::string& leader) {
+    return Joint(name, "continuous", "world", "l" + name, "<mimic joint=\"" + leader + "\"/>") +
+           Link("l" + name) + "\n";
+  };
+  ExpectRefusal(Robot(Link("world", "") + joint("a", "b") + joint("b", "c") + joint("c", "a")),
+                {"file.xml:4: <mimic>: found joints that follow each other", "no cycle"});
 }
 
 TEST(ImportUrdf, WhatIsNoTreeIsRefusedWithItsLine) {

@@ -11,6 +11,7 @@
 
 #include "harness/exchange/import.h"
 #include "harness/observers/observer.h"
+#include "harness/text/files.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"
@@ -199,6 +200,26 @@ TEST_P(Imports, OneFourBarOfUrdfIsThatOfA02) {
     EXPECT_LE(error, Bound(run));
     EXPECT_NEAR(coupler.v.norm(), run.last.bodies[BodyNamed(bars, "left")].w.norm(), Bound(run));
     std::cout << "height " << error << " m, " << run.result.steps << " steps\n";
+  }
+}
+
+TEST_P(Imports, LoopsWithinUrdfMoveAsInASidecar) {
+  const MechanismDescription bars = Import("one-four-bar.urdf", "one-four-bar-loop.json");
+  const Simulation expected = RunTo(bars, GetParam(), 0.5);
+  for (const std::string loop :
+       {R"(<loop_joint name="B" type="continuous"><link1 link="right" xyz="0 0 1"/>
+           <link2 link="coupler" xyz="1 0 0"/><axis xyz="0 1 0"/></loop_joint>)",
+        R"(<gazebo><joint name="B" type="revolute"><parent>right</parent><child>coupler</child>
+           <pose>1 0 0 0 0 0</pose><axis><xyz>0 1 0</xyz></axis></joint></gazebo>)",
+        R"(<drake:ball_constraint><drake:ball_constraint_body_A name="right"/>
+           <drake:ball_constraint_p_AP value="0 0 1"/><drake:ball_constraint_body_B name="coupler"/>
+           <drake:ball_constraint_p_BQ value="1 0 0"/></drake:ball_constraint>)"}) {
+    std::string text = ReadFile(kConfigs / "imports/one-four-bar.urdf");
+    text.insert(text.rfind("</robot>"), loop);
+    MechanismDescription own = ImportText(text, "file.urdf").description;
+    own.initial = bars.initial;  // the same joints in the same order
+    const Simulation run = RunTo(own, GetParam(), 0.5);
+    EXPECT_LE(Difference(own, run.last, bars, expected.last), Bound(run)) << loop;
   }
 }
 

@@ -283,7 +283,8 @@ void SdfReader::ReadName(const XmlElement& child, SdfScope* scope) const {
     frame.relative_to = frame.attached_to;
     frame.is_raw_to_child = child.tag() == "joint";
   }
-  scope->Add(child.RequiredName(), std::move(frame));
+  const std::string name = child.RequiredName();
+  scope->Add(child.tag() == "joint" ? FrameOf(name) : name, std::move(frame));
 }
 
 void SdfReader::ReadNames(SdfScope* scope) const {

@@ -83,6 +83,11 @@ class SdfReader {
   void ReadVersion(const XmlValue& value);
   /// Reads the <pose> of an element and its `relative_to`.
   SdfFrame ReadPose(const XmlElement& element) const;
+  /// Returns the name of a joint's frame. Before 1.7 joints are no frames, and links may have their
+  /// names.
+  std::string FrameOf(const std::string& joint) const {
+    return minor_ < 7 ? "joint " + joint : joint;
+  }
   /// Reads the name and frame of a link, frame or joint.
   void ReadName(const XmlElement& child, SdfScope* scope) const;
   /// Reads all names of a world or model, including nested models.

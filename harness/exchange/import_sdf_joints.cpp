@@ -96,8 +96,8 @@ void SdfReader::ReadJoint(const XmlElement& element, const SdfScope& scope) {
   if (P.body == Q.body) {
     element.Fail("parent and child that are one body", "two different bodies");
   }
-  const SdfFrame& frame = scope.frames.at(name);
-  const Placement X_model_joint = scope.Resolve(name, element);
+  const SdfFrame& frame = scope.frames.at(FrameOf(name));
+  const Placement X_model_joint = scope.Resolve(FrameOf(name), element);
   const Placement X_rest = scope.at_rest * X_model_joint;
   // bit-identical to the file if the child is a link and not a frame on a link
   const auto named = scope.frames.find(frame.attached_to);
@@ -257,7 +257,7 @@ void SdfReader::ReadGearbox(const XmlElement& element, const SdfScope& scope) co
   const XmlElement axis = element.RequiredChild("axis");
   const auto axis2 = element.Child("axis2");
   if (!axis2) draft_->Note(element, "no <axis2>: the angle of the child is about <axis> too");
-  const Placement X = scope.Resolve(element.RequiredName(), element);
+  const Placement X = scope.Resolve(FrameOf(element.RequiredName()), element);
   CouplingDescription::Part parts[2];  // joints, and their coordinates per theta
   for (const auto& [side, about, part] :
        {std::tuple{"parent", axis, &parts[0]}, {"child", axis2.value_or(axis), &parts[1]}}) {

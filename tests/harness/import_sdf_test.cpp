@@ -219,6 +219,14 @@ TEST(ImportSdf, NestedModelsHaveTheirNames) {
   EXPECT_EQ(JointNamed(imported, "k").from.position, Eigen::Vector3d(1, 0, 0));
 }
 
+TEST(ImportSdf, JointsMayHaveNamesOfLinksBeforeTheyAreFrames) {
+  const std::string same = Link("a", "1 0 0 0 0 0") + Joint("a", "revolute", "world", "a");
+  const Imported imported = Read(same, "1.6");
+  EXPECT_EQ(JointNamed(imported, "a").from.position, Eigen::Vector3d::UnitX());
+  ExpectRefusal(Sdf(same, "1.7"), {"file.xml:4: <joint name=\"a\">: found a second \"a\""});
+  ExpectRefusal(Sdf(same + Joint("a", "ball", "world", "a"), "1.6"), {"a second"});
+}
+
 TEST(ImportSdf, ACanonicalLinkIsNoNews) {
   const Imported imported = ImportText(
       "<sdf version=\"1.9\"><model name=\"m\" canonical_link=\"a\">" + Link("a") + "</model></sdf>",

@@ -96,7 +96,8 @@ struct DroppedReason {
 };
 
 inline constexpr const char* kDryFriction = "dry friction is no force of mechanism files";
-/// Reasons why springs, dampers, efforts and rotors of a joint with several coordinates are dropped.
+/// Reasons why springs, dampers, efforts and rotors of a joint with several coordinates are
+/// dropped.
 inline constexpr const char* kNoRotors = "only joints with one coordinate have rotors";
 inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
 inline constexpr const char* kNotCoupled =

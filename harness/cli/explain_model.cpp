@@ -94,7 +94,7 @@ std::string FunctionText(const TimeFunctionDescription& function) {
                      table.cubic ? "cubic" : "straight lines");
 }
 
-/// Returns parameters and prescribed motions.
+/// Returns parameters, the rotor and prescribed motions.
 std::string Given(SpaceKind space, const JointDescription& joint) {
   std::string text;
   const JointParameter& own = TraitsOf(joint.type).parameter;
@@ -102,6 +102,10 @@ std::string Given(SpaceKind space, const JointDescription& joint) {
     text = fmt::format("{} {} {}", own.key, ShortNumber(joint.parameter), own.unit);
   }
   const std::vector<ValueWord> words = ValueWords(joint.type, space, false);
+  if (joint.rotor_inertia > 0.0) {
+    text += fmt::format("{}rotor {} {}", text.empty() ? "" : "; ", ShortNumber(joint.rotor_inertia),
+                        words.at(0).is_length() ? "kg" : "kg m^2");
+  }
   for (const PrescribedMotion& motion : joint.motions) {
     const ValueWord& word = words.at(static_cast<std::size_t>(motion.coordinate));
     text += fmt::format("{}{} = {} [{}]", text.empty() ? "" : "; ", word.name,

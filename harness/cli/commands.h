@@ -173,7 +173,8 @@ struct ExplainView {
   std::optional<std::size_t> width = {};
   /// Document that gets the sections under their keys (--json) instead of the terminal.
   JsonObject* document = nullptr;
-  bool statics = false;  ///< forces that hold the start, too
+  bool statics = false;    ///< forces that hold the start, too
+  std::string range = "";  ///< name of a joint: the range of its coordinate, too
 };
 
 /// Returns the view of standard output.
@@ -205,7 +206,7 @@ std::string Spaced(const Vector& vector) {
 }
 
 /// Prints the model, the start and the structure of a mechanism. Returns 2, after all other output,
-/// if the start cannot be assembled, or if nothing can hold it and `view.statics` is set. Degrees
+/// if the start cannot be assembled, or if what `view` asks for does not exist. Degrees
 /// of freedom that the file does not expect are a ConfigError, in a document its "error" and 2.
 int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view);
 

@@ -288,12 +288,12 @@ std::string MechanismText(const std::filesystem::path& path, ExplainView view,
 
 /// Prints runs and measures of experiments, and models of mechanisms, by the kind of each file.
 /// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it. `all`:
-/// every row of long tables. `statics`: forces that hold mechanisms, too.
-int Explain(const ExperimentFiles& files, bool all, bool statics, bool json,
+/// every row of long tables.
+int Explain(const ExperimentFiles& files, const ExplainView& asked, bool json,
             const ProcessLimits& limits) {
   // the child process prints into memory, without a terminal
-  ExplainView view = ViewOfOutput(all);
-  view.statics = statics;
+  ExplainView view = asked;
+  view.width = ViewOfOutput(asked.all).width;
   int exit_code = 0;
   std::string documents;
   for (const auto& path : files.paths) {
@@ -302,9 +302,10 @@ int Explain(const ExperimentFiles& files, bool all, bool statics, bool json,
       throw ConfigError(fmt::format(
           "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
     }
-    if (statics && !is_mechanism) {
+    if ((view.statics || !view.range.empty()) && !is_mechanism) {
       throw ConfigError(
-          fmt::format("{}: --statics is for mechanisms, and this is an experiment", path.string()));
+          fmt::format("{}: --statics and --range are for mechanisms, and this is an experiment",
+                      path.string()));
     }
     if (json) {
       documents += (documents.empty() ? "" : ",\n") +
@@ -407,12 +408,11 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
 void AddExplain(Commands& commands) {
   auto& files = commands.Keep<ExperimentFiles>();
   auto& limits = commands.Keep(kFileLimits);
-  auto& all = commands.Keep<bool>();
-  auto& statics = commands.Keep<bool>();
+  auto& view = commands.Keep<ExplainView>();
   auto& json = commands.Keep<bool>();
   commands.Add("explain",
                "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)",
-               [&](const Typed&) { return Explain(files, all, statics, json, limits); },
+               [&](const Typed&) { return Explain(files, view, json, limits); },
                {{"file", "Experiment or mechanism files (JSON)", &files.paths, kRequired},
                 FilterOption(&files.filter),
                 CpuOption(&limits),
@@ -420,8 +420,9 @@ void AddExplain(Commands& commands) {
                 SetOption(&files.settings),
                 WideOption(),
                 JsonOption(&json),
-                {"--all", "Print all rows of long tables", &all},
-                {"--statics", "Print the forces that hold a mechanism at its start", &statics}});
+                {"--all", "Print all rows of long tables", &view.all},
+                {"--statics", "Print the forces that hold a mechanism at its start", &view.statics},
+                {"--range", "Joint whose coordinate is moved to its limits", &view.range}});
 }
 
 }  // namespace loopbench::harness

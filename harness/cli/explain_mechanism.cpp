@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "harness/analysis/coordinate_range.h"
 #include "harness/analysis/model_warnings.h"
 #include "harness/analysis/structure_hints.h"
 #include "harness/cli/commands.h"
@@ -227,6 +228,54 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
   return 0;
 }
 
+/// Prints the limits of a coordinate and the positions there; returns 2 if there are none.
+int PrintRange(const MechanismDescription& description, const ExplainView& view) {
+  std::vector<std::string> names;
+  for (const JointDescription& joint : description.joints) names.push_back(joint.name);
+  const auto found = std::ranges::find(names, view.range);
+  if (found == names.end()) {
+    const std::string nearest = NearestSpelling(view.range, names);
+    throw ConfigError(fmt::format("--range: found \"{}\", expected a joint{}", view.range,
+                                  nearest.empty() ? "" : " (did you mean \"" + nearest + "\"?)"));
+  }
+  const auto joint = static_cast<int>(found - names.begin());
+  const CoordinateRange range = FindRange(description, joint);
+  if (view.document != nullptr) view.document->Add("range_message", range.why);
+  if (!range.why.empty()) {
+    Say(view, "\nRange of {}: none, {}\n", view.range, range.why);
+    return 2;
+  }
+  const ValueWord word =
+      ValueWords(description.joints[joint].type, description.space, false).front();
+  Table table;
+  table.columns = {{"end", "end", Format::kText, {}},
+                   {"value", fmt::format("{} [{}]", word.name, word.unit), Format::kText, {}},
+                   {"limit", "limit", Format::kText, {}},
+                   {"in_line", "in line", Format::kText, {}},
+                   {"position", "coordinates there", Format::kText, {}}};
+  for (const bool is_low : {true, false}) {
+    const RangeEnd& end = is_low ? range.low : range.high;
+    std::vector<std::string> position;
+    for (const JointValues& values : end.at.initial.coordinates) {
+      if (values.joint == joint) continue;
+      std::vector<std::string> numbers;
+      for (const double number : values.values) numbers.push_back(ShortNumber(number));
+      position.push_back(fmt::format("{} {}", names[static_cast<std::size_t>(values.joint)],
+                                     fmt::join(numbers, " ")));
+    }
+    const char* none = word.is_length() ? "none within ten lengths" : "none within a turn";
+    AddRow({is_low ? "low" : "high",
+            view.document != nullptr ? Value(end.value) : Value(ShortNumber(end.value)),
+            end.binds ? "binds" : none, fmt::format("{}", fmt::join(end.in_line, "; ")),
+            fmt::format("{}", fmt::join(position, ", "))},
+           &table);
+  }
+  PrintSection(
+      fmt::format("Range of {} from {} {}", view.range, ShortNumber(range.start), word.unit), table,
+      view, "range");
+  return 0;
+}
+
 std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
                                       const Structure& structure) {
   std::vector<JsonObject> loops;
@@ -320,7 +369,9 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   if (!hints.empty()) Say(view, "\nHints\n");
   for (const std::string& hint : hints) Say(view, "  {}\n", hint);
   int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
-  if (view.statics && code == 0) code = PrintStatics(description, structure, view);
+  const bool is_assembled = code == 0;
+  if (view.statics && is_assembled) code = PrintStatics(description, structure, view);
+  if (!view.range.empty() && is_assembled) code = std::max(code, PrintRange(description, view));
   const std::string fault = FreedomFault(description, file.observe, structure);
   if (fault.empty()) return code;
   if (view.document == nullptr) throw ConfigError(fault);

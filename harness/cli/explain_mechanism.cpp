@@ -192,21 +192,21 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
                      {"unit", "unit", Format::kText, {}},
                      {"held", "held by", Format::kText, {}}};
   reactions.columns = {{"joint", "joint", Format::kText, {}}, {"on", "on", Format::kText, {}}};
-  std::map<std::string, std::string> second;
-  for (const JointDescription& joint : description.joints) {
-    second[LabelName(joint.name)] = description.bodies[joint.to.body].name;
-  }
+  std::map<std::string, const JointDescription*> joints;
+  for (const JointDescription& joint : description.joints) joints[LabelName(joint.name)] = &joint;
   for (std::size_t i = 1; i < statics.columns.size(); ++i) {
     const auto& [kind, name, component, unit] = statics.columns[i];
     if (kind == "drive") {
       const bool is_ours =
           std::ranges::find(statics.held, name + ":" + component) != statics.held.end();
-      AddRow(
-          {name, component, shown(statics.values[i]), unit, is_ours ? "--statics" : "its motion"},
-          &efforts);
+      AddRow({joints[name]->name, component, shown(statics.values[i]), unit,
+              is_ours ? "--statics" : "its motion"},
+             &efforts);
       continue;
     }
-    if (component == "fx") AddRow({name, second[name]}, &reactions);
+    if (component == "fx") {
+      AddRow({joints[name]->name, description.bodies[joints[name]->to.body].name}, &reactions);
+    }
     reactions.rows.back().Set(component, shown(statics.values[i]));
     if (reactions.rows.size() == 1) {
       reactions.columns.push_back(

@@ -204,5 +204,39 @@ TEST_F(ExplainTest, AnglesOfMoreThanATurnAreQuestionedAndNotRefused) {
   }
 }
 
+std::string LeverFile(const std::string& more) {
+  return R"({"name": "lever", "gravity": [0, -10],
+    "bodies": [{"name": "b", "mass": 2, "inertia": 1, "com": [0.5, 0]}],
+    "joints": [{"name": "J:1", "type": "revolute", "from": {"body": "ground"},
+                "to": {"body": "b"}}])" +
+         more + "}";
+}
+
+TEST_F(ExplainTest, StaticsAndRangeAreAskedFor) {
+  Write("lever.json", LeverFile(""));
+  ExpectSqueezed(Call("explain lever.json --statics --range J:1"),
+                 {"J:1 angle 10 N m --statics", "J:1 b 0 20 0", "Range of J:1 from 0 rad",
+                  "low -6.28319 none within a turn", "high 6.28319 none within a turn"});
+  EXPECT_EQ(Call("explain lever.json").text.find("Reactions at rest"), std::string::npos);
+  const Ending wrong = Call("explain lever.json --range J1");
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.text.find("found \"J1\", expected a joint (did you mean \"J:1\"?)"),
+            std::string::npos)
+      << wrong.text;
+}
+
+TEST_F(ExplainTest, UnexpectedFreedomEndsWithTwo) {
+  Write("right.json", LeverFile(R"(, "expect": {"degrees_of_freedom": 1})"));
+  Write("wrong.json", LeverFile(R"(, "expect": {"degrees_of_freedom": 0})"));
+  for (const char* command : {"explain", "explain --json", "check"}) {
+    EXPECT_EQ(Call(std::string(command) + " right.json").code, 0) << command;
+    const Ending ending = Call(std::string(command) + " wrong.json");
+    EXPECT_EQ(ending.code, 2) << command;
+    EXPECT_NE(ending.text.find("wrong.json:4: /expect/degrees_of_freedom: found 1, expected 0"),
+              std::string::npos)
+        << ending.text;
+  }
+}
+
 }  // namespace explain_test
 }  // namespace loopbench::harness

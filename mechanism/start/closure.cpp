@@ -205,6 +205,8 @@ class Closure {
   /// problem:
   ///
   ///   min |J s z - (J g - e)|^2 + mu^2 |z|^2     guesses of cut joints are rows of J, times mu w
+  ///
+  /// `J` below is J s.
   Vector PullStep(const Vector& q, double mu) {
     const Vector e = Residual(q), g = guesses_.GuessedApart(q);
     std::vector<OfCutJoint> cut = guesses_.held();
@@ -213,7 +215,7 @@ class Closure {
     row_units.tail(guesses_.loose().size()).array() /= mu * guesses_.loose_weights().array();
     SparseRows J = LoopRows(kinematics_, pull_units_, row_units, cut, guesses_.fixed());
     r << -e, -mu * WeightedLoose();
-    r += J * g;
+    r += J * g.cwiseProduct(units_.columns).cwiseQuotient(pull_units_.columns);
     const Vector z = Solver(std::move(J)).Damped(r, mu);
     const Vector d = z.cwiseProduct(pull_units_.columns).cwiseQuotient(units_.columns) - g;
     return d * std::min(1.0, kLongestStep / d.template lpNorm<Eigen::Infinity>());

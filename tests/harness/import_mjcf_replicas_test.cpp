@@ -143,7 +143,7 @@ TEST(ImportMjcfReplicas, ReferencesIntoNestedReplicatesFollowBoth) {
 TEST(ImportMjcfReplicas, NotesCountOnce) {
   const Imported imported =
       Read("<replicate count=\"20\" offset=\"1 0 0\">" +
-               Body("b", "<joint armature=\"1\"/>\n<geom size=\"1\"/>") + "</replicate>",
+               Body("b", "<joint frictionloss=\"1\"/>\n<geom size=\"1\"/>") + "</replicate>",
            "<keyframe><key qpos=\"1\"/></keyframe>");
   EXPECT_EQ(imported.notes.size(), 3u);
   ExpectNote(imported, "<key>", "one replica");

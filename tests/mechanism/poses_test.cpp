@@ -119,7 +119,7 @@ TEST(Poses, OfALoopAreClosedPositions) {
   d.bodies.push_back(Bar("rocker", 1.0, 1.0, 1.5));
   d.joints.push_back(Revolute("C", 0, {3.5, 0.0, 0.0}, 3, Vector3d::Zero()));
   d.joints.push_back(Revolute("B", 2, 1.5 * Vector3d::UnitX(), 3, 1.5 * Vector3d::UnitX()));
-  for (const double angle : {2.2, -2.2, 1.7}) {
+  for (const double angle : {2.2, -2.2, 2.0}) {
     MechanismDescription one = d;
     const Vector3d tip(3.5 + 1.5 * std::cos(angle), 1.5 * std::sin(angle), 0.0);
     one.initial.poses = {{.body = 3, .point = 1.5 * Vector3d::UnitX(), .at = tip}};

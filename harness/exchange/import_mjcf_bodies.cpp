@@ -58,14 +58,48 @@ Solid ShapeOf(Type type, const Eigen::Vector3d& size) {
   return EllipsoidOf(type == kSphere ? Eigen::Vector3d(size[0], size[0], size[0]) : size);
 }
 
-/// Reads a mesh of <asset> as a solid in its own frame.
+/// Reads the points of a mesh from `vertex`, and triangles from `face`, if any.
+TriangleMesh ReadVertices(const XmlValue& vertex, const std::optional<XmlValue>& face) {
+  TriangleMesh mesh;
+  const std::vector<double> numbers = vertex.Numbers(12, 3 * kMostHullPoints);
+  if (numbers.size() % 3 != 0) {
+    vertex.element().Fail(fmt::format("{} numbers in \"vertex\"", numbers.size()),
+                          "three for each point");
+  }
+  for (std::size_t i = 0; i < numbers.size(); i += 3) {
+    mesh.points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  }
+  if (!face) return mesh;
+  const std::vector<double> corners = face->Numbers(12, 6 * kMostHullPoints);
+  if (corners.size() % 3 != 0) {
+    face->element().Fail(fmt::format("{} numbers in \"face\"", corners.size()),
+                         "three for each triangle");
+  }
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const double corner = corners[i];
+    if (corner != std::floor(corner) || corner < 0.0 ||
+        corner >= static_cast<double>(mesh.points.size())) {
+      face->element().Fail(fmt::format("{} in \"face\"", corner),
+                           fmt::format("a point, 0 to {}", mesh.points.size() - 1));
+    }
+    if (i % 3 == 0) mesh.triangles.emplace_back();
+    mesh.triangles.back()[i % 3] = static_cast<int>(corner);
+  }
+  return mesh;
+}
+
+/// Reads a mesh of <asset> as a solid in its own frame. Points without triangles mean their convex
+/// hull.
 Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
-  const auto file = asset.Attribute("file");
-  if (!file) {
-    asset.own().Fail("a mesh without a file", "\"file\", an .stl or .obj with triangles");
+  const auto file = asset.Attribute("file"), vertex = asset.Attribute("vertex");
+  if (!file && !vertex) {
+    asset.own().Fail("a mesh without points",
+                     "\"file\", an .stl or .obj with triangles, or \"vertex\"");
   }
   const auto inertia = asset.Attribute("inertia");
-  const MeshRule rule = inertia ? inertia->Choice<MeshRule>({{"legacy", MeshRule::kPyramids},
+  const bool is_convex = inertia && inertia->text() == "convex";
+  const MeshRule rule = inertia ? inertia->Choice<MeshRule>({{"convex", MeshRule::kEnclosed},
+                                                             {"legacy", MeshRule::kPyramids},
                                                              {"exact", MeshRule::kEnclosed},
                                                              {"shell", MeshRule::kShell}})
                                 : MeshRule::kPyramids;
@@ -80,7 +114,19 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
     const std::vector<double> q = given->Numbers(4, 4);
     turn = UnitQuaternion(*given, {q[0], q[1], q[2], q[3]});
   }
-  TriangleMesh mesh = ReadMesh(file->File(model.settings.mesh_folder));
+  TriangleMesh mesh = file ? ReadMesh(file->File(model.settings.mesh_folder))
+                           : ReadVertices(*vertex, asset.Attribute("face"));
+  const XmlValue& given = file ? *file : *vertex;
+  if (is_convex || mesh.triangles.empty()) {
+    if (mesh.points.size() > kMostHullPoints) {
+      given.element().Fail(fmt::format("{} points", mesh.points.size()),
+                           fmt::format("at most {} for a convex hull", kMostHullPoints));
+    }
+    mesh = ConvexHullOf(mesh.points);
+    if (mesh.triangles.empty()) {
+      given.element().Fail("points in a plane", "points that enclose a volume");
+    }
+  }
   for (Eigen::Vector3d& point : mesh.points) {
     point = scale.cwiseProduct(turn.conjugate() * (point - origin));
   }
@@ -89,15 +135,15 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
   }
   const Solid solid = SolidOf(mesh, rule);
   if (!(solid.volume > 0.0)) {
-    file->element().Fail(fmt::format("a mesh of {:.3g} m^3", solid.volume),
+    given.element().Fail(fmt::format("a mesh of {:.3g} m^3", solid.volume),
                          "a volume > 0, with triangles counter-clockwise from outside");
   }
   const std::size_t open = NumOpenEdges(mesh);
   if (open > 0 && rule == MeshRule::kEnclosed) {
-    file->Fail(fmt::format("a closed mesh: {} edges have a triangle on one side only", open));
+    given.Fail(fmt::format("a closed mesh: {} edges have a triangle on one side only", open));
   }
   if (open > 0 && rule == MeshRule::kPyramids) {
-    model.draft->Note(asset.own(), "file",
+    model.draft->Note(asset.own(), file ? "file" : "vertex",
                       fmt::format("not closed at {} edges: mass by MuJoCo's legacy rule", open));
   }
   return solid;

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <set>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -86,6 +87,79 @@ std::size_t NumOpenEdges(const TriangleMesh& mesh) {
   }
   return static_cast<std::size_t>(
       std::ranges::count_if(sides, [](const auto& side) { return side.second != 0; }));
+}
+
+namespace {
+
+/// A triangle of a hull with its plane, normal . r = height.
+struct HullFace {
+  std::array<int, 3> corners;
+  Vector3d normal;
+  double height;
+
+  HullFace(const std::vector<Vector3d>& points, int a, int b, int c)
+      : corners{a, b, c},
+        normal((points[b] - points[a]).cross(points[c] - points[a]).normalized()),
+        height(normal.dot(points[a])) {}
+};
+
+/// Returns four points that span the most volume, chosen one after the other; the last one lies
+/// below the triangle of the first three. Empty if they lie in a plane.
+std::vector<int> SpanningPoints(const std::vector<Vector3d>& points, double negligible) {
+  std::vector<int> chosen;
+  const auto add_farthest = [&](const auto& distance_of) {
+    const auto farthest = std::ranges::max_element(points, {}, distance_of);
+    if (!(distance_of(*farthest) > negligible)) return false;
+    chosen.push_back(static_cast<int>(farthest - points.begin()));
+    return true;
+  };
+  const auto at = [&](std::size_t i) -> const Vector3d& { return points[chosen[i]]; };
+  chosen.push_back(0);
+  if (!add_farthest([&](const Vector3d& p) { return (p - at(0)).norm(); })) return {};
+  const Vector3d along = (at(1) - at(0)).normalized();
+  if (!add_farthest([&](const Vector3d& p) { return along.cross(p - at(0)).norm(); })) return {};
+  const Vector3d normal = along.cross(at(2) - at(0)).normalized();
+  if (!add_farthest([&](const Vector3d& p) { return std::abs(normal.dot(p - at(0))); })) return {};
+  if (normal.dot(at(3) - at(0)) > 0.0) std::swap(chosen[1], chosen[2]);
+  return chosen;
+}
+
+}  // namespace
+
+/// Adds one point after the other: triangles that see it, or lie in a plane with it, are replaced
+/// by those from their outline to the point. An edge in line with the point is within that outline.
+TriangleMesh ConvexHullOf(const std::vector<Vector3d>& points) {
+  TriangleMesh hull{points, {}};
+  if (points.empty()) return hull;
+  double extent = 0.0;
+  for (const Vector3d& p : points) extent = std::max(extent, (p - points[0]).norm());
+  const double negligible = 1e-12 * extent;  // of coordinates with some thousand eps
+  const std::vector<int> base = SpanningPoints(points, negligible);
+  if (base.empty()) return hull;
+  const auto [a, b, c, d] = std::tuple{base[0], base[1], base[2], base[3]};
+  std::vector<HullFace> faces = {
+      {points, a, b, c}, {points, a, d, b}, {points, b, d, c}, {points, c, d, a}};
+  for (int p = 0; p < static_cast<int>(points.size()); ++p) {
+    const auto height = [&](const HullFace& face) {
+      return face.normal.dot(points[p]) - face.height;
+    };
+    if (std::ranges::none_of(
+            faces, [&](double h) { return h > negligible; }, height))
+      continue;
+    const auto seen = std::ranges::partition(
+        faces, [&](double h) { return h < -negligible; }, height);
+    std::set<std::pair<int, int>> outline;
+    for (const HullFace& face : seen) {
+      for (int i = 0; i < 3; ++i) {
+        const std::pair edge{face.corners[i], face.corners[(i + 1) % 3]};
+        if (outline.erase({edge.second, edge.first}) == 0) outline.insert(edge);
+      }
+    }
+    faces.erase(seen.begin(), seen.end());
+    for (const auto& [from, to] : outline) faces.emplace_back(points, from, to, p);
+  }
+  for (const HullFace& face : faces) hull.triangles.push_back(face.corners);
+  return hull;
 }
 
 /// Sums pyramids from an apex over the triangles, first about the centroid of the surface, then

@@ -35,6 +35,11 @@ TriangleMesh ReadMesh(const std::filesystem::path& path);
 /// closed.
 std::size_t NumOpenEdges(const TriangleMesh& mesh);
 
+/// Returns the convex hull of points; without triangles if they lie in a plane, up to round-off.
+/// O(points times triangles).
+TriangleMesh ConvexHullOf(const std::vector<Eigen::Vector3d>& points);
+inline constexpr std::size_t kMostHullPoints = 10000;  ///< some seconds
+
 /// Rules for the mass of a mesh.
 enum class MeshRule {
   kEnclosed,  ///< of the enclosed volume

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <numbers>
+#include <random>
 
 #include "harness/text/files.h"
 #include "tests/harness/import_texts.h"
@@ -138,6 +139,37 @@ TEST(Solids, SpheresAndToriConvergeToTheirClosedForms) {
 TEST(Solids, PositivePyramidsCountOutsideTwice) {
   const double exact = SolidOf(Torus(32), MeshRule::kEnclosed).volume;
   EXPECT_GT(SolidOf(Torus(32), MeshRule::kPyramids).volume, 1.2 * exact);
+}
+
+/// Random points in a ball, a cube's grid, and a torus, whose hull fills the hole.
+TEST(Solids, HullsAreClosedAndContainTheirPoints) {
+  std::mt19937_64 generator(3);
+  const auto random = [&] { return static_cast<double>(generator() >> 11) * 0x1p-52 - 1.0; };
+  std::vector<std::vector<Eigen::Vector3d>> sets(3);
+  while (sets[0].size() < 500) {
+    const Eigen::Vector3d p(random(), random(), random());
+    if (p.norm() < 1.0) sets[0].push_back(p);
+  }
+  for (int i = 0; i < 125; ++i) sets[1].emplace_back(i % 5, i / 5 % 5, i / 25);
+  for (int i = 0; i < 400; ++i) {
+    const double u = 0.05 * std::numbers::pi * (i % 40), v = 0.2 * std::numbers::pi * (i / 40);
+    sets[2].emplace_back((3 + std::cos(v)) * std::cos(u), (3 + std::cos(v)) * std::sin(u),
+                         std::sin(v));
+  }
+  for (const auto& points : sets) {
+    const TriangleMesh hull = ConvexHullOf(points);
+    EXPECT_EQ(NumOpenEdges(hull), 0u);
+    for (const auto& [a, b, c] : hull.triangles) {
+      const Eigen::Vector3d normal =
+          (points[b] - points[a]).cross(points[c] - points[a]).normalized();
+      for (const Eigen::Vector3d& p : points) {
+        EXPECT_LE(normal.dot(p - points[a]), 1e-11);  // ten times the accepted 1e-12 of the extent
+      }
+    }
+  }
+  EXPECT_NEAR(SolidOf(ConvexHullOf(sets[1]), MeshRule::kEnclosed).volume, 64.0, 64 * 64 * kEps);
+  EXPECT_TRUE(ConvexHullOf({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}).triangles.empty());
+  EXPECT_TRUE(ConvexHullOf({}).triangles.empty());
 }
 
 TEST(Solids, ReversedAndOpenMeshesAreSeen) {
@@ -313,15 +345,29 @@ TEST_F(MeshFiles, MjcfGeomsTakeTheMassOfTheirMesh) {
          "a file below the folder of the main file"},
         {"<mesh name=\"brick\" file=\"/etc/passwd\"/>", "a file below the folder of the main file"},
         {"<mesh name=\"brick\" file=\".\"/>", "a file that exists"},
-        {"<mesh name=\"brick\" vertex=\"0 0 0\"/>", "a mesh without a file"},
-        {"<mesh name=\"brick\" file=\"brick.obj\" inertia=\"convex\"/>",
-         "inertia: found \"convex\""},
+        {"<mesh name=\"brick\"/>", "a mesh without points"},
+        {"<mesh name=\"brick\" vertex=\"0 0 0\"/>", "vertex: found"},
+        {"<mesh name=\"brick\" vertex=\"0 0 0 1 0 0 0 1 0 1 1 0\"/>", "found points in a plane"},
+        {"<mesh name=\"brick\" vertex=\"0 0 0 1 0 0 0 1 0 1 1 0 7\"/>", "found 13 numbers"},
+        {"<mesh name=\"brick\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\" face=\"0 1 2 0 1 3 0 2 3 1 2 "
+         "4\"/>",
+         "found 4 in \"face\", expected a point, 0 to 3"},
         {"<mesh name=\"brick\" file=\"brick.obj\" scale=\"0 1 1\"/>", "a mesh of 0 m^3"},
         {"<mesh file=\"brick.obj\"/><mesh file=\"brick.obj\"/>", "a name that no other mesh has"},
         {"", "mesh: found \"brick\", expected the name of a mesh"}}) {
     WriteFileAtomically(top_ / "out.obj", AsObj(Box({1, 1, 1})));
     Write("m.xml", model(row.asset, geom));
     EXPECT_NE(refusal().find(row.words), std::string::npos) << row.asset << ": " << refusal();
+  }
+  // eight corners, two points within and one on a face: their hull is the cuboid of 1 x 2 x 3
+  const std::string cuboid =
+      "vertex=\"0 0 0 1 0 0 0 2 0 1 2 0 0.5 1 1 0 0 3 1 0 3 0.25 1.5 2 0 2 3 1 2 3 0.5 0 1.5\"";
+  for (const std::string inertia : {"", " inertia=\"convex\"", " inertia=\"exact\""}) {
+    Write("m.xml", model("<mesh name=\"brick\" scale=\"1 1 1\" " + cuboid + inertia + "/>", geom));
+    const BodyDescription made = read().description.bodies.at(1);
+    EXPECT_LE((made.com - Vector3d(0.5, 1.0, 1.5)).norm(), 64 * kEps);
+    const Vector3d wanted = Vector3d(13.0, 10.0, 5.0) / 4.0;  // m/12 (b^2 + c^2)
+    EXPECT_LE((made.inertia.diagonal() - wanted).norm(), 64 * kEps * wanted.norm());
   }
   // without a type MuJoCo fits a sphere to the mesh
   Write("m.xml", model("<mesh file=\"brick.obj\"/>", "<geom mesh=\"brick\"/>"));

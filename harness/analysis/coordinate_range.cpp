@@ -9,6 +9,7 @@
 #include "harness/analysis/structure_hints.h"
 #include "mechanism/simplify/compile.h"
 #include "mechanism/start/branches.h"
+#include "mechanism/start/guesses.h"
 
 namespace loopbench::harness {
 namespace {
@@ -69,16 +70,10 @@ class RangeSearch {
     const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
     const Start<double> start = Assemble<Space>(description, mechanism);
     if (start.outcome == Outcome::kInconsistentStart) return start.message;
-    std::vector<JointValues>& values = description.initial.coordinates;
-    values.clear();
-    for (const TreeStep& step : mechanism.tree()) {
-      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
-      if (joint.description < 0 || joint.num_q() < joint.kind->num_q || joint.num_q() == 0) {
-        continue;
-      }
-      values.push_back({joint.description,
-                        {&start.q[joint.q_offset], &start.q[joint.q_offset] + joint.num_q()}});
-    }
+    description.initial.coordinates = TreeValues(mechanism, start.q);
+    std::erase_if(description.initial.coordinates, [&](const JointValues& values) {
+      return !description.joints[values.joint].motions.empty();
+    });
     Kinematics<Space, double> kinematics(mechanism);
     kinematics.UpdatePosition(start.q);
     const Compiled compiled = Compile(description, CompileOptions::None());
@@ -201,6 +196,7 @@ CoordinateRange FindRange(MechanismDescription description, int joint) {
     described.motions.clear();
   }
   description.initial.speeds.clear();
+  description.initial.poses.clear();  // they hold at the start only
   if (description.space == SpaceKind::kPlanar) {
     Search<Planar>(description, joint, &range);
   } else {

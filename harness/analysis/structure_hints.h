@@ -34,7 +34,7 @@ std::vector<std::string> NamesOf(const MechanismDescription& description,
 /// mixed. Bodies of usual shapes have 0.1 to 1; g for kg gives 1/30, mm for m 1000 times.
 inline constexpr double kOddGyration = 100.0;
 
-/// Returns sentences on parts that are valid but unusual: bodies that hang by one joint beside
+/// Returns sentences on unusual parts: bodies that hang by one joint beside
 /// loops, and radii of gyration out of proportion with the distances of joints and centres of mass.
 std::vector<std::string> FindHints(const MechanismDescription& description,
                                    const Structure& structure);

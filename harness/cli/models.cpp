@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Exact facts that remain valid: on bodies that still exist, and in an approximate model only its
-/// length. Expected degrees of freedom are those of an exact model in one part.
+/// length. Only an exact model in one part has the expected degrees of freedom.
 ObservedQuantities ObserveIn(const MechanismDescription& description,
                              const ObservedQuantities& observe, bool keeps_facts) {
   ObservedQuantities known = observe;

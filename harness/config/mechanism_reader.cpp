@@ -96,7 +96,7 @@ Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.
 // without bodies, every reference to a body would be a consequential error
 bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
 
-/// Assembles a file with targets, so that its coordinates are those of the result.
+/// Assembles a file with targets and takes over the coordinates of the result.
 void MeetTargets(const JsonNode& root, Draft& draft) {
   if (draft.initial.poses.empty() || !root.errors().empty() || !Validate(draft).empty()) return;
   const std::string why = ResolvePoses(&draft);

@@ -16,7 +16,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// A coordinate holds a motion in which it moves by more than this share of unit bodies' motions
-/// [rad, or lengths]: efforts at it are then at most as many times those at other coordinates.
+/// [rad, or lengths]. Smaller shares would need efforts of more than 1e4 times the loads.
 constexpr double kHolds = 1e-4;
 /// Power of applied forces that counts as zero, over the sum of its parts: permitted speeds are
 /// known to round-off over kRankRatio.
@@ -114,7 +114,7 @@ class AtRestSearch {
     for (int i = 0; i < static_cast<int>(words.size()); ++i) {
       if (held_rates_.cols() == permitted_.cols()) return;
       VectorXd rates(permitted_.cols());
-      // permitted speeds are those of unit bodies, about 1 m/s
+      // permitted speeds belong to unit bodies, about 1 m/s
       const double scale =
           joint.kind->inverse_H_squared * (words[i].is_length() ? 1.0 : mechanism_.length());
       for (Eigen::Index k = 0; k < rates.size(); ++k) {

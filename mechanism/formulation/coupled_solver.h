@@ -2,9 +2,9 @@
 //
 //   (M + R^T I R) x - J^T lambda - G^T mu = f,      J x = c,      G x = d
 //
-// G has a row per coupling, R one per rotor, I are the rotors' inertias. With tau = -I R x the
-// rotors' efforts are unknowns like mu, and all rows are alike. x0 is the inner solver's result for
-// (f, c), and a column of Y its result for a row of G or R as force, with c = 0. Then
+// G has a row per coupling, R one per rotor, I are the rotors' inertias. The rotors' efforts tau =
+// -I R x are unknowns like mu. x0 is the inner solver's result for (f, c). A column of Y is its
+// result for a row of G or R as force, with c = 0. Then
 //
 //   x = x0 + Y [mu; tau],      (X + diag(0, I^-1)) [mu; tau] = [d; 0] - [G; R] x0,      X = [G; R]
 //   Y

@@ -124,7 +124,7 @@ void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
 /// its motion is prescribed.
 template <class Space, class S>
 S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses, int joint);
-/// The same of a coupling: the scale of its row.
+/// Response of a coupling to its own force, likewise: the scale of its row.
 template <class Space, class S>
 S FreeResponseOf(const Kinematics<Space, S>& kinematics, Masses masses, int coupling);
 

@@ -2,8 +2,8 @@
 //
 // A target is a free joint from Ground that closes a loop without constraints: its coordinates are
 // the pose of the body in the target's frame. Given ones count as fixed values or as guesses of 0
-// in the assembly (closure.h), which thus meets fixed targets exactly and comes as near as possible
-// to the others: the sum of squares, times weights squared, is least.
+// in the assembly (closure.h), which thus meets fixed targets exactly. It minimises the weighted
+// sum of squares of the distances from the others.
 #pragma once
 
 #include <string>
@@ -16,8 +16,8 @@ namespace loopbench {
 /// The description with its targets as joints, behind its own.
 MechanismDescription WithTargets(const MechanismDescription& description);
 
-/// Assembles the description with its targets, and replaces the initial coordinates by those of
-/// the result. Returns "", or the reason why fixed targets and loops cannot be satisfied.
+/// Assembles the description with its targets and takes over the coordinates of the result as
+/// initial ones. Returns "", or the reason why fixed targets and loops cannot be satisfied.
 std::string ResolvePoses(MechanismDescription* description);
 
 /// Distance of a body from a target.

@@ -108,6 +108,11 @@ TEST(CoordinateRangeTest, WhatHasNoRangeIsNamed) {
   seven_bar.initial.held.clear();
   EXPECT_NE(FindRange(seven_bar, 0).why.find("other motion"), std::string::npos)
       << FindRange(seven_bar, 0).why;
+  // a pose fixes the start, not the motion
+  seven_bar.initial.poses = {{.body = 1, .rotation = Eigen::Vector3d::Zero(), .fixed = true},
+                             {.body = 4, .rotation = Eigen::Vector3d::Zero(), .fixed = true}};
+  EXPECT_NE(FindRange(seven_bar, 0).why.find("other motion"), std::string::npos)
+      << FindRange(seven_bar, 0).why;
   const MechanismDescription platform =
       ReadMechanism(kConfigs / "mechanisms/stewart-platform.json").description;
   EXPECT_NE(FindRange(platform, 0).why.find("expected a joint with one coordinate"),

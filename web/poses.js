@@ -70,5 +70,15 @@ const LoopbenchPoses = (() => {
     return out;
   }
 
-  return {between, frameAt, matrices, placed};
+  // The path of each named point of a picture through frames: x, y, z of every frame.
+  function paths(picture, frames) {
+    const all = picture.points.map(() => new Float64Array(3 * frames.length)), p = [0, 0, 0];
+    frames.forEach((frame, f) => {
+      const X = matrices(picture, frame);
+      picture.points.forEach((point, i) => all[i].set(placed(X, point.at, 0, null, p), 3 * f));
+    });
+    return all;
+  }
+
+  return {between, frameAt, matrices, paths, placed};
 })();

@@ -5,6 +5,7 @@
 //   LoopbenchScene.attach(drawing, {onHover(item) {..}});      // mouse, touch and keys
 //   drawing.poses = LoopbenchScene.between(picture, frames, 3.5);
 //   drawing.ghosts = [{poses, colour: '--second'}];            // others of the same bodies, as outlines
+//   drawing.traces = [{paths: LoopbenchScene.paths(picture, frames), colour: '--drive'}];  // of named points
 //   drawing.draw();
 //
 // Poses are flat numbers by body, Ground first: x, y, angle in the plane; x, y, z and the quaternion
@@ -12,7 +13,7 @@
 'use strict';
 const LoopbenchScene = (() => {
   const TURN = 2 * Math.PI;
-  const {between, frameAt, matrices, placed} = LoopbenchPoses;
+  const {between, frameAt, matrices, paths, placed} = LoopbenchPoses;
   const {paint, fromSegment} = LoopbenchSymbols;
   const {attach} = LoopbenchControls;
 
@@ -36,6 +37,7 @@ const LoopbenchScene = (() => {
       this.picture = picture;
       this.poses = picture.start;
       this.ghosts = [];
+      this.traces = [];          // paths of the picture's named points
       this.gaps = false;         // how open loops are as the file says it
       this.names = true;
       this.centres = true;
@@ -133,6 +135,7 @@ const LoopbenchScene = (() => {
       g.fillRect(0, 0, this.width, this.height);
       this.taken = [];
       for (const ghost of this.ghosts) this.drawGhost(ghost);
+      for (const trace of this.traces) this.drawTrace(trace);
       this.drawn = this.project(matrices(this.picture, this.poses));
       for (const one of this.drawn) paint(this, one);
       this.drawMarks();
@@ -164,6 +167,20 @@ const LoopbenchScene = (() => {
       }
       if (!this.picture.planar) list.sort((a, b) => a.depth - b.depth);
       return list;
+    }
+
+    drawTrace({paths, colour}) {
+      const g = this.context;
+      g.strokeStyle = this.colour(colour);
+      g.lineWidth = 1.2;
+      for (const path of paths) {
+        g.beginPath();
+        for (let i = 0; i < path.length; i += 3) {
+          const s = this.see(path.subarray(i, i + 3));
+          if (i) g.lineTo(s[0], s[1]); else g.moveTo(s[0], s[1]);
+        }
+        g.stroke();
+      }
     }
 
     drawGhost({poses, colour}) {
@@ -353,5 +370,5 @@ const LoopbenchScene = (() => {
   const number = (value) => String(Number(value.toPrecision(3)));
   const short = (name) => (Array.from(name).length > 20 ? Array.from(name).slice(0, 20).join('') + '\u2026' : name);
 
-  return {Drawing, attach, between, frameAt, matrices, number, short};
+  return {Drawing, attach, between, frameAt, matrices, number, paths, short};
 })();

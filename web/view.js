@@ -58,6 +58,10 @@
     last = performance.now();
     redraw();
   }
+  function showPaths() {
+    const on = byId('paths').checked && motion !== null;
+    drawing.traces = on ? [{paths: LoopbenchScene.paths(picture, motion.frames), colour: '--drive'}] : [];
+  }
   function choose(index) {
     motion = picture.motions[index] || null;
     play.disabled = slider.disabled = motion === null;
@@ -65,6 +69,7 @@
     byId('motiontext').textContent = motion ? motion.text : '';
     phase = 0;
     drawing.poses = picture.start;
+    showPaths();
     if (motion) {
       slider.max = String(motion.frames.length - 1);
       showFrame(motion.start);
@@ -167,7 +172,8 @@
     if (motion) showFrame(Number(slider.value));
     redraw();
   });
-  const toggles = {names: (on) => { drawing.names = on; }, centres: (on) => { drawing.centres = on; },
+  byId('pathslabel').hidden = picture.points.length === 0 || picture.motions.length === 0;
+  const toggles = {paths: showPaths, names: (on) => { drawing.names = on; }, centres: (on) => { drawing.centres = on; },
                    given: (on) => {
                      drawing.ghosts = on ? [{poses: picture.given}] : [];
                      drawing.gaps = on;

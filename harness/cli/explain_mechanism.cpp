@@ -193,14 +193,29 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
                      {"held", "held by", Format::kText, {}}};
   reactions.columns = {{"joint", "joint", Format::kText, {}}, {"on", "on", Format::kText, {}}};
   std::map<std::string, const JointDescription*> joints;
+  std::map<std::string, std::string> holder_of;  // of columns
   for (const JointDescription& joint : description.joints) joints[LabelName(joint.name)] = &joint;
+  for (const CouplingDescription& coupling : description.couplings) {
+    for (const auto& [j, ratio] : coupling.parts) {
+      const JointDescription& joint = description.joints[j];
+      const std::string name = LabelName(coupling.name) + ":" + LabelName(joint.name);
+      joints[name] = &joint;
+      holder_of[name] = "coupling " + coupling.name;
+    }
+  }
   for (std::size_t i = 1; i < statics.columns.size(); ++i) {
     const auto& [kind, name, component, unit] = statics.columns[i];
-    if (kind == "drive") {
+    if (kind != "reaction") {
       const bool is_ours =
           std::ranges::find(statics.held, name + ":" + component) != statics.held.end();
-      AddRow({joints[name]->name, component, shown(statics.values[i]), unit,
-              is_ours ? "--statics" : "its motion"},
+      const bool is_drive = kind == "drive";
+      const std::string coordinate =
+          is_drive ? component
+                   : std::string(ValueWords(joints[name]->type, description.space, false)[0].name);
+      AddRow({joints[name]->name, coordinate, shown(statics.values[i]), unit,
+              !is_drive ? holder_of[name]
+              : is_ours ? "--statics"
+                        : "its motion"},
              &efforts);
       continue;
     }

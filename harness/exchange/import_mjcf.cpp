@@ -212,8 +212,9 @@ XmlValue MjcfElement::Required(const std::string& name, std::string_view expecte
 void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   const auto given = element.Attribute("class");
   if (!given && !parent.empty()) element.Fail("no \"class\"", "a name: it is a nested class");
-  const std::string name = parent.empty() ? kMain : given->Name();
-  if (parent.empty()) {
+  const bool is_main = parent.empty() && !element.is_attached_default();
+  const std::string name = is_main ? kMain : given->Name();
+  if (is_main) {
     // a second top-level <default> adds to the first
     const std::string also = given ? given->Name() : kMain;
     if (also != kMain && classes_.contains(also)) given->Fail("a class that is not described yet");

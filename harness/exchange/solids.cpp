@@ -357,7 +357,9 @@ TriangleMesh ReadObj(const std::filesystem::path& path, std::string_view text) {
       for (const std::size_t corner : {std::size_t{0}, k - 1, k}) mesh.Add(points[corners[corner]]);
     }
   });
-  return std::move(mesh).mesh();
+  TriangleMesh read = std::move(mesh).mesh();
+  if (read.triangles.empty()) read.points = points;
+  return read;
 }
 
 }  // namespace
@@ -373,7 +375,7 @@ TriangleMesh ReadMesh(const std::filesystem::path& path) {
   const TriangleMesh mesh = ending == ".obj" ? ReadObj(path, bytes)
                             : is_text        ? ReadTextStl(path, bytes)
                                              : ReadBinaryStl(path, bytes);
-  if (mesh.triangles.empty()) Fail(path, 0, "no triangles", "a closed surface");
+  if (mesh.points.empty()) Fail(path, 0, "no triangles", "a closed surface");
   return mesh;
 }
 

@@ -27,8 +27,8 @@ struct TriangleMesh {
   std::vector<std::array<int, 3>> triangles;  ///< counter-clockwise, seen from outside
 };
 
-/// Reads a file: STL (binary or text) or Wavefront OBJ, by its ending. Throws ConfigError for
-/// others, for faults with the line, and for files above 64 MiB.
+/// Reads a file: STL (binary or text) or Wavefront OBJ, by its ending; an OBJ file may have points
+/// alone. Throws ConfigError for others, for faults with the line, and for files above 64 MiB.
 TriangleMesh ReadMesh(const std::filesystem::path& path);
 
 /// Returns the number of edges that have no triangle, or several, on one side; 0 if the mesh is

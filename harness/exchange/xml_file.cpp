@@ -20,9 +20,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::vector<const tinyxml2::XMLElement*> ChildrenIn(const tinyxml2::XMLElement& element) {
-  std::vector<const tinyxml2::XMLElement*> children;
-  for (const auto* child = element.FirstChildElement(); child != nullptr;
+using Element = tinyxml2::XMLElement;
+
+std::vector<Element*> ChildrenIn(Element* element) {
+  std::vector<Element*> children;
+  for (Element* child = element->FirstChildElement(); child != nullptr;
        child = child->NextSiblingElement()) {
     children.push_back(child);
   }
@@ -39,24 +41,29 @@ struct XmlDocument {
   };
   std::deque<File> files;        ///< the main file first
   std::optional<fs::path> path;  ///< of the main file
-  std::unordered_map<const tinyxml2::XMLElement*, const tinyxml2::XMLElement*>
-      included;  ///< the root element of the file in place of an <include>
+  /// The element whose children are in place of an <include> or <attach>.
+  std::unordered_map<const Element*, Element*> included;
+  std::unordered_map<const Element*, std::vector<Element*>> added;  ///< further children
+  std::unordered_set<const Element*> attached_defaults;
   std::unordered_set<const void*> read;
 
-  const tinyxml2::XMLElement* root() const { return files.front().xml.RootElement(); }
-  /// Returns the children of an element, including children from included files.
-  std::vector<const tinyxml2::XMLElement*> ChildrenOf(const tinyxml2::XMLElement& element) const {
-    if (included.empty()) return ChildrenIn(element);
-    std::vector<const tinyxml2::XMLElement*> children;
-    for (const auto* child : ChildrenIn(element)) {
+  Element* root() { return files.front().xml.RootElement(); }
+  /// Returns the children of an element, including children from other files.
+  std::vector<Element*> ChildrenOf(Element* element) const {
+    std::vector<Element*> children = ChildrenIn(element);
+    if (included.empty() && added.empty()) return children;
+    std::vector<Element*> all;
+    for (Element* child : children) {
       const auto found = included.find(child);
       if (found == included.end()) {
-        children.push_back(child);
+        all.push_back(child);
       } else {
-        std::ranges::copy(ChildrenOf(*found->second), std::back_inserter(children));
+        std::ranges::copy(ChildrenOf(found->second), std::back_inserter(all));
       }
     }
-    return children;
+    const auto more = added.find(element);
+    if (more != added.end()) std::ranges::copy(more->second, std::back_inserter(all));
+    return all;
   }
 };
 
@@ -125,7 +132,7 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
   }
 }
 
-std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const tinyxml2::XMLElement& element) {
+std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const Element& element) {
   std::vector<const tinyxml2::XMLAttribute*> attributes;
   for (const auto* one = element.FirstAttribute(); one != nullptr; one = one->Next()) {
     attributes.push_back(one);
@@ -133,12 +140,11 @@ std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const tinyxml2::XMLEleme
   return attributes;
 }
 
-const tinyxml2::XMLElement* FirstWithin(const XmlDocument& document,
-                                        const tinyxml2::XMLElement& element,
-                                        const std::vector<std::string_view>& tags) {
-  for (const auto* child : document.ChildrenOf(element)) {
+Element* FirstWithin(const XmlDocument& document, Element* element,
+                     const std::vector<std::string_view>& tags) {
+  for (Element* child : document.ChildrenOf(element)) {
     if (std::ranges::find(tags, child->Name()) != tags.end()) return child;
-    if (const auto* within = FirstWithin(document, *child, tags)) return within;
+    if (Element* within = FirstWithin(document, child, tags)) return within;
   }
   return nullptr;
 }
@@ -212,7 +218,7 @@ void XmlValue::FailChoice(const std::vector<std::string>& words) const {
   Fail(fmt::format("one of {}", fmt::join(words, ", ")));
 }
 
-XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XMLElement* element)
+XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, Element* element)
     : document_(std::move(document)), element_(element) {
   document_->read.insert(element_);
 }
@@ -221,6 +227,10 @@ std::string XmlElement::tag() const { return element_->Name(); }
 int XmlElement::line() const { return element_->GetLineNum(); }
 const std::string& XmlElement::file() const {
   return *static_cast<const std::string*>(element_->GetDocument()->GetUserData());
+}
+
+bool XmlElement::is_attached_default() const {
+  return document_->attached_defaults.contains(element_);
 }
 
 std::string XmlElement::Shown() const {
@@ -243,7 +253,7 @@ void XmlElement::Fail(std::string_view found, std::string_view expected) const {
 
 std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> children;
-  for (const auto* child : document_->ChildrenOf(*element_)) {
+  for (Element* child : document_->ChildrenOf(element_)) {
     if (tags.empty() || std::ranges::find(tags, child->Name()) != tags.end()) {
       children.emplace_back(document_, child);
     }
@@ -266,7 +276,7 @@ std::vector<XmlElement> XmlElement::InSections(const char* section, const char* 
 }
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
-  const auto* found = FirstWithin(*document_, *element_, tags);
+  Element* found = FirstWithin(*document_, element_, tags);
   if (found == nullptr) return std::nullopt;
   return XmlElement(document_, found);
 }
@@ -326,8 +336,7 @@ void XmlElement::Ignore() const {
 namespace {
 
 /// Adds a parsed file and returns its root element.
-const tinyxml2::XMLElement* Parse(std::string_view text, const std::string& file,
-                                  XmlDocument* document) {
+Element* Parse(std::string_view text, const std::string& file, XmlDocument* document) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   XmlDocument::File& parsed = document->files.emplace_back();
@@ -356,7 +365,7 @@ const tinyxml2::XMLElement* Parse(std::string_view text, const std::string& file
   return parsed.xml.RootElement();
 }
 
-/// Resolves the <include> elements of MJCF.
+/// Resolves the <include> and <attach> elements of MJCF.
 class Includer {
  public:
   explicit Includer(const std::shared_ptr<XmlDocument>& document)
@@ -364,45 +373,230 @@ class Includer {
     known_.insert(open_[0]);
   }
 
-  void Resolve(const tinyxml2::XMLElement& element, const fs::path& folder) {
-    for (const auto* child : ChildrenIn(element)) {
-      if (std::string_view(child->Name()) == "include") {
-        Include(child, folder);
-      } else {
-        Resolve(*child, folder);
-      }
-    }
+  /// Resolves a model, whose file is in `folder`.
+  void Resolve(Element* root, const fs::path& folder) {
+    Include(root, folder);
+    std::vector<Element*> places;
+    for (Element* world : Named(root, "worldbody")) AddWithin(world, "attach", &places);
+    for (Element* place : places) Attach(place, root, folder);
   }
 
  private:
-  /// Reads a file, named from the folder of the main file or of the file that contains `element`.
-  void Include(const tinyxml2::XMLElement* element, const fs::path& folder) {
+  void Include(Element* element, const fs::path& folder) {
+    for (Element* child : ChildrenIn(element)) {
+      if (std::string_view(child->Name()) != "include") {
+        Include(child, folder);
+        continue;
+      }
+      const auto name =
+          XmlElement(document_, child).Required("file", "a file below the folder of the main file");
+      fs::path shown;
+      Element* root = Open(name, folder, &shown);
+      if (!known_.insert(open_.back()).second) name.Fail("each file once");
+      document_->included.emplace(child, root);
+      Include(root, shown.parent_path());
+      open_.pop_back();
+    }
+  }
+
+  /// Reads a file, named from the folder of the main file or from `folder`, and returns its root
+  /// element. It is the last of the open files.
+  Element* Open(const XmlValue& name, const fs::path& folder, fs::path* shown) {
     constexpr std::size_t kMaxDepth = 16;
-    const XmlValue name =
-        XmlElement(document_, element).Required("file", "a file below the folder of the main file");
-    const fs::path shown = name.File({}, folder), path = CanonicalOf(shown);
+    *shown = name.File({}, folder);
+    const fs::path path = CanonicalOf(*shown);
     if (const auto cycle = std::ranges::find(open_, path); cycle != open_.end()) {
       std::string names;
       for (auto at = cycle; at != open_.end(); ++at) names += at->filename().string() + " > ";
       name.Fail(fmt::format("no cycle of files ({}{})", names, path.filename().string()));
     }
-    if (!known_.insert(path).second) name.Fail("each file once");
     if (open_.size() > kMaxDepth) name.Fail(fmt::format("at most {} nested files", kMaxDepth));
     std::error_code error;
     bytes_ += fs::file_size(path, error);
     if (error || bytes_ > kMaxConfigBytes) {
       name.Fail(fmt::format("files of at most {} MiB in all", kMaxConfigBytes >> 20));
     }
-    const auto* root = Parse(ReadTextFile(path), shown.string(), document_.get());
-    document_->included.emplace(element, root);
     open_.push_back(path);
-    Resolve(*root, shown.parent_path());
+    return Parse(ReadTextFile(path), shown->string(), document_.get());
+  }
+
+  std::vector<Element*> Named(Element* root, std::string_view tag) const {
+    std::vector<Element*> named = document_->ChildrenOf(root);
+    std::erase_if(named, [&](Element* child) { return child->Name() != tag; });
+    return named;
+  }
+  /// Adds the descendants of an element with this tag, or all if it is empty, and not those within
+  /// them unless all are added.
+  void AddWithin(Element* element, std::string_view tag, std::vector<Element*>* found) const {
+    for (Element* child : document_->ChildrenOf(element)) {
+      const bool fits = tag.empty() || child->Name() == tag;
+      if (fits) found->push_back(child);
+      if (!fits || tag.empty() || tag == "body") AddWithin(child, tag, found);
+    }
+  }
+  /// Returns an attribute of <compiler>, of the last one that has it.
+  std::string Setting(Element* root, const char* name, const char* otherwise) const {
+    std::string value = otherwise;
+    for (Element* compiler : Named(root, "compiler")) {
+      if (const char* given = compiler->Attribute(name)) value = Trimmed(given);
+    }
+    return value;
+  }
+
+  void Attach(Element* place, Element* root, const fs::path& folder) {
+    const XmlElement attach(document_, place);
+    const XmlValue model = attach.Required("model", "the name of a <model> in <asset>");
+    std::optional<XmlValue> file;
+    for (const XmlElement& given : XmlElement(document_, root).InSections("asset", "model")) {
+      if (given.RequiredName() == model.text()) file = given.Required("file", "a MJCF file");
+    }
+    if (!file) model.Fail("the name of a <model> in <asset>");
+    std::set<fs::path> known;
+    std::swap(known, known_);
+    fs::path shown;
+    Element* other = Open(*file, folder, &shown);
+    Resolve(other, shown.parent_path());
     open_.pop_back();
+    std::swap(known, known_);
+    for (const auto& [name, otherwise] : {std::pair{"angle", "degree"},
+                                          {"eulerseq", "xyz"},
+                                          {"autolimits", "true"},
+                                          {"inertiafromgeom", "auto"},
+                                          {"inertiagrouprange", "0 5"},
+                                          {"balanceinertia", "false"},
+                                          {"boundmass", "0"},
+                                          {"boundinertia", "0"},
+                                          {"settotalmass", "-1"}}) {
+      const std::string wanted = Setting(root, name, otherwise);
+      if (Setting(other, name, otherwise) == wanted) continue;
+      model.Fail(fmt::format("a model with {}=\"{}\" in its <compiler>, as in {}", name, wanted,
+                             attach.file()));
+    }
+    const auto body = attach.Attribute("body");
+    const bool is_whole = !body || body->text() == "world";
+    std::vector<Element*> contents, bodies;
+    for (Element* world : Named(other, "worldbody")) {
+      std::ranges::copy(document_->ChildrenOf(world), std::back_inserter(contents));
+      AddWithin(world, "body", &bodies);
+    }
+    if (!is_whole) {
+      std::erase_if(bodies, [&](Element* one) {
+        const char* name = one->Attribute("name");
+        return name == nullptr || body->text() != name;
+      });
+      if (bodies.empty()) body->Fail("the name of a body of " + shown.string());
+      contents = {bodies[0]};
+    }
+    const auto prefix = attach.Attribute("prefix");
+    const std::string main = Rename(other, prefix ? prefix->text() : "", shown.parent_path());
+    Element* frame = other->GetDocument()->NewElement("frame");
+    frame->SetAttribute("childclass", main.c_str());
+    Element* all = other->GetDocument()->NewElement("attached");
+    document_->added[frame] = contents;
+    document_->added[all] = {frame};
+    document_->included.emplace(place, all);
+    if (!is_whole) DropOutside(other, frame);
+    for (const char* tag : {"default", "asset", "contact", "tendon", "equality", "actuator",
+                            "deformable", "extension"}) {
+      std::ranges::copy(Named(other, tag), std::back_inserter(document_->added[root]));
+    }
+  }
+
+  /// Adds a prefix to all names of a model, and paths to its meshes. Returns the name of its
+  /// default class, which no class of other models is.
+  std::string Rename(Element* root, const std::string& prefix, const fs::path& folder) {
+    constexpr const char* kNames[] = {
+        "name",          "class",    "childclass", "body",    "body1",     "body2",
+        "joint",         "joint1",   "joint2",     "site",    "site1",     "site2",
+        "geom",          "geom1",    "geom2",      "tendon",  "mesh",      "tendon1",
+        "tendon2",       "hfield",   "actuator",   "refsite", "cranksite", "slidersite",
+        "jointinparent", "sidesite", "material",   "texture", "target"};
+    const std::string main =
+        fmt::format("{}main ({})", prefix, document_->attached_defaults.size());
+    std::set<std::string> names_of_main = {"main"};
+    std::vector<Element*> defaults = Named(root, "default");
+    std::erase_if(defaults,
+                  [&](Element* one) { return document_->attached_defaults.contains(one); });
+    if (defaults.empty()) {
+      defaults.push_back(root->GetDocument()->NewElement("default"));
+      document_->added[root].push_back(defaults[0]);
+    }
+    for (Element* one : defaults) {
+      if (const char* name = one->Attribute("class")) names_of_main.insert(name);
+      one->SetAttribute("class", "main");
+    }
+    for (const char* tag : {"asset", "tendon", "equality", "actuator"}) {
+      for (Element* section : Named(root, tag)) {
+        for (Element* one : document_->ChildrenOf(section)) {
+          if (one->Attribute("class") == nullptr) one->SetAttribute("class", "main");
+          const char* file = one->Attribute("file");
+          if (file == nullptr || std::string_view(one->Name()) != "mesh") continue;
+          const std::string path = file;
+          if (one->Attribute("name") == nullptr) {
+            one->SetAttribute("name", fs::path(path).stem().c_str());
+          }
+          const std::string meshes =
+              Setting(root, "meshdir", Setting(root, "assetdir", "").c_str());
+          one->SetAttribute("file", fs::absolute(folder / meshes / path).c_str());
+        }
+      }
+    }
+    std::vector<Element*> all;
+    AddWithin(root, "", &all);
+    for (Element* one : all) {
+      for (const char* key : kNames) {
+        const char* given = one->Attribute(key);
+        if (given == nullptr) continue;
+        const std::string name(Trimmed(given)), attribute = key;
+        if (name.empty() || (attribute.starts_with("body") && name == "world")) continue;
+        const bool is_main = attribute.ends_with("class") && names_of_main.contains(name);
+        one->SetAttribute(key, (is_main ? main : prefix + name).c_str());
+      }
+    }
+    document_->attached_defaults.insert(defaults.begin(), defaults.end());
+    return main;
+  }
+
+  /// Deletes tendons, constraints and actuators of a model that refer to parts outside `frame`.
+  void DropOutside(Element* root, Element* frame) {
+    std::set<std::string> inside;  // kind and name
+    std::vector<Element*> parts;
+    const auto note = [&](Element* one, const std::string& kind) {
+      if (const char* name = one->Attribute("name")) inside.insert(kind + " " + name);
+    };
+    AddWithin(frame, "", &parts);
+    for (Element* one : parts) {
+      note(one, std::string_view(one->Name()) == "freejoint" ? "joint" : one->Name());
+    }
+    const auto is_inside = [&](Element* one) {
+      for (const char* kind : {"body", "joint", "site", "geom", "tendon"}) {
+        for (const std::string& key :
+             {kind + std::string(), kind + std::string("1"), kind + std::string("2")}) {
+          const char* name = one->Attribute(key.c_str());
+          if (name == nullptr || std::string_view(name) == "world") continue;
+          if (!inside.contains(std::string(kind) + " " + name)) return false;
+        }
+      }
+      return true;
+    };
+    for (const char* tag : {"tendon", "equality", "actuator"}) {
+      for (Element* section : Named(root, tag)) {
+        for (Element* one : document_->ChildrenOf(section)) {
+          std::vector<Element*> own = {one};
+          AddWithin(one, "", &own);
+          if (std::ranges::all_of(own, is_inside)) {
+            note(one, tag);
+          } else {
+            one->Parent()->DeleteChild(one);
+          }
+        }
+      }
+    }
   }
 
   std::shared_ptr<XmlDocument> document_;
   std::vector<fs::path> open_;  ///< the files around the element, the main file first
-  std::set<fs::path> known_;
+  std::set<fs::path> known_;    ///< of the model that is read
   std::uintmax_t bytes_ = 0;
 };
 
@@ -417,7 +611,7 @@ XmlFile::XmlFile(std::string_view text, const std::string& file,
 
 void XmlFile::Include() {
   if (document_->path) {
-    Includer(document_).Resolve(*document_->root(), document_->path->parent_path());
+    Includer(document_).Resolve(document_->root(), document_->path->parent_path());
   }
 }
 
@@ -428,8 +622,7 @@ namespace {
 
 using Parts = std::vector<std::pair<XmlElement, std::string>>;
 
-void AddUnread(const std::shared_ptr<XmlDocument>& document, const tinyxml2::XMLElement* element,
-               Parts* parts) {
+void AddUnread(const std::shared_ptr<XmlDocument>& document, Element* element, Parts* parts) {
   if (!document->read.contains(element)) {
     parts->emplace_back(XmlElement(document, element), "");
     return;
@@ -438,7 +631,7 @@ void AddUnread(const std::shared_ptr<XmlDocument>& document, const tinyxml2::XML
     if (document->read.contains(one)) continue;
     parts->emplace_back(XmlElement(document, element), IsText(one->Name()) ? one->Name() : "?");
   }
-  for (const auto* child : document->ChildrenOf(*element)) AddUnread(document, child, parts);
+  for (Element* child : document->ChildrenOf(element)) AddUnread(document, child, parts);
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 // than kMaxConfigBytes, nested deeper than the parser's limit, invalid UTF-8, or with a document
 // type, the only place for entity declarations (no entity is expanded).
 //
-// A file may contain others (Include()): their elements are read in place of <include>, with their
-// own file names and lines in messages.
+// A file may contain others (Include()): their elements are read in place of <include> or <attach>,
+// with their own file names and lines in messages.
 #pragma once
 
 #include <Eigen/Core>
@@ -33,7 +33,7 @@ struct XmlDocument;
 
 class XmlElement {
  public:
-  XmlElement(std::shared_ptr<XmlDocument> document, const tinyxml2::XMLElement* element);
+  XmlElement(std::shared_ptr<XmlDocument> document, tinyxml2::XMLElement* element);
 
   /// Returns an identity that no other element has.
   const void* id() const { return element_; }
@@ -69,6 +69,9 @@ class XmlElement {
   /// Returns the first descendant with one of these tags; marks only that element as read.
   std::optional<XmlElement> Within(const std::vector<std::string_view>& tags) const;
 
+  /// Returns true for the outermost <default> of an attached model.
+  bool is_attached_default() const;
+
   /// Marks the element and all its contents as read.
   void Ignore() const;
 
@@ -80,7 +83,7 @@ class XmlElement {
                            std::string_view expected) const;
 
   std::shared_ptr<XmlDocument> document_;
-  const tinyxml2::XMLElement* element_;
+  tinyxml2::XMLElement* element_;
 };
 
 /// The name and text of an attribute, or the text within an element (name "").
@@ -140,8 +143,10 @@ class XmlFile {
   XmlFile(std::string_view text, const std::string& file,
           const std::optional<std::filesystem::path>& path = {});
 
-  /// Replaces all <include file="..."> by the children of the root elements of these files, each
-  /// read once, and at most kMaxConfigBytes in all.
+  /// Resolves the elements of MJCF that stand for other files, at most kMaxConfigBytes in all.
+  ///   <include file="...">: the children of the root element of that file, which is read once.
+  ///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
+  ///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.
   void Include();
 
   XmlElement root() const;

@@ -156,6 +156,9 @@ svg text { font: 12px system-ui, 'DejaVu Sans', sans-serif; fill: var(--text); }
 .spread { stroke: var(--drive); stroke-opacity: 0.65; } .level { stroke: var(--text); stroke-width: 1.5; }
 .step { stroke: var(--gap); stroke-dasharray: 5 3; }
 .worse { color: var(--gap); font-weight: 600; }
+tr.commit th { padding-top: 10px; }
+svg.spark { border: 0; background: none; } .spark path { fill: none; stroke: var(--drive); }
+input { font: inherit; width: 20em; max-width: 100%; color: var(--text); background: var(--paper); border: 1px solid var(--rule); }
 )";
 
 /// Chooses the light or dark theme of the system.
@@ -165,6 +168,17 @@ constexpr const char* kThemeScript =
     "'light'; };\n"
     "paint();\n"
     "dark.addEventListener('change', paint);";
+
+/// Shows the series whose text has all words of the filter.
+constexpr const char* kFilterScript =
+    "const filter = document.getElementById('filter');\n"
+    "filter.addEventListener('input', () => {\n"
+    "  const words = filter.value.toLowerCase().split(/\\s+/);\n"
+    "  for (const one of document.querySelectorAll('figure, tr.series')) {\n"
+    "    const text = one.textContent.toLowerCase();\n"
+    "    one.hidden = !words.every((word) => text.includes(word));\n"
+    "  }\n"
+    "});";
 
 struct Chart {
   const History& history;
@@ -196,11 +210,12 @@ struct Chart {
     const double n = std::max<double>(1.0, static_cast<double>(series.values.size()) - 1.0);
     return kLeft + 8 + (kWidth - kLeft - kRight - 16) * static_cast<double>(i) / n;
   }
-  double Y(double value) const {
-    const double share = logarithmic ? std::log(std::max(value, low) / low) / std::log(high / low)
-                                     : (value - low) / (high - low);
-    return kTop + (kHeight - kTop - kBottom) * (1.0 - share);
+  /// Returns the height of a value over the axis, 0 to 1.
+  double Share(double value) const {
+    return logarithmic ? std::log(std::max(value, low) / low) / std::log(high / low)
+                       : (value - low) / (high - low);
   }
+  double Y(double value) const { return kTop + (kHeight - kTop - kBottom) * (1.0 - Share(value)); }
   const HistoryEntry& Entry(std::size_t i) const { return history.entries[series.values[i].entry]; }
 
   std::string Text() const {
@@ -274,17 +289,72 @@ struct Chart {
   }
 };
 
+/// The values of a series as a small line.
+std::string Sparkline(const History& history, const HistorySeries& series) {
+  constexpr double kLong = 120, kHigh = 22, kEdge = 3;
+  const Chart chart(history, series);
+  std::string path;
+  double x = 0.0, y = 0.0;
+  for (std::size_t i = 0; i < series.values.size(); ++i) {
+    const double last = std::max<double>(1.0, static_cast<double>(series.values.size()) - 1.0);
+    x = kEdge + (kLong - 2 * kEdge) * static_cast<double>(i) / last;
+    y = kEdge +
+        (kHigh - 2 * kEdge) * (1.0 - chart.Share(std::min(series.values[i].value, chart.high)));
+    path += fmt::format("{}{:.1f} {:.1f}", i == 0 ? "M" : "L", x, y);
+  }
+  return fmt::format(
+      "<svg class=\"spark\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" "
+      "aria-hidden=\"true\">"
+      "<path d=\"{2}\"/><circle class=\"dot\" cx=\"{3:.1f}\" cy=\"{4:.1f}\" r=\"2\"/></svg>",
+      kLong, kHigh, path, x, y);
+}
+
+/// Rows of all series in this order, with their last value and their last step.
+std::string SeriesRows(const History& history, const std::vector<const HistorySeries*>& order) {
+  std::string text =
+      "<div "
+      "class=\"wide\"><table><thead><tr><th>case</th><th>measure</th><th>machine</th><th>values</"
+      "th>"
+      "<th>last</th><th>last step</th></tr></thead><tbody>\n";
+  for (const HistorySeries* one : order) {
+    std::string step;
+    if (!one->changes.empty()) {
+      const LevelChange& change = one->changes.back();
+      step = fmt::format(
+          "{} at {}",
+          change.before > 0.0 ? fmt::format("x {:.3g}", change.after / change.before) : "from 0",
+          ShortCommit(history.entries[one->values[change.at].entry].commit));
+    }
+    text += fmt::format(
+        "<tr class=\"series\"><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td "
+        "class=\"n\">{:.4g}{}</td><td>{}</td></tr>\n",
+        EscapeXml(one->one), EscapeXml(one->measure), EscapeXml(one->machine),
+        Sparkline(history, *one), one->values.back().value,
+        one->unit.empty() ? "" : " " + EscapeXml(one->unit), EscapeXml(step));
+  }
+  return text + "</tbody></table></div>\n";
+}
+
+/// Rows of all steps, by commit.
 std::string StepRows(const History& history, const HistoryFindings& found) {
   const Table table = StepTable(history, found);
   if (table.rows.empty()) {
     return "<p>No step found: every series keeps its level, every case its ending.</p>\n";
   }
-  std::string text = "<div class=\"wide\"><table><thead><tr>";
-  for (const TableColumn& column : table.columns) text += "<th>" + column.header + "</th>";
+  constexpr std::size_t kOfCommit = 2;  // the first columns
+  const auto columns = table.columns | std::views::drop(kOfCommit);
+  std::string text = "<div class=\"wide\"><table><thead><tr>", commit;
+  for (const TableColumn& column : columns) text += "<th>" + column.header + "</th>";
   text += "</tr></thead><tbody>\n";
   for (const Record& row : table.rows) {
+    if (const std::string own = row.Text("commit"); own != commit) {
+      commit = own;
+      text += fmt::format(
+          "<tr class=\"commit\"><th colspan=\"{}\">{} <span class=\"soft\">{}</span></th></tr>\n",
+          columns.size(), EscapeXml(commit), EscapeXml(row.Text("date")));
+    }
     text += "<tr>";
-    for (const TableColumn& column : table.columns) {
+    for (const TableColumn& column : columns) {
       const bool is_worse = column.key == "ratio" && row.Number("ratio") > 1.0;
       text += fmt::format("<td{}>{}</td>",
                           is_worse                            ? " class=\"n worse\""
@@ -319,7 +389,11 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
       kFalseAlarms);
   page += StepRows(history, found);
   page +=
-      "<h2>Series</h2>\n<p class=\"soft\">Dots: a commit each; of times the least, with a line up "
+      "<h2>Series</h2>\n<p><input id=\"filter\" type=\"search\" aria-label=\"filter\" "
+      "placeholder=\"words of case, measure, machine\"></p>\n";
+  page += SeriesRows(history, order);
+  page +=
+      "<h2>Charts</h2>\n<p class=\"soft\">Dots: a commit each; of times the least, with a line up "
       "to the 90th percentile. "
       "Hollow dots: the machine had another speed than usual, so that they decide nothing. "
       "Lines: levels. Broken lines: steps, with the ratio of the levels.</p>\n";
@@ -346,7 +420,7 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
   page += "</tbody></table></div>\n";
   for (const std::string& line : provenance)
     page += "<p class=\"soft\">" + EscapeXml(line) + "</p>\n";
-  return page + "</main>\n</body>\n</html>\n";
+  return page + fmt::format("</main>\n<script>{}</script>\n</body>\n</html>\n", kFilterScript);
 }
 
 }  // namespace loopbench::harness

@@ -153,6 +153,13 @@ std::vector<TrajectoryColumn> TrajectoryColumns(const MechanismDescription& user
   }
   if (output.Has(OutputPart::kReactions)) {
     for (const JointDescription& joint : user.joints) AddReaction(user, joint, planar, &columns);
+    for (const CouplingDescription& coupling : user.couplings) {
+      for (const auto& [j, ratio] : coupling.parts) {
+        columns.push_back({"coupling",
+                           LabelName(coupling.name) + ":" + LabelName(user.joints[j].name),
+                           "effort", EffortUnit(IsLength(user, j))});
+      }
+    }
   }
   if (output.Has(OutputPart::kForces)) {
     for (std::size_t f = 0; f < user.forces.size(); ++f) AddForce(user, f, planar, &columns);
@@ -286,6 +293,11 @@ class RowOf final : public RowWriter {
     reactions_.Solve(A_, applied_);
     for (std::size_t j = 0; j < user_.joints.size(); ++j) {
       if (user_.joints[j].type != JointType::kFree) Bearing(static_cast<int>(j));
+    }
+    for (std::size_t c = 0; c < user_.couplings.size(); ++c) {
+      for (std::size_t i = 0; i < user_.couplings[c].parts.size(); ++i) {
+        PushOrOpen(reactions_.CouplingOf(static_cast<int>(c), static_cast<int>(i)));
+      }
     }
   }
 

@@ -17,8 +17,8 @@ namespace loopbench::harness {
 
 struct Statics {
   std::string why;  ///< why there are no forces: something moves that nothing can hold; else empty
-  /// Drives (columns "drive") and reactions (columns "reaction"), in ground axes; NaN if redundant
-  /// constraints share the load in no one way.
+  /// Drives (columns "drive"), reactions ("reaction") and efforts of couplings ("coupling"), in
+  /// ground axes; NaN if redundant constraints share the load in no one way.
   std::vector<TrajectoryColumn> columns;
   std::vector<double> values;
   std::vector<std::string> held;  ///< names of columns of drives that the file does not prescribe

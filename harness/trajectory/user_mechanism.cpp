@@ -331,6 +331,7 @@ struct Reactions<Space>::Work {
         enter(At(j).from, ShiftForce<Space, double>(D, State(j).r_P), -scale);
       }
     }
+    const Eigen::Index first_coupling = columns;
     for (const Coupling<double>& coupling : user.mechanism().couplings()) {
       const double most = SizeOfForce(coupling);
       for (const auto& [j, ratio] : coupling.parts) {
@@ -347,7 +348,17 @@ struct Reactions<Space>::Work {
         needed[place[b] + i] = w[b][i] / (i < Space::kRot ? length() : 1.0);
       }
     }
-    Enter(part, Solved(entries, needed, columns, limit));
+    const Solution solution = Solved(entries, needed, columns, limit);
+    Enter(part, solution);
+    mu.clear();
+    for (const Coupling<double>& coupling : user.mechanism().couplings()) {
+      const Eigen::Index column = first_coupling + std::ssize(mu);
+      const auto changes = [&](double change) { return std::abs(change) > negligible; };
+      const bool is_known =
+          solution.is_known &&
+          (solution.open.cols() == 0 || std::ranges::none_of(solution.open.row(column), changes));
+      mu.push_back(is_known ? solution.x[column] / SizeOfForce(coupling) : kNaN);
+    }
   }
 
   static Solution Solved(const std::vector<Coefficients>& entries, const Eigen::VectorXd& needed,
@@ -393,8 +404,9 @@ struct Reactions<Space>::Work {
   std::vector<Wrench<Space, double>> w;      ///< wrenches that bodies still need
   std::vector<Wrench<Space, double>> total;  ///< wrenches on second bodies, including drives
   std::vector<std::vector<Wrench<Space, double>>> open;  ///< homogeneous solutions
-  std::vector<int> left;                                 ///< number of unsolved joints of a body
-  std::vector<Eigen::Index> first;                       ///< column of a joint's first direction
+  std::vector<double> mu;           ///< by coupling: its efforts over their coefficients
+  std::vector<int> left;            ///< number of unsolved joints of a body
+  std::vector<Eigen::Index> first;  ///< column of a joint's first direction
   std::vector<std::vector<int>> joints_of;
   std::vector<int> bearing;  ///< the user's joints with constrained directions
   std::vector<bool> is_done;
@@ -463,6 +475,12 @@ template <class Space>
 double Reactions<Space>::DriveOf(int joint, int coordinate) const {
   const Velocity<Space, double> along = work_->user.DirectionOfSpeed(joint, coordinate) * 1.0;
   return work_->IsKnown(joint, along) ? work_->total[joint].dot(along) : kNaN;
+}
+
+template <class Space>
+double Reactions<Space>::CouplingOf(int coupling, int part) const {
+  const auto& parts = work_->user.mechanism().couplings()[coupling].parts;
+  return parts[part].ratio * work_->mu[coupling];
 }
 
 template class Reactions<Planar>;

@@ -101,8 +101,8 @@ class UserMechanism {
 // all joints of the user: also between merged bodies, and out of the plane of a problem simplified
 // to planar.
 //
-// Couplings add a column each, and their forces are not part of a joint's reaction; all joints are
-// then one part. Bodies with one joint left are solved in turn from the leaves inwards. The
+// Couplings add a column each, their efforts over the coefficients; they are not part of a joint's
+// reaction. All joints are then one part. Bodies with one joint left are solved in turn from the leaves inwards. The
 // remaining loops are solved part by part: by sparse QR for many unknowns, by dense QR with
 // pivoting for few or dependent ones. Rigid bodies do not determine how redundant constraints share
 // a load. A reaction component is known if no solution of (*) with w = 0 changes it, else NaN.
@@ -127,6 +127,9 @@ class Reactions {
   /// Returns the effort of a prescribed motion along its coordinate: its power is effort times
   /// speed [N m or N]. NaN if not unique.
   double DriveOf(int joint, int coordinate) const;
+
+  /// Returns the effort of a coupling along the coordinate of one of its joints, as above.
+  double CouplingOf(int coupling, int part) const;
 
  private:
   struct Work;

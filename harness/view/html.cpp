@@ -63,6 +63,11 @@ std::string ShapeText(const PictureShape& shape) {
       offsets);
 }
 
+std::string PointText(const PicturePoint& point) {
+  return fmt::format(R"({{"name":{},"at":[{}]}})", ScriptString(point.name),
+                     PlaceText(point.place));
+}
+
 std::string LoopText(const PictureLoop& loop) {
   return fmt::format(
       R"({{"joint":{},"bodies":{},"joints":{},"from":[{}],"offset":[{}],"to":[{}],"gap":{},"turn":{},"left":{},"redundant":{}}})",
@@ -113,6 +118,7 @@ std::string ToJson(const Picture& picture) {
       Numbers(R.row(2)), Number(picture.symbol), Number(picture.extent));
   text += "\"items\":" + ListOf(picture.items, ItemText);
   text += ",\"shapes\":" + ListOf(picture.shapes, ShapeText);
+  text += ",\"points\":" + ListOf(picture.points, PointText);
   text += ",\"loops\":" + ListOf(picture.loops, LoopText);
   text += ",\"start\":" + poses(picture.start) + ",\"given\":" + poses(picture.given);
   text += ",\"motions\":" + ListOf(picture.motions, [&](const PictureMotion& motion) {
@@ -147,6 +153,7 @@ constexpr const char* kBody = R"(<header>
 <div class="row">
 <label><input type="checkbox" id="names" checked> names</label>
 <label><input type="checkbox" id="centres" checked> centres of mass</label>
+<label id="pathslabel"><input type="checkbox" id="paths"> paths of named points</label>
 <label><input type="checkbox" id="given"{3}> as the file says it, with open loops</label>
 <button type="button" id="fit">Whole</button>
 <button type="button" id="theme">Dark</button>

@@ -247,6 +247,13 @@ Picture MakePicture(const MechanismDescription& description, const std::string& 
     picture.up = g > 0.0 ? Vector3d(-description.gravity / g) : Vector3d::UnitZ();
   }
   AddItems(description, &picture);
+  for (int b = 1; b < std::ssize(description.bodies); ++b) {
+    const BodyDescription& body = description.bodies[static_cast<std::size_t>(b)];
+    for (const auto& [name, at] : body.points) {
+      if (picture.points.size() == kMaxPoints) break;
+      picture.points.push_back({body.name + ":" + name, {.body = b, .at = at}});
+    }
+  }
   if (picture.planar) {
     Maker<Planar>(description, &picture).Make();
   } else {

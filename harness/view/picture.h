@@ -109,6 +109,12 @@ struct PictureLoop {
   std::vector<std::string> redundant;
 };
 
+/// A named point of a body, whose path pages can show.
+struct PicturePoint {
+  std::string name;  ///< "rod:B"
+  PicturePlace place;
+};
+
 /// One swing of one degree of freedom, or one pass of the prescribed motions.
 struct PictureMotion {
   std::string name = "";           ///< its leading speed, or "prescribed motions"
@@ -130,6 +136,7 @@ struct Picture {
   std::size_t bodies = 0, joints = 0;                 ///< Ground included
   std::vector<PictureItem> items;
   std::vector<PicturePlace> centres;  ///< centres of mass, by body
+  std::vector<PicturePoint> points;   ///< of moving bodies, at most kMaxPoints
   std::vector<PictureShape> shapes;
   Poses start;  ///< as assembled
   Poses given;  ///< as given in the file, before assembly
@@ -145,6 +152,8 @@ struct Picture {
 inline constexpr std::size_t kMaxDetailed = 500;
 /// Number of tree speeds above which no loop motion is followed and nothing is analysed.
 inline constexpr int kMaxFollowed = 240;
+/// Maximum number of named points with paths.
+inline constexpr std::size_t kMaxPoints = 50;
 /// Maximum number of motions, and of body poses in all of them.
 inline constexpr std::size_t kMaxMotions = 12, kMaxFrames = 40000;
 

@@ -137,15 +137,11 @@ std::vector<std::vector<Vector3d>> Attachments(const MechanismDescription& descr
   for (std::size_t b = 1; b < points.size(); ++b) {
     const BodyDescription& body = description.bodies[b];
     std::vector<Vector3d>& own = points[b];
-    const auto is_one_place = [&own] {
-      return std::ranges::all_of(own, [&](const Vector3d& p) {
-        return (p - own.front()).norm() <= 1e-9 * (p.norm() + own.front().norm());
-      });
-    };
-    if (is_one_place()) {
-      for (const auto& [name, at] : body.points) own.push_back(at);
-    }
-    if (is_one_place()) own.push_back(body.com);
+    for (const auto& [name, at] : body.points) own.push_back(at);
+    const bool is_one_place = std::ranges::all_of(own, [&](const Vector3d& p) {
+      return (p - own.front()).norm() <= 1e-9 * (p.norm() + own.front().norm());
+    });
+    if (is_one_place) own.push_back(body.com);
   }
   return points;
 }

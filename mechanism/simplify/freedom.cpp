@@ -174,7 +174,7 @@ class Measuring {
 };
 
 /// Relative speed of a joint's bodies that counts as rest, per unit speed of the whole.
-constexpr double kStill = 1e-8;
+constexpr double kStillJoint = 1e-8;
 
 template <class Space>
 std::vector<bool> StillIn(const MechanismDescription& description) {
@@ -192,7 +192,7 @@ std::vector<bool> StillIn(const MechanismDescription& description) {
     for (std::size_t j = 0; j < still.size(); ++j) {
       Velocity<Space, double> V = kinematics.joints()[j].V_rel;
       V.angular *= mechanism.length();
-      if (V.norm() > kStill) still[j] = false;
+      if (V.norm() > kStillJoint) still[j] = false;
     }
   }
   return still;

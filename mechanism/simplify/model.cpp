@@ -35,7 +35,8 @@ Simplified Exactly(const MechanismDescription& description, bool CompileOptions:
   return result;
 }
 
-Simplified Flat(const MechanismDescription& description, const ShortRun&, const SimplifyOptions&) {
+Simplified MadePlanar(const MechanismDescription& description, const ShortRun&,
+                      const SimplifyOptions&) {
   Simplified result = Exactly(description, &CompileOptions::planar);
   if (description.space == SpaceKind::kPlanar) result.why_not = "it is planar already";
   return result;
@@ -121,7 +122,7 @@ const std::vector<SimplificationRule>& SimplificationRules() {
       {.name = "planar",
        .is_exact = true,
        .sentence = "a spatial mechanism that moves in parallel planes becomes planar",
-       .apply = Flat},
+       .apply = MadePlanar},
       {.name = "constant-parts",
        .sentence = "bodies that hardly move relative to each other become one body",
        .assumption = "their joints stay at rest after the trial run",

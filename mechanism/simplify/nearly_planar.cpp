@@ -18,7 +18,7 @@ using Matrix3 = Eigen::Matrix3d;
 using Vector3 = Eigen::Vector3d;
 
 /// A joint at the start: its frames in ground axes, its planar counterpart, and the deviation.
-struct Flat {
+struct PlacedJoint {
   Frame X_WF, X_WM;
   JointType type = JointType::kRevolute;
   double tilt = 0.0;    ///< sine
@@ -32,7 +32,7 @@ class Flattening {
   Flattening(const MechanismDescription& description, const BodyStarts& starts)
       : d_(description), starts_(starts) {
     for (const JointDescription& joint : d_.joints) {
-      Flat flat;
+      PlacedJoint flat;
       flat.X_WF = StartOf(joint.from.body).X * FrameOf(joint, joint.from);
       flat.X_WM = StartOf(joint.to.body).X * FrameOf(joint, joint.to);
       joints_.push_back(flat);
@@ -41,7 +41,7 @@ class Flattening {
     for (std::size_t j = 0; j < joints_.size(); ++j) Judge(d_.joints[j], &joints_[j]);
   }
 
-  const std::vector<Flat>& joints() const { return joints_; }
+  const std::vector<PlacedJoint>& joints() const { return joints_; }
   const Matrix3& R_WC() const { return R_WC_; }
 
   /// Returns the share of a spring's or rod's length along the normal (sine).
@@ -90,7 +90,7 @@ class Flattening {
     R_WC_ = AxesWithNormal(n);
   }
 
-  void Judge(const JointDescription& joint, Flat* flat) const {
+  void Judge(const JointDescription& joint, PlacedJoint* flat) const {
     const Vector3 n = R_WC_.col(2);
     const auto off = [&](const Vector3& axis) { return axis.cross(n).norm(); };   // from n
     const auto out = [&](const Vector3& axis) { return std::abs(axis.dot(n)); };  // of the plane
@@ -129,18 +129,19 @@ class Flattening {
     return flat;
   }
 
-  JointDescription FlatJoint(const JointDescription& joint, const Flat& flat) const;
+  JointDescription FlatJoint(const JointDescription& joint, const PlacedJoint& flat) const;
 
   const MechanismDescription& d_;
   const BodyStarts& starts_;
-  std::vector<Flat> joints_;
+  std::vector<PlacedJoint> joints_;
   Matrix3 R_WC_ = Matrix3::Identity();
 };
 
 /// All bodies have the ground's axes at the start, and every joint's frames are projected along the
 /// normal. Coordinates keep their values, angles within half a turn; axes of opposite direction
 /// swap the joint's sides.
-JointDescription Flattening::FlatJoint(const JointDescription& joint, const Flat& flat) const {
+JointDescription Flattening::FlatJoint(const JointDescription& joint,
+                                       const PlacedJoint& flat) const {
   JointDescription changed = joint;
   changed.type = flat.type;
   changed.axis.setZero();
@@ -223,7 +224,7 @@ std::string Judged(const MechanismDescription& description, const Flattening& fl
                    double limit, Simplified* result) {
   std::string fault;
   for (std::size_t j = 0; j < flattening.joints().size(); ++j) {
-    const Flat& flat = flattening.joints()[j];
+    const PlacedJoint& flat = flattening.joints()[j];
     const std::string what = "joint \"" + description.joints[j].name + "\"";
     result->candidates.push_back({what, flat.tilt, flat.why.empty() && flat.tilt <= limit,
                                   flat.why.empty() ? "" : flat.why});

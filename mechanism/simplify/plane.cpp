@@ -20,9 +20,9 @@ Frame FrameOf(const JointDescription& joint, const JointSide& side) {
   return X;
 }
 
-class Search {
+class PlaneSearch {
  public:
-  explicit Search(const MechanismDescription& description)
+  explicit PlaneSearch(const MechanismDescription& description)
       : d_(description),
         normal_(description.bodies.size(), Vector3::Zero()),
         height_(description.bodies.size(), 0.0) {}
@@ -123,7 +123,7 @@ class Search {
 };
 
 /// Without its part along z.
-Vector3 Flat(const Vector3& v) { return {v.x(), v.y(), 0.0}; }
+Vector3 WithoutZ(const Vector3& v) { return {v.x(), v.y(), 0.0}; }
 
 /// Expresses one joint's sides in the new axes: positions and angles within the plane.
 void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& normal,
@@ -136,7 +136,7 @@ void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& 
     const Matrix3& R = axes[side->body];
     const Vector3 along = R.transpose() * (X.R * across);
     side->rotation = {0.0, 0.0, std::atan2(along.y(), along.x())};
-    side->position = Flat(R.transpose() * side->position);
+    side->position = WithoutZ(R.transpose() * side->position);
   };
   flatten(X_PF, &joint->from);
   flatten(X_QM, &joint->to);
@@ -153,7 +153,7 @@ void FlattenJoint(const std::vector<Matrix3>& axes, const std::vector<Vector3>& 
   if (traits.flat.is_free) joint->type = JointType::kFree;
 }
 
-InPlane Search::Express() const {
+InPlane PlaneSearch::Express() const {
   InPlane result;
   MechanismDescription& planar = result.description;
   planar = d_;
@@ -167,15 +167,15 @@ InPlane Search::Express() const {
     X_CB.p.z() = height_[i];
     result.X_CB.push_back(X_CB);
     BodyDescription& body = planar.bodies[i];
-    body.com = Flat(R.transpose() * body.com);
+    body.com = WithoutZ(R.transpose() * body.com);
     body.inertia = R.transpose() * body.inertia * R;
     body.inertia = (0.5 * (body.inertia + body.inertia.transpose())).eval();
-    for (auto& [name, point] : body.points) point = Flat(R.transpose() * point);
+    for (auto& [name, point] : body.points) point = WithoutZ(R.transpose() * point);
   }
   result.R_WC = axes[kGround];
   const Vector3 gravity = result.R_WC.transpose() * d_.gravity;
   result.gravity_dropped = gravity.z();
-  planar.gravity = Flat(gravity);
+  planar.gravity = WithoutZ(gravity);
   for (JointDescription& joint : planar.joints) {
     bool mirrored = false;
     FlattenJoint(axes, normal_, &joint, &mirrored);
@@ -188,10 +188,10 @@ InPlane Search::Express() const {
       const Matrix3& R = axes[*parts.in_body_axes ? parts.points[0]->body : kGround];
       const Vector3 f = R.transpose() * *parts.force;
       result.force_dropped.back() = f.z();
-      *parts.force = Flat(f);
+      *parts.force = WithoutZ(f);
     }
     for (BodyPoint* point : parts.points) {
-      point->at = Flat(axes[point->body].transpose() * point->at);
+      point->at = WithoutZ(axes[point->body].transpose() * point->at);
     }
   }
   for (auto* list : {&planar.initial.coordinates, &planar.initial.speeds}) {
@@ -219,7 +219,7 @@ Eigen::Matrix3d AxesWithNormal(const Vector3& n) {
 }
 
 std::optional<InPlane> ExpressInPlane(const MechanismDescription& description, std::string* why) {
-  Search search(description);
+  PlaneSearch search(description);
   *why = search.Why();
   if (!why->empty()) return std::nullopt;
   return search.Express();

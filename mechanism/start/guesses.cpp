@@ -4,13 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace loopbench {
 
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 /// Weight of the distance of a coordinate without a guess from 0.
 constexpr double kUnguessed = 1e-3;
 

@@ -7,11 +7,14 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "mechanism/start/assembly.h"
 #include "mechanism/start/assembly_units.h"
 
 namespace loopbench {
+
+inline constexpr double kTurn = 2 * std::numbers::pi;  ///< [rad]
 
 template <class Space>
 class Guesses {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "mechanism/start/guesses.h"
 
@@ -13,7 +12,6 @@ namespace {
 
 /// Share of a link, or of a radian, from which a target counts as missed.
 constexpr double kMissed = 0.01;
-constexpr double kTurn = 2 * std::numbers::pi;
 
 JointDescription JointOf(const PoseTarget& target, const MechanismDescription& description) {
   JointDescription joint;

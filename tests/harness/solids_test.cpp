@@ -362,8 +362,12 @@ TEST_F(MeshFiles, MjcfGeomsTakeTheMassOfTheirMesh) {
   // eight corners, two points within and one on a face: their hull is the cuboid of 1 x 2 x 3
   const std::string cuboid =
       "vertex=\"0 0 0 1 0 0 0 2 0 1 2 0 0.5 1 1 0 0 3 1 0 3 0.25 1.5 2 0 2 3 1 2 3 0.5 0 1.5\"";
-  for (const std::string inertia : {"", " inertia=\"convex\"", " inertia=\"exact\""}) {
-    Write("m.xml", model("<mesh name=\"brick\" scale=\"1 1 1\" " + cuboid + inertia + "/>", geom));
+  Write("meshes/points.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 1 2 0\nv 0.5 1 1\nv 0 0 3\nv 1 0 3\nv 0 2 3\nv 1 2 3\n");
+  for (const std::string& points :
+       {cuboid, cuboid + " inertia=\"convex\"", cuboid + " inertia=\"exact\"",
+        std::string("file=\"points.obj\"")}) {
+    Write("m.xml", model("<mesh name=\"brick\" scale=\"1 1 1\" " + points + "/>", geom));
     const BodyDescription made = read().description.bodies.at(1);
     EXPECT_LE((made.com - Vector3d(0.5, 1.0, 1.5)).norm(), 64 * kEps);
     const Vector3d wanted = Vector3d(13.0, 10.0, 5.0) / 4.0;  // m/12 (b^2 + c^2)

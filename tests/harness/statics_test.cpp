@@ -186,6 +186,19 @@ TEST(StaticsTest, GroundCarriesTheWeight) {
   }
 }
 
+/// A lever on gears: one holding moment at the first wheel, 40 q_O = -20 q_W.
+TEST(StaticsTest, CouplingsPassTheMomentOn) {
+  const double load = 2 * kGravity * 0.4;
+  auto value = Values(Of(R"({"name": "hoist", "gravity": [0, -9.81],
+    "bodies": [{"name": "wheel", "mass": 1, "inertia": 0.1}, {"name": "lever", "mass": 2, "inertia": 0.1, "com": [0.4, 0]}],
+    "joints": [{"name": "W", "type": "revolute", "from": {"body": "ground", "at": [1, 0]}, "to": {"body": "wheel"}},
+               {"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "lever"}}],
+    "couplings": [{"name": "mesh", "coefficients": {"O": 40, "W": 20}}]})"));
+  EXPECT_NEAR(value["coupling:mesh:O:effort"], load, 1000 * kEps * load);
+  EXPECT_NEAR(value["coupling:mesh:W:effort"], load / 2, 1000 * kEps * load);
+  EXPECT_NEAR(value["drive:W:angle"], -load / 2, 1000 * kEps * load);
+}
+
 /// A drive is held where it is: its rate and acceleration need no force here.
 TEST(StaticsTest, DrivesAreHeldAtTheirStart) {
   MechanismDescription moving = Shipped("driven-four-bar");

@@ -246,6 +246,17 @@ TEST(View, NamesAreOnlyShown) {
   EXPECT_EQ(data.find('\xff'), std::string::npos);
 }
 
+TEST(View, NamedPointsAreInTheOutlineAndHavePaths) {
+  MechanismDescription description =
+      ReadMechanism(kConfigs / "mechanisms/four-bar.json").description;
+  description.bodies[2].points["tip"] = {0.5, 2.0, 0.0};
+  const std::vector<Vector3d> places = Attachments(description)[2];
+  EXPECT_NE(std::ranges::find(places, Vector3d(0.5, 2.0, 0.0)), places.end());
+  const std::string name = "\"" + description.bodies[2].name + ":tip\"";
+  EXPECT_NE(ToJson(MakePicture(description, "")).find("{\"name\":" + name + ",\"at\":[2,0.5,2,0]}"),
+            std::string::npos);
+}
+
 TEST(View, LargeOnesAreBounded) {
   const Picture ladder = MakePicture(Ladder(500, 1.0, 1.0), "");
   EXPECT_TRUE(ladder.assembled);

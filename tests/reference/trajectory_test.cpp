@@ -253,6 +253,27 @@ TEST(Reactions, OfAStaticFourBarAreThoseOfStatics) {
   }
 }
 
+TEST(Reactions, OfGearsAreThoseOfTheirTorques) {
+  // I1 a1 = T + 40 mu, I2 a2 = 20 mu, 40 a1 + 20 a2 = 0
+  const double I1 = 0.4, I2 = 0.03, T = 5.0, effort = -2 * I2 * T / (I1 + 4 * I2);
+  const MechanismFile gears = ParseMechanism(R"({"name": "gears",
+    "bodies": [{"name": "large", "mass": 2, "inertia": 0.4}, {"name": "small", "mass": 1, "inertia": 0.03}],
+    "joints": [
+      {"name": "P", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "large"}},
+      {"name": "Q", "type": "revolute", "from": {"body": "ground", "at": [0.3, 0]}, "to": {"body": "small"}}],
+    "couplings": [{"name": "mesh", "coefficients": {"P": 40, "Q": 20}}],
+    "forces": [{"type": "joint_torque", "joint": "P", "value": 5}]})",
+                                             "gears.json");
+  for (const Method& method : RankRevealingMethods()) {
+    const Written run = WriteTrajectory(gears, method, "ode45", 1e-9, 1.0, Rows(3));
+    for (std::size_t row = 0; row < 3; ++row) {
+      const double bound = 1000 * T * kEpsilon;  // two bodies, condition below 10
+      EXPECT_NEAR(run.At(row, "coupling", "mesh:Q", "effort"), effort, bound) << ToString(method);
+      EXPECT_NEAR(run.At(row, "coupling", "mesh:P", "effort"), 2 * effort, bound);
+    }
+  }
+}
+
 /// Wrenches of all joints on their second bodies by a formulation's multipliers.
 template <class Space>
 void ExpectMultipliers(const MechanismDescription& description, const std::string& formulation) {

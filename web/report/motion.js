@@ -51,6 +51,13 @@ const LoopbenchMotion = (() => {
       this.part = button('Where they part', () => this.findParting());
       this.choices.replaceChildren(this.one.element, ...(paths.length > 1 ? [this.other.element, this.part] : []));
       this.part.disabled = true;
+      if (paths.length > 0 && scene.picture.points.length > 0) {
+        this.traced = make('input', {type: 'checkbox'});
+        this.traced.addEventListener('change', () => { this.trace(); this.draw(); });
+        this.choices.append(make('label', {}, this.traced, ' paths of named points'));
+      } else {
+        this.traced = null;
+      }
       this.fit();
     }
 
@@ -69,8 +76,16 @@ const LoopbenchMotion = (() => {
         const some = (path) => [0, 0.25, 0.5, 0.75, 1].map((s) => path.frames[Math.round(s * (path.frames.length - 1))]);
         this.drawing.fit([...some(this.first), ...(this.second ? some(this.second) : [])]);
       }
+      this.trace();
       this.slider.max = String(this.clock.end);
       this.draw();
+    }
+
+    // Paths of named points in the motions that are shown.
+    trace() {
+      this.drawing.traces = [[this.first, '--drive'], [this.second, '--second']]
+          .filter(([path]) => path && this.traced && this.traced.checked)
+          .map(([path, colour]) => ({paths: LoopbenchScene.paths(this.scene.picture, path.frames), colour}));
     }
 
     posesAt(path, t) {

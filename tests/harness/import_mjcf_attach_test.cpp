@@ -1,0 +1,184 @@
+// <attach> of MJCF: models of other files in a body, with prefixed names.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "harness/config/mechanism_reader.h"
+#include "harness/text/files.h"
+#include "tests/harness/import_texts.h"
+
+namespace loopbench::harness {
+namespace import_mjcf_attach_test {
+
+namespace fs = std::filesystem;
+
+class ImportMjcfAttach : public testing::Test {
+ protected:
+  ImportMjcfAttach() { fs::create_directories(folder_.path() / "model/parts"); }
+
+  void Write(const std::string& name, const std::string& text) const {
+    WriteFileAtomically(folder_.path() / "model" / name, text);
+  }
+  Imported Read() const { return ImportMechanism(folder_.path() / "model/main.xml"); }
+  std::string Message() const {
+    try {
+      Read();
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  void ExpectMessage(const std::vector<std::string>& words) const {
+    const std::string message = Message();
+    for (const std::string& word : words) {
+      EXPECT_NE(message.find(word), std::string::npos) << "no <" << word << "> in " << message;
+    }
+  }
+
+  TemporaryFolder folder_{"loopbench-attach"};
+};
+
+std::string TextOf(const Imported& imported) {
+  return MechanismText(imported.description, imported.observe);
+}
+
+const std::string kMass = R"(<inertial pos="0 0 0.1" mass="2" diaginertia="1 1 1"/>)";
+
+/// A base with a hinge and a tip with a hinge of another class; a spring of the tip's hinge to the
+/// base, a motor, and a constraint; `p` precedes all names, `class_of` is the text of a class.
+std::string Arm(const std::string& p, const std::string& class_of_hinge,
+                const std::string& class_of_soft) {
+  return fmt::format(
+      R"(<body name="{0}base" pos="0 0 1">{1}<joint name="{0}j" {2}/><site name="{0}s" pos="0 0 0.5"/>
+           <body name="{0}tip" pos="0 0 0.5">{1}<joint name="{0}k" {3}/><site name="{0}e" pos="0.2 0 0"/></body>
+         </body>)",
+      p, kMass, class_of_hinge, class_of_soft);
+}
+std::string ArmParts(const std::string& p) {
+  return fmt::format(
+      R"(<tendon><spatial name="{0}t" stiffness="30" springlength="0.1"><site site="{0}s"/><site site="{0}e"/></spatial></tendon>
+         <actuator><motor name="{0}m" joint="{0}k" gear="3"/></actuator>
+         <equality><joint joint1="{0}j" joint2="{0}k" polycoef="0 2 0 0 0"/></equality>
+         <keyframe><key ctrl="1"/></keyframe>)",
+      p);
+}
+const std::string kDefaults = R"(<default class="arm"><joint axis="0 1 0" damping="0.5"/>
+  <default class="soft"><joint axis="1 0 0" stiffness="7"/></default></default>)";
+
+TEST_F(ImportMjcfAttach, IsTheSameAsTheModelWrittenOut) {
+  Write("parts/arm.xml", "<mujoco model=\"arm\"><compiler angle=\"radian\"/>" + kDefaults +
+                             "<worldbody>" + Arm("", "", "class=\"soft\"") + "</worldbody>" +
+                             ArmParts("") + "</mujoco>");
+  // a class of the main model must not reach the arms, which have their own
+  const std::string before =
+      "<compiler angle=\"radian\"/><default><joint axis=\"0 0 1\" damping=\"9\"/></default>";
+  const auto main = [&](const std::string& left, const std::string& right,
+                        const std::string& rest) {
+    return "<mujoco model=\"m\">" + before + "<worldbody><body name=\"cart\">" + kMass +
+           "<joint name=\"c\"/><frame pos=\"1 0 0\">" + left +
+           "</frame></body><body name=\"post\" pos=\"0 3 0\" euler=\"0 0 1\">" + right +
+           "</body></worldbody>" + rest + "</mujoco>";
+  };
+  Write("main.xml", main("<attach model=\"arm\" body=\"base\" prefix=\"l_\"/>",
+                         "<attach model=\"arm\" prefix=\"r_\"/>",
+                         "<asset><model name=\"arm\" file=\"parts/arm.xml\"/></asset>"));
+  const std::string hinge = "axis=\"0 1 0\" damping=\"0.5\"",
+                    soft = "axis=\"1 0 0\" damping=\"0.5\" stiffness=\"7\"";
+  const auto parts = [](const std::string& p) {
+    std::string text = ArmParts(p);
+    return text.substr(0, text.find("<keyframe>"));
+  };
+  const std::string whole =
+      main(Arm("l_", hinge, soft), Arm("r_", hinge, soft), parts("l_") + parts("r_"));
+  EXPECT_EQ(TextOf(Read()), TextOf(ImportText(whole, "file.xml")));
+  EXPECT_EQ(Read().description.bodies.size(), 7u);
+}
+
+TEST_F(ImportMjcfAttach, ModelsAttachModels) {
+  Write("parts/tip.xml", "<mujoco><worldbody><body name=\"tip\">" + kMass +
+                             "<joint name=\"j\"/></body></worldbody></mujoco>");
+  Write("parts/arm.xml",
+        "<mujoco><asset><model name=\"tip\" file=\"tip.xml\"/></asset><worldbody>"
+        "<body name=\"arm\">" +
+            kMass +
+            "<joint name=\"j\"/><attach model=\"tip\" prefix=\"t_\"/></body>"
+            "</worldbody></mujoco>");
+  Write("main.xml",
+        "<mujoco><asset><model name=\"arm\" file=\"parts/arm.xml\"/></asset><worldbody>"
+        "<attach model=\"arm\" body=\"world\" prefix=\"a_\"/></worldbody></mujoco>");
+  const Imported imported = Read();
+  ASSERT_EQ(imported.description.joints.size(), 2u);
+  EXPECT_EQ(imported.description.joints[0].name, "a_j");
+  EXPECT_EQ(imported.description.joints[1].name, "a_t_j");
+  EXPECT_EQ(imported.description.bodies[2].name, "a_t_tip");
+}
+
+TEST_F(ImportMjcfAttach, PartsThatReferToTheRestOfAModelStayThere) {
+  Write("arm.xml", "<mujoco><worldbody>" + Arm("", "", "") + "<body name=\"other\">" + kMass +
+                       "<joint name=\"o\"/></body></worldbody><actuator><motor joint=\"o\"/><motor "
+                       "joint=\"k\"/></actuator><equality><joint joint1=\"o\" joint2=\"j\"/>"
+                       "</equality></mujoco>");
+  Write("main.xml",
+        "<mujoco><asset><model name=\"arm\" file=\"arm.xml\"/></asset><worldbody>"
+        "<attach model=\"arm\" body=\"tip\" prefix=\"x\"/></worldbody></mujoco>");
+  const Imported imported = Read();
+  ASSERT_EQ(imported.description.bodies.size(), 2u);
+  EXPECT_EQ(imported.description.joints[0].name, "xk");
+  EXPECT_TRUE(imported.description.couplings.empty());
+}
+
+TEST_F(ImportMjcfAttach, MeshesAreFoundBesideTheirModel) {
+  fs::create_directories(folder_.path() / "model/parts/meshes");
+  // a cube of 1 m
+  std::string cube;
+  for (const int i : {0, 1, 2, 3, 4, 5, 6, 7}) {
+    cube += fmt::format("v {} {} {}\n", i & 1, (i >> 1) & 1, i >> 2);
+  }
+  for (const char* face : {"1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"}) {
+    cube += fmt::format("f {}\n", face);
+  }
+  Write("parts/meshes/cube.obj", cube);
+  Write("parts/box.xml",
+        "<mujoco><compiler meshdir=\"meshes\"/><asset><mesh file=\"cube.obj\"/></asset><worldbody>"
+        "<body name=\"b\"><joint/><geom type=\"mesh\" mesh=\"cube\" density=\"10\"/></body>"
+        "</worldbody></mujoco>");
+  Write("main.xml",
+        "<mujoco><asset><model name=\"box\" file=\"parts/box.xml\"/></asset><worldbody>"
+        "<attach model=\"box\" prefix=\"p_\"/></worldbody></mujoco>");
+  EXPECT_NEAR(Read().description.bodies[1].mass, 10.0, 1e-13);
+}
+
+TEST_F(ImportMjcfAttach, FaultsAreNamed) {
+  const auto attach = [&](const std::string& attributes,
+                          const std::string& asset = "<model name=\"a\" file=\"a.xml\"/>") {
+    Write("main.xml", "<mujoco><asset>" + asset + "</asset><worldbody>\n<attach " + attributes +
+                          "/></worldbody></mujoco>");
+  };
+  Write("a.xml", "<mujoco><worldbody>" + Arm("", "", "") + "</worldbody></mujoco>");
+  attach("prefix=\"p\"");
+  ExpectMessage({"main.xml:2: <attach>: found no \"model\"", "the name of a <model> in <asset>"});
+  attach("model=\"b\"");
+  ExpectMessage({"main.xml:2: <attach> model: found \"b\"", "the name of a <model> in <asset>"});
+  attach("model=\"a\" body=\"no\"");
+  ExpectMessage({"main.xml:2: <attach> body: found \"no\"", "the name of a body of", "a.xml"});
+  attach("model=\"a\"", "<model name=\"a\" file=\"../a.xml\"/>");
+  ExpectMessage({"main.xml:1: <model name=\"a\"> file: found \"../a.xml\""});
+  attach("model=\"a\"", "<model name=\"a\" file=\"main.xml\"/>");
+  ExpectMessage({"no cycle of files (main.xml > main.xml)"});
+  Write("a.xml", "<mujoco><compiler angle=\"radian\"/><worldbody/></mujoco>");
+  attach("model=\"a\"");
+  ExpectMessage({"<attach> model: found \"a\"", "a model with angle=\"degree\" in its <compiler>"});
+  // each model attaches the next twice
+  for (int i = 0; i < 20; ++i) {
+    const std::string next = fmt::format("<attach model=\"n\" prefix=\"{}\"/>", "a");
+    Write(fmt::format("bomb{}.xml", i),
+          fmt::format("<mujoco><asset><model name=\"n\" file=\"bomb{}.xml\"/></asset><worldbody>"
+                      "{}{}</worldbody></mujoco>",
+                      i + 1, next, next));
+  }
+  Write("bomb20.xml", "<mujoco><worldbody/></mujoco>");
+  attach("model=\"a\"", "<model name=\"a\" file=\"bomb0.xml\"/>");
+  ExpectMessage({"at most 16 nested files"});
+}
+
+}  // namespace import_mjcf_attach_test
+}  // namespace loopbench::harness

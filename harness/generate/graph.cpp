@@ -118,7 +118,6 @@ double Value(Operation operation, double a, double b) {
 }
 
 int Graph::Input() {
-  ++num_inputs_;
   nodes_.push_back({Operation::kInput});
   return static_cast<int>(nodes_.size()) - 1;
 }

@@ -127,7 +127,6 @@ class Graph {
 
   const std::vector<Node>& nodes() const { return nodes_; }
   const std::vector<Comparison>& comparisons() const { return comparisons_; }
-  int num_inputs() const { return num_inputs_; }
 
   /// Nodes on which the outputs depend, or with `compared` the outputs and all comparisons.
   std::vector<bool> Live(const std::vector<int>& outputs, bool compared) const;
@@ -160,7 +159,6 @@ class Graph {
   bool keeps_numbers_;
   std::vector<Node> nodes_;
   std::vector<Comparison> comparisons_;
-  int num_inputs_ = 0;
   std::unordered_map<std::uint64_t, int> constants_;  ///< by bits
   std::unordered_map<std::uint64_t, int> seen_[static_cast<int>(Operation::kMax) + 1];
   std::unordered_map<std::uint64_t, std::array<std::uint8_t, 3>> compared_;  ///< outcome + 1

@@ -210,22 +210,6 @@ LOOPBENCH_INLINE Result Apply(const Block<Space, S>& A, const SpatialVector<Spac
   return product;
 }
 
-/// Does the same for a block with only a rotational part and a linear diagonal.
-template <class Result, class Space, class S, class Kind>
-LOOPBENCH_INLINE Result ApplyDiagonal(const Block<Space, S>& A,
-                                      const SpatialVector<Space, S, Kind>& x) {
-  Result product;
-  LOOPBENCH_UNROLL
-  for (int i = 0; i < Space::kRot; ++i) {
-    product[i] = A(i, 0) * x[0];
-    LOOPBENCH_UNROLL
-    for (int k = 1; k < Space::kRot; ++k) product[i] += A(i, k) * x[k];
-  }
-  LOOPBENCH_UNROLL
-  for (int i = Space::kRot; i < Space::kDim; ++i) product[i] = A(i, i) * x[i];
-  return product;
-}
-
 /// A -= x y^T.
 template <class Space, class S, class Kind>
 LOOPBENCH_INLINE void SubtractOuter(const SpatialVector<Space, S, Kind>& x,

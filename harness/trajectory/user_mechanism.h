@@ -102,11 +102,12 @@ class UserMechanism {
 // to planar.
 //
 // Couplings add a column each, their efforts over the coefficients; they are not part of a joint's
-// reaction. All joints are then one part. Bodies with one joint left are solved in turn from the leaves inwards. The
-// remaining loops are solved part by part: by sparse QR for many unknowns, by dense QR with
-// pivoting for few or dependent ones. Rigid bodies do not determine how redundant constraints share
-// a load. A reaction component is known if no solution of (*) with w = 0 changes it, else NaN.
-// Positions with a relative violation e leave directions free in which (*) holds to less than 10 e.
+// reaction. All joints are then one part. Bodies with one joint left are solved in turn from the
+// leaves inwards. The remaining loops are solved part by part: by sparse QR for many unknowns, by
+// dense QR with pivoting for few or dependent ones. Rigid bodies do not determine how redundant
+// constraints share a load. A reaction component is known if no solution of (*) with w = 0 changes
+// it, else NaN. Positions with a relative violation e leave directions free in which (*) holds to
+// less than 10 e.
 
 template <class Space>
 class Reactions {

@@ -425,13 +425,13 @@ class Includer {
     std::erase_if(named, [&](Element* child) { return child->Name() != tag; });
     return named;
   }
-  /// Adds the descendants of an element with this tag, or all if it is empty, and not those within
-  /// them unless all are added.
+  /// Adds the descendants of an element with this tag and not those within them, or all without
+  /// tag.
   void AddWithin(Element* element, std::string_view tag, std::vector<Element*>* found) const {
     for (Element* child : document_->ChildrenOf(element)) {
       const bool fits = tag.empty() || child->Name() == tag;
       if (fits) found->push_back(child);
-      if (!fits || tag.empty() || tag == "body") AddWithin(child, tag, found);
+      if (!fits || tag.empty()) AddWithin(child, tag, found);
     }
   }
   /// Returns an attribute of <compiler>, of the last one that has it.
@@ -443,12 +443,22 @@ class Includer {
     return value;
   }
 
+  /// Returns the name of a <model> in <asset>: its own, or the one in its file.
+  std::string NameOf(const XmlElement& model, const XmlValue& file, const fs::path& folder) {
+    if (const auto name = model.Attribute("name")) return name->Name();
+    fs::path shown;
+    const char* name = Open(file, folder, &shown)->Attribute("model");
+    open_.pop_back();
+    return name != nullptr ? name : "";
+  }
+
   void Attach(Element* place, Element* root, const fs::path& folder) {
     const XmlElement attach(document_, place);
     const XmlValue model = attach.Required("model", "the name of a <model> in <asset>");
     std::optional<XmlValue> file;
     for (const XmlElement& given : XmlElement(document_, root).InSections("asset", "model")) {
-      if (given.RequiredName() == model.text()) file = given.Required("file", "a MJCF file");
+      const XmlValue path = given.Required("file", "a MJCF file");
+      if (NameOf(given, path, folder) == model.text()) file = path;
     }
     if (!file) model.Fail("the name of a <model> in <asset>");
     std::set<fs::path> known;
@@ -472,30 +482,33 @@ class Includer {
       model.Fail(fmt::format("a model with {}=\"{}\" in its <compiler>, as in {}", name, wanted,
                              attach.file()));
     }
-    const auto body = attach.Attribute("body");
-    const bool is_whole = !body || body->text() == "world";
-    std::vector<Element*> contents, bodies;
+    auto part = attach.Attribute("body");
+    if (part && part->text() == "world") part.reset();
+    if (!part) part = attach.Attribute("frame");
+    std::vector<Element*> contents, all;
     for (Element* world : Named(other, "worldbody")) {
       std::ranges::copy(document_->ChildrenOf(world), std::back_inserter(contents));
-      AddWithin(world, "body", &bodies);
+      AddWithin(world, "", &all);
     }
-    if (!is_whole) {
-      std::erase_if(bodies, [&](Element* one) {
+    if (part) {
+      const auto named = std::ranges::find_if(all, [&](const Element* one) {
         const char* name = one->Attribute("name");
-        return name == nullptr || body->text() != name;
+        return one->Name() == part->attribute() && name != nullptr && part->text() == name;
       });
-      if (bodies.empty()) body->Fail("the name of a body of " + shown.string());
-      contents = {bodies[0]};
+      if (named == all.end()) {
+        part->Fail(fmt::format("the name of a {} of {}", part->attribute(), shown.string()));
+      }
+      contents = {*named};
     }
     const auto prefix = attach.Attribute("prefix");
     const std::string main = Rename(other, prefix ? prefix->text() : "", shown.parent_path());
     Element* frame = other->GetDocument()->NewElement("frame");
     frame->SetAttribute("childclass", main.c_str());
-    Element* all = other->GetDocument()->NewElement("attached");
+    Element* attached = other->GetDocument()->NewElement("attached");
     document_->added[frame] = contents;
-    document_->added[all] = {frame};
-    document_->included.emplace(place, all);
-    if (!is_whole) DropOutside(other, frame);
+    document_->added[attached] = {frame};
+    document_->included.emplace(place, attached);
+    if (part) DropOutside(other, frame);
     for (const char* tag : {"default", "asset", "contact", "tendon", "equality", "actuator",
                             "deformable", "extension"}) {
       std::ranges::copy(Named(other, tag), std::back_inserter(document_->added[root]));

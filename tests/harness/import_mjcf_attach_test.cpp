@@ -110,6 +110,17 @@ TEST_F(ImportMjcfAttach, ModelsAttachModels) {
   EXPECT_EQ(imported.description.joints[0].name, "a_j");
   EXPECT_EQ(imported.description.joints[1].name, "a_t_j");
   EXPECT_EQ(imported.description.bodies[2].name, "a_t_tip");
+  // a frame of the world, with what is in it
+  Write("parts/tip.xml",
+        "<mujoco model=\"Tip\"><worldbody><frame name=\"f\" pos=\"0 0 2\"><body name=\"tip\">" +
+            kMass +
+            "<joint name=\"j\"/></body></frame><body name=\"other\"/></worldbody>"
+            "</mujoco>");
+  Write("main.xml",
+        "<mujoco><asset><model file=\"parts/tip.xml\"/></asset><worldbody>"
+        "<attach model=\"Tip\" frame=\"f\"/></worldbody></mujoco>");
+  ASSERT_EQ(Read().description.bodies.size(), 2u);
+  EXPECT_EQ(Read().description.joints[0].from.position.z(), 2.0);
 }
 
 TEST_F(ImportMjcfAttach, PartsThatReferToTheRestOfAModelStayThere) {

@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3669,  17,   6},  2700},
     {"harness/figures",         { 3070,  12,   7},  1900},
     {"harness/view",            { 2447,  10,   8},  2050},
-    {"harness/exchange",        { 9065,  35,  10},  5000},
+    {"harness/exchange",        { 9109,  37,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2037,  10,   7},  1500},
     {"harness/cli",             { 8426,  26,  29},  3600},
     {"peers",                   {  718,  12,   5},   650},
-    {"",                        {92159, 517, 242}, 62000}
+    {"",                        {92203, 519, 242}, 62000}
 };
 // clang-format on
 

@@ -256,7 +256,7 @@ TEST(Reactions, OfAStaticFourBarAreThoseOfStatics) {
 TEST(Reactions, OfGearsAreThoseOfTheirTorques) {
   // I1 a1 = T + 40 mu, I2 a2 = 20 mu, 40 a1 + 20 a2 = 0
   const double I1 = 0.4, I2 = 0.03, T = 5.0, effort = -2 * I2 * T / (I1 + 4 * I2);
-  const MechanismFile gears = ParseMechanism(R"({"name": "gears",
+  const MechanismFile gears = ParseMechanism(R"({"name": "gears", "gravity": [0, 0],
     "bodies": [{"name": "large", "mass": 2, "inertia": 0.4}, {"name": "small", "mass": 1, "inertia": 0.03}],
     "joints": [
       {"name": "P", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "large"}},

@@ -114,9 +114,9 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
                : "peers are for the folders of peers/";
   }
   if (header == "tinyxml2.h") {
-    return OneOf(path, {"harness/exchange/xml_file.cpp", "tests/generate/cli_generate_test.cpp"})
+    return OneOf(path, {"harness/exchange/xml_document.h", "tests/generate/cli_generate_test.cpp"})
                ? ""
-               : "XML is for harness/exchange/xml_file.cpp";
+               : "XML is for harness/exchange/xml_document.h";
   }
   if (header.starts_with("boost/context/")) {
     return path == "harness/run/side_by_side.cpp"

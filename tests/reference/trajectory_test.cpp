@@ -266,10 +266,13 @@ TEST(Reactions, OfGearsAreThoseOfTheirTorques) {
                                              "gears.json");
   for (const Method& method : RankRevealingMethods()) {
     const Written run = WriteTrajectory(gears, method, "ode45", 1e-9, 1.0, Rows(3));
+    const auto P = run.rows.Find("coupling", "mesh:P", "effort", true),
+               Q = run.rows.Find("coupling", "mesh:Q", "effort", true);
+    ASSERT_TRUE(P && Q);
     for (std::size_t row = 0; row < 3; ++row) {
       const double bound = 1000 * T * kEpsilon;  // two bodies, condition below 10
-      EXPECT_NEAR(run.At(row, "coupling", "mesh:Q", "effort"), effort, bound) << ToString(method);
-      EXPECT_NEAR(run.At(row, "coupling", "mesh:P", "effort"), 2 * effort, bound);
+      EXPECT_NEAR(run.rows.At(row, *Q), effort, bound) << ToString(method);
+      EXPECT_NEAR(run.rows.At(row, *P), 2 * effort, bound);
     }
   }
 }

@@ -1,6 +1,7 @@
 // Documents: their commands print the output that they show, and reference pages are complete.
 #include <algorithm>
 #include <regex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -129,6 +130,31 @@ TEST(Documents, EveryKeyOfRecordsIsDescribed) {
     const std::string name = key.substr(0, key.find('*'));
     EXPECT_NE(text.find('`' + name), std::string::npos) << key;
   }
+}
+
+/// Commits in the provenance of the tables of a folder: "commit: 821824c71881".
+std::set<std::string> CommitsOf(const fs::path& folder) {
+  static const std::regex line("(^|\n)(# )?(measured: )?commit:? ([0-9a-f]{12})");
+  std::set<std::string> commits;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string ending = entry.path().extension().string();
+    if (ending != ".md" && ending != ".csv") continue;
+    const std::string text = ReadFile(entry.path());
+    for (std::sregex_iterator at(text.begin(), text.end(), line), end; at != end; ++at) {
+      commits.insert((*at)[4]);
+    }
+  }
+  return commits;
+}
+
+TEST(Results, TablesAreOfOneProgram) {
+  const std::string commit = *CommitsOf(kRoot / "results/paper").begin();
+  for (const char* folder :
+       {"paper", "methods", "overconstrained", "peers", "precision", "scaling", "work-precision"}) {
+    EXPECT_EQ(CommitsOf(kRoot / "results" / folder), std::set<std::string>{commit}) << folder;
+  }
+  // older: results/extremes/README.md names its commit
+  EXPECT_EQ(CommitsOf(kRoot / "results/extremes").size(), 1u);
 }
 
 }  // namespace documents_test

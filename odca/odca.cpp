@@ -90,6 +90,12 @@ void Odca<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target, Ve
 }
 
 template <class Space, class S>
+void Odca<Space, S>::SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda) {
+  equations_.SetWrenches(*kinematics_, wrenches);
+  SweepTo(x, lambda);
+}
+
+template <class Space, class S>
 bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                                 VectorX<S>& udot, VectorX<S>* lambda) {
   equations_.SetState(kinematics, feedback);

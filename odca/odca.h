@@ -42,6 +42,9 @@ class Odca final : public ConstraintSolver<Space, S> {
   bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u) override;
   bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                   VectorX<S>& udot, VectorX<S>* lambda) override;
+  /// Any join that closes a loop may be regularized, also of tree joints.
+  bool TakesWrenches() const override { return true; }
+  void SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda) override;
   /// In double, unless as published: for pins in the plane (path_sweep.h, assembly_sweep.h) and
   /// arms of revolute joints in space (arm_sweep.h).
   bool RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics, std::span<const S> q,

@@ -1,5 +1,7 @@
 #include "mechanism/formulation/constraint_solver.h"
 
+#include <stdexcept>
+
 #include "mechanism/algebra/instantiate.h"
 
 namespace loopbench {
@@ -8,6 +10,11 @@ template <class Space, class S>
 bool ConstraintSolver<Space, S>::Accelerate(const Kinematics<Space, S>&, const VectorX<S>&,
                                             VectorX<S>&, VectorX<S>*) {
   return false;
+}
+
+template <class Space, class S>
+void ConstraintSolver<Space, S>::SolveWrenches(const VectorX<S>&, VectorX<S>&, VectorX<S>*) {
+  throw std::logic_error("a solver that takes wrenches does not solve for them");
 }
 
 template <class Space, class S>

@@ -80,6 +80,14 @@ class ConstraintSolver {
   virtual bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
                           VectorX<S>& udot, VectorX<S>* lambda);
 
+  /// Whether forces that replace constraint forces must be given as wrenches to SolveWrenches(),
+  /// instead of along the coordinates to Solve() (the default). True if Factor() may regularize
+  /// joints of the forest: coordinates do not contain their constraint forces. Needs Accelerate().
+  virtual bool TakesWrenches() const { return false; }
+  /// Computes x and, unless null, lambda, of wrenches on bodies alone, after Factor(): [moment;
+  /// force] at the centres of mass in ground axes, body by body, Ground first.
+  virtual void SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda);
+
   /// Fast path for a whole right-hand side without feedback and drives: qdot and udot at (q, u),
   /// equal to Factor() and Accelerate() up to round-off, after CompleteSpeeds() if requested.
   /// Returns false (the default) if there is none or Factor() must judge the position. Does not

@@ -47,11 +47,12 @@ Passage<Space, S>::Passage(const Mechanism<Space, S>& mechanism, ConstraintSolve
       there_(rates_),
       moved_(rates_),
       udot_(VectorX<S>::Zero(mechanism.num_u())),
-      force_(udot_),
-      change_(udot_),
+      force_(VectorX<S>::Zero(solver.TakesWrenches() ? Space::kDim * mechanism.num_bodies()
+                                                     : mechanism.num_u())),
+      change_(force_),
       rows_(VectorX<S>::Zero(mechanism.num_equations())),
       nothing_(rows_) {
-  means_.fill(udot_);
+  means_.fill(force_);
 }
 
 template <class Space, class S>
@@ -95,7 +96,7 @@ Nearby Passage<Space, S>::Judge(const Kinematics<Space, S>& at, S least, S step)
   return lowest > S(kPassed * kRegularization) ? Nearby::kRegular : Nearby::kOneBranch;
 }
 
-/// M udot + h of the accelerations there.
+/// M udot + h of the accelerations there, or body by body.
 template <class Space, class S>
 bool Passage<Space, S>::FindForce(VectorX<S>& force) {
   if (solver_.conditioning().smallest_weight < kRegularWeight) return false;
@@ -105,7 +106,14 @@ bool Passage<Space, S>::FindForce(VectorX<S>& force) {
     force = -force;
     solver_.Solve(force, rows_, udot_, nullptr);
   }
-  dynamics_.Residual(state_.kinematics(), udot_, nothing_, force, rows_);
+  if (solver_.TakesWrenches()) {
+    const auto wrenches = dynamics_.WrenchesLeft(state_.kinematics(), udot_, nothing_);
+    for (Eigen::Index i = Space::kDim; i < force.size(); ++i) {
+      force[i] = wrenches[static_cast<std::size_t>(i / Space::kDim)][i % Space::kDim];
+    }
+  } else {
+    dynamics_.Residual(state_.kinematics(), udot_, nothing_, force, rows_);
+  }
   return force.allFinite();
 }
 
@@ -129,8 +137,8 @@ bool Passage<Space, S>::Interpolate(const Kinematics<Space, S>& at, S step) {
   sum(pairs, force_);
   sum(kPairs - 1, change_);
   const S difference = (change_ - force_).norm();
-  dynamics_.Bias(state_.kinematics(), change_);
-  is_smooth_ = pairs == kPairs && difference < S(kRough) * std::max(force_.norm(), change_.norm());
+  dynamics_.Bias(state_.kinematics(), udot_);
+  is_smooth_ = pairs == kPairs && difference < S(kRough) * std::max(force_.norm(), udot_.norm());
   return true;
 }
 

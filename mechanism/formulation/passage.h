@@ -8,9 +8,10 @@
 //
 //   f(0) = (15 f_1 - 6 f_2 + f_3) / 10 + O(s^6).
 //
-// Solvers add f to the applied forces. Directions that are not regularized compensate it. Round-off
-// e of projected positions causes errors of e / s^3 in f, so s is large; where the last term of the
-// sum shows that f is not smooth on this scale, s is smaller.
+// Solvers add f to the applied forces. Directions that are not regularized compensate it. f is J^T
+// lambda, or the constraint wrenches on all bodies for solvers that regularize joints of the
+// forest. Round-off e of projected positions causes errors of e / s^3 in f, so s is large; where
+// the last term of the sum shows that f is not smooth on this scale, s is smaller.
 //
 // A motion that passes a singular configuration at a small distance has no such f. It turns, or the
 // least eigenvalue of the loops has a minimum above zero. Its positions are regular.
@@ -45,7 +46,7 @@ class Passage {
   /// Looks ahead and behind from the state `at`, whose factors the solver has. Afterwards the
   /// solver has factors of other positions.
   Nearby Look(const Kinematics<Space, S>& at);
-  /// J^T lambda of the constraints after Look() with kOneBranch.
+  /// Forces of the constraints after Look() with kOneBranch, for Solve() or SolveWrenches().
   const VectorX<S>& Force() const { return force_; }
   /// Share for regularization together with this force.
   double regularization() const { return is_smooth_ ? kSmoothRegularization : kRegularization; }
@@ -60,7 +61,7 @@ class Passage {
   /// Whether the motion passes at a distance, from positions at -step and step; `least` is the
   /// eigenvalue between.
   Nearby Judge(const Kinematics<Space, S>& at, S least, S step);
-  /// J^T lambda where Move() ended. False if a direction is regularized there.
+  /// Forces of the constraints where Move() ended. False if a direction is regularized there.
   bool FindForce(VectorX<S>& force);
   /// Sets force_ from as many pairs of positions at multiples of -step and step as are not
   /// regularized, and is_smooth_. False if there are none.

@@ -128,7 +128,12 @@ void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
   VectorX<S>* multipliers = shares_ && lambda == nullptr ? &lambda_change_ : lambda;
   if (!solver_->Accelerate(kinematics(), *feedback_, udot_, multipliers)) SolveFormed(multipliers);
   if (carried_ != nullptr) {
-    solver_->Solve(*carried_, nothing_, change_, lambda != nullptr ? &lambda_change_ : nullptr);
+    VectorX<S>* multiplier_change = lambda != nullptr ? &lambda_change_ : nullptr;
+    if (solver_->TakesWrenches()) {
+      solver_->SolveWrenches(*carried_, change_, multiplier_change);
+    } else {
+      solver_->Solve(*carried_, nothing_, change_, multiplier_change);
+    }
     udot_ += change_;
     if (lambda != nullptr) *lambda += lambda_change_;
   }

@@ -64,6 +64,19 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
   SetFree(kinematics, false);
 }
 
+template <class Space, class S>
+void BodyEquations<Space, S>::SetWrenches(const Kinematics<Space, S>& kinematics,
+                                          const VectorX<S>& wrenches) {
+  known_.setZero();
+  for (Components<Space, S>& c0 : c0_) c0.setZero();
+  for (std::size_t body = 0; body < wrenches_.size(); ++body) {
+    for (int d = 0; d < Space::kDim; ++d) {
+      wrenches_[body][d] = wrenches[static_cast<Eigen::Index>(body) * Space::kDim + d];
+    }
+  }
+  SetFree(kinematics, false);
+}
+
 /// n_Q - n_P - g is the part of (7) besides the accelerations at centres of mass and H udot, at Mo
 /// in ground axes. Its components along D are c0, to which feedback adds; components along H belong
 /// to udot.

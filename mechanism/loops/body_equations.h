@@ -28,6 +28,8 @@ class BodyEquations {
   /// b and c0 of ConstraintSolver::Solve(): a force along a tree joint is a pair of wrenches.
   void SetForce(const Kinematics<Space, S>& kinematics, const VectorX<S>& force,
                 const VectorX<S>& target);
+  /// For ConstraintSolver::SolveWrenches(): b of the wrenches, and c0 = 0.
+  void SetWrenches(const Kinematics<Space, S>& kinematics, const VectorX<S>& wrenches);
   /// For ConstraintSolver::Accelerate(): b from the wrenches of applied forces less w x I w.
   void SetState(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback);
   /// Sets the velocity violation of `kinematics` as the only load.

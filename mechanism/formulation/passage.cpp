@@ -108,8 +108,9 @@ bool Passage<Space, S>::FindForce(VectorX<S>& force) {
   }
   if (solver_.TakesWrenches()) {
     const auto wrenches = dynamics_.WrenchesLeft(state_.kinematics(), udot_, nothing_);
-    for (Eigen::Index i = Space::kDim; i < force.size(); ++i) {
-      force[i] = wrenches[static_cast<std::size_t>(i / Space::kDim)][i % Space::kDim];
+    for (std::size_t body = 1; body < wrenches.size(); ++body) {
+      const auto first = static_cast<Eigen::Index>(body) * Space::kDim;
+      for (int d = 0; d < Space::kDim; ++d) force[first + d] = wrenches[body][d];
     }
   } else {
     dynamics_.Residual(state_.kinematics(), udot_, nothing_, force, rows_);

@@ -150,7 +150,7 @@ void ReadAssets(const XmlElement& root, MjcfModel* model) {
         (name ? *name : *file).Fail("a name that no other mesh has");
       }
     }
-    model->draft->DropWhole(assets, "only masses of meshes matter");
+    model->draft->DropWhole(assets, "only masses of meshes and attached models matter");
   }
 }
 

@@ -31,8 +31,11 @@ CoupledSolver<Space, S>::CoupledSolver(const Mechanism<Space, S>& mechanism,
       num_couplings_(std::ssize(mechanism.couplings())),
       rows_(VectorX<S>::Zero(mechanism.num_rows())),
       lambda_(rows_),
-      force_(VectorX<S>::Zero(mechanism.num_u())),
-      column_(force_) {
+      lambda_change_(rows_),
+      rest_(VectorX<S>::Zero(mechanism.num_u())),
+      force_(rest_),
+      column_(rest_),
+      A_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()) {
   const std::vector<Rotor<S>>& rotors = mechanism.rotors();
   const Eigen::Index rows = num_couplings_ + std::ssize(rotors);
   G_.setZero(rows, mechanism.num_u());
@@ -110,10 +113,17 @@ int CoupledSolver<Space, S>::FactorResponse() {
 }
 
 template <class Space, class S>
-void CoupledSolver<Space, S>::Couple(const VectorX<S>& target, VectorX<S>& x) {
-  left_.noalias() = G_ * x;
-  left_ = -left_;
-  if (target.size() > rows_.size()) left_.head(num_couplings_) += target.tail(num_couplings_);
+void CoupledSolver<Space, S>::SetTarget(const VectorX<S>& target) {
+  rows_.setZero();
+  left_.setZero();
+  const Eigen::Index rows = std::min(target.size(), rows_.size());
+  rows_.head(rows) = target.head(rows);
+  if (target.size() > rows_.size()) left_.head(num_couplings_) = target.tail(num_couplings_);
+}
+
+template <class Space, class S>
+void CoupledSolver<Space, S>::Couple(VectorX<S>& x) {
+  left_.noalias() -= G_ * x;
   mu_.setZero();
   // L z = scaled left, then L^T z
   for (int i = 0; i < rank_; ++i) {
@@ -131,24 +141,60 @@ void CoupledSolver<Space, S>::Couple(const VectorX<S>& target, VectorX<S>& x) {
 }
 
 template <class Space, class S>
+void CoupledSolver<Space, S>::PutMultipliers(VectorX<S>& lambda) {
+  force_.noalias() = G_.transpose() * mu_;
+  rows_.setZero();
+  inner_->Solve(force_, rows_, column_, &lambda_change_);
+  lambda.resize(lambda_.size() + num_couplings_);
+  lambda << lambda_ + lambda_change_, mu_.head(num_couplings_);
+}
+
+template <class Space, class S>
 void CoupledSolver<Space, S>::Solve(const VectorX<S>& force, const VectorX<S>& target,
                                     VectorX<S>& x, VectorX<S>* lambda) {
-  rows_ = target.head(rows_.size());
-  inner_->Solve(force, rows_, x, nullptr);
-  Couple(target, x);
-  if (lambda == nullptr) return;
-  force_.noalias() = G_.transpose() * mu_;
-  if (force.size() > 0) force_ += force;
-  inner_->Solve(force_, rows_, column_, &lambda_);
-  lambda->resize(lambda_.size() + num_couplings_);
-  *lambda << lambda_, mu_.head(num_couplings_);
+  SetTarget(target);
+  inner_->Solve(force, rows_, x, lambda != nullptr ? &lambda_ : nullptr);
+  Couple(x);
+  if (lambda != nullptr) PutMultipliers(*lambda);
+}
+
+/// Without forces of inertia, left_ contains the accelerations for udot = 0, also of rotors.
+template <class Space, class S>
+bool CoupledSolver<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics,
+                                         const VectorX<S>& feedback, VectorX<S>& udot,
+                                         VectorX<S>* lambda) {
+  SetTarget(feedback);
+  if (!inner_->Accelerate(kinematics, rows_, udot, lambda != nullptr ? &lambda_ : nullptr)) {
+    return false;
+  }
+  dynamics_.BodyAccelerations(kinematics, rest_, A_);
+  for (int c = 0; c < num_couplings_; ++c) {
+    left_[c] += CouplingAcceleration<Space, S>(kinematics, c, nullptr, A_);
+  }
+  for (std::size_t r = 0; r < mechanism_.rotors().size(); ++r) {
+    left_[num_couplings_ + static_cast<Eigen::Index>(r)] =
+        CoordinateAcceleration<Space, S>(kinematics, mechanism_.rotors()[r].joint, A_);
+  }
+  left_ = -left_;
+  Couple(udot);
+  if (lambda != nullptr) PutMultipliers(*lambda);
+  return true;
+}
+
+template <class Space, class S>
+void CoupledSolver<Space, S>::SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x,
+                                            VectorX<S>* lambda) {
+  left_.setZero();
+  inner_->SolveWrenches(wrenches, x, lambda != nullptr ? &lambda_ : nullptr);
+  Couple(x);
+  if (lambda != nullptr) PutMultipliers(*lambda);
 }
 
 template <class Space, class S>
 void CoupledSolver<Space, S>::Correct(const VectorX<S>& target, VectorX<S>& x) {
-  rows_ = target.head(rows_.size());
+  SetTarget(target);
   inner_->Correct(rows_, x);
-  Couple(target, x);
+  Couple(x);
 }
 
 template <class Space, class S>

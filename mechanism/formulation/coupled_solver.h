@@ -38,6 +38,10 @@ class CoupledSolver final : public ConstraintSolver<Space, S> {
   Outcome Factor(const Kinematics<Space, S>& kinematics) override;
   void Solve(const VectorX<S>& force, const VectorX<S>& target, VectorX<S>& x,
              VectorX<S>* lambda) override;
+  bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
+                  VectorX<S>& udot, VectorX<S>* lambda) override;
+  bool TakesWrenches() const override { return inner_->TakesWrenches(); }
+  void SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda) override;
   /// The inner solver's change, then the smallest in the metric of the masses that satisfies the
   /// couplings.
   void Correct(const VectorX<S>& target, VectorX<S>& x) override;
@@ -52,8 +56,12 @@ class CoupledSolver final : public ConstraintSolver<Space, S> {
  private:
   /// Factors the scaled sum X + diag(0, I^-1); returns its rank.
   int FactorResponse();
-  /// Sets mu_, efforts of couplings, then of rotors, and adds Y mu to x = x0.
-  void Couple(const VectorX<S>& target, VectorX<S>& x);
+  /// Sets rows_ and left_ from rows of joints and couplings, as far as there are any.
+  void SetTarget(const VectorX<S>& target);
+  /// Sets mu_, efforts of couplings, then of rotors, for [d; 0] in left_. Adds Y mu to x = x0.
+  void Couple(VectorX<S>& x);
+  /// Multipliers after Couple(), if lambda_ contains the inner solver's.
+  void PutMultipliers(VectorX<S>& lambda);
 
   const Mechanism<Space, S>& mechanism_;
   std::unique_ptr<ConstraintSolver<Space, S>> inner_;
@@ -65,7 +73,8 @@ class CoupledSolver final : public ConstraintSolver<Space, S> {
   VectorX<S> scale_;        ///< 1 / sqrt(FreeResponseOf() + yield_)
   std::vector<int> order_;  ///< rows of G_ by pivot
   int rank_ = 0;            ///< of X_
-  VectorX<S> rows_, lambda_, force_, column_, mu_, left_;
+  VectorX<S> rows_, lambda_, lambda_change_, rest_, force_, column_, mu_, left_;
+  std::vector<Acceleration<Space, S>> A_;
 };
 
 }  // namespace loopbench

@@ -307,8 +307,18 @@ void TreeDynamics<Space, S>::CouplingJacobian(const Kinematics<Space, S>& kinema
   for (std::size_t r = 0; r < rotors; ++r) add(couplings + r, mechanism.rotors()[r].joint, S(1));
 }
 
-/// A joint of the forest has its udot; of a cut joint it is H^T (A_Q - A_P - g) / |H|^2, where g
-/// has a prescribed acceleration.
+/// H^T (A_Q - A_P - g) / |H|^2, where g has a prescribed acceleration.
+template <class Space, class S>
+S CoordinateAcceleration(const Kinematics<Space, S>& kinematics, int index,
+                         std::span<const Acceleration<Space, S>> A) {
+  const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  S sum = joint.kind->inverse_H_squared * kinematics.joints()[index].basis[0].dot(
+                                              RelativeAcceleration<Space, S>(kinematics, index, A));
+  if (joint.num_drives > 0) sum += kinematics.drives()[joint.first_drive].acceleration;
+  return sum;
+}
+
+/// A free joint of the forest has its udot.
 template <class Space, class S>
 S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, const VectorX<S>* udot,
                        std::span<const Acceleration<Space, S>> A) {
@@ -316,21 +326,17 @@ S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, con
   S sum = S(0);
   for (const auto& [index, ratio] : mechanism.couplings()[coupling].parts) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
-    if (joint.num_drives > 0) {
+    if (!joint.in_tree()) {
+      sum += ratio * CoordinateAcceleration<Space, S>(kinematics, index, A);
+    } else if (joint.num_drives > 0) {
       sum += ratio * kinematics.drives()[joint.first_drive].acceleration;
-    } else if (joint.in_tree() && udot != nullptr) {
+    } else if (udot != nullptr) {
       sum += ratio * (*udot)[joint.u_offset];
     }
-    if (joint.in_tree()) continue;
-    sum += ratio * joint.kind->inverse_H_squared *
-           kinematics.joints()[index].basis[0].dot(
-               RelativeAcceleration<Space, S>(kinematics, index, A));
   }
   return sum;
 }
 
-/// The acceleration along the coordinate is H^T (A_Q - A_P - g) / |H|^2, where g has a prescribed
-/// one.
 template <class Space, class S>
 void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
                       std::span<const Acceleration<Space, S>> A,
@@ -339,10 +345,8 @@ void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
     const Direction<Space, S>& H = state.basis[0];
-    S acceleration =
-        joint.kind->inverse_H_squared * H.dot(RelativeAcceleration<Space, S>(kinematics, index, A));
-    if (joint.num_drives > 0) acceleration += kinematics.drives()[joint.first_drive].acceleration;
-    const Wrench<Space, S> F = H * (joint.kind->inverse_H_squared * inertia * acceleration);
+    const Wrench<Space, S> F = H * (joint.kind->inverse_H_squared * inertia *
+                                    CoordinateAcceleration<Space, S>(kinematics, index, A));
     wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
     wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
   }
@@ -464,6 +468,8 @@ JointMatrix<S> FreeResponse(const Kinematics<Space, S>& kinematics, Masses masse
                                                        std::span<const Acceleration<Space, S>>); \
   template Components<Space, S> JointAcceleration(const Kinematics<Space, S>&, int,              \
                                                   std::span<const Acceleration<Space, S>>);      \
+  template S CoordinateAcceleration(const Kinematics<Space, S>&, int,                            \
+                                    std::span<const Acceleration<Space, S>>);                    \
   template S CouplingAcceleration(const Kinematics<Space, S>&, int, const VectorX<S>*,           \
                                   std::span<const Acceleration<Space, S>>);                      \
   template void AddRotorWrenches(const Kinematics<Space, S>&,                                    \

@@ -108,6 +108,12 @@ template <class Space, class S>
 Components<Space, S> JointAcceleration(const Kinematics<Space, S>& kinematics, int joint,
                                        std::span<const Acceleration<Space, S>> A);
 
+/// Acceleration along the one coordinate of a joint, prescribed or free, from the accelerations A
+/// of all centres of mass.
+template <class Space, class S>
+S CoordinateAcceleration(const Kinematics<Space, S>& kinematics, int joint,
+                         std::span<const Acceleration<Space, S>> A);
+
 /// Second derivative of a coupling's mismatch, from the accelerations A of all centres of mass and
 /// the udot that they belong to; null: zero.
 template <class Space, class S>

@@ -10,7 +10,7 @@
 #include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench {
-namespace {
+namespace assembly_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -266,5 +266,5 @@ TEST(AssemblyTest, PerturbMovesHeldCoordinatesAndIsDeterministic) {
   EXPECT_NE(moved, Perturb(d, 1e-3, 8, 2).initial.coordinates[0].values[0]);
 }
 
-}  // namespace
+}  // namespace assembly_test
 }  // namespace loopbench

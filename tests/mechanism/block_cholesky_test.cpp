@@ -9,7 +9,7 @@
 #include <random>
 
 namespace loopbench {
-namespace {
+namespace block_cholesky_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr double kNoLimit = 1e9;
@@ -179,5 +179,5 @@ TEST(BlockCholeskyTest, TellsWhatPivotsHaveLost) {
   EXPECT_EQ(std::min(factors.ratio(0), factors.ratio(1)), 0.0);
 }
 
-}  // namespace
+}  // namespace block_cholesky_test
 }  // namespace loopbench

@@ -10,7 +10,7 @@
 #include "tests/mechanism/scramble.h"
 
 namespace loopbench::testing {
-namespace {
+namespace compile_planar_test {
 
 TEST(CompilePlanarTest, TiltedPlanarMechanismsBecomePlanar) {
   std::vector<MechanismDescription> mechanisms;
@@ -90,5 +90,5 @@ TEST(CompilePlanarTest, ForcesAndGravityAlongTheNormalAreDroppedAndReported) {
   EXPECT_EQ(compiled.parts[0].description.gravity.z(), 0.0);
 }
 
-}  // namespace
+}  // namespace compile_planar_test
 }  // namespace loopbench::testing

@@ -9,7 +9,7 @@
 #include "tests/mechanism/compiled_motion.h"
 
 namespace loopbench::testing {
-namespace {
+namespace compile_test {
 
 TEST(CompileTest, WeldedBodiesMoveAsOne) {
   int merged = 0;
@@ -214,5 +214,5 @@ TEST(CompileTest, NothingIsDoneWhenAllIsOffOrNothingIsToSave) {
   EXPECT_EQ(same.parts[0].description.joints.size(), 6u);
 }
 
-}  // namespace
+}  // namespace compile_test
 }  // namespace loopbench::testing

@@ -15,7 +15,7 @@
 #include "tests/contract/comparison.h"
 
 namespace loopbench {
-namespace {
+namespace direction_weights_test {
 
 DirectionWeights<double> WeightsOf(MatrixX<double> X, std::span<const int> rows) {
   DirectionWeights<double> weights(rows);
@@ -96,5 +96,5 @@ TEST(DirectionWeightsTest, WhatIsNotFiniteIsLeftOut) {
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(weights.IsLeftOut(i));
 }
 
-}  // namespace
+}  // namespace direction_weights_test
 }  // namespace loopbench

@@ -10,7 +10,7 @@
 #include "tests/mechanism/samples.h"
 
 namespace loopbench {
-namespace {
+namespace forces_test {
 
 using testing::ForBothSets;
 using testing::kKind;
@@ -247,5 +247,5 @@ TEST(ForceElementsTest, WhatIsWrongWithAForceIsNamed) {
   }
 }
 
-}  // namespace
+}  // namespace forces_test
 }  // namespace loopbench

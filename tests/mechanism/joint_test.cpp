@@ -8,7 +8,7 @@
 #include "tests/contract/oracle.h"
 
 namespace loopbench {
-namespace {
+namespace joint_test {
 
 using testing::Jet;
 using testing::JetPose;
@@ -239,5 +239,5 @@ TEST(HelixTest, TurnsAreCounted) {
   }
 }
 
-}  // namespace
+}  // namespace joint_test
 }  // namespace loopbench

@@ -11,7 +11,7 @@
 #include "tests/mechanism/samples.h"
 
 namespace loopbench {
-namespace {
+namespace kinematics_test {
 
 using testing::kKind;
 using testing::Oracle;
@@ -193,5 +193,5 @@ TYPED_TEST(KinematicsTest, CoordinatesMoveBetweenSetsAndBack) {
   }
 }
 
-}  // namespace
+}  // namespace kinematics_test
 }  // namespace loopbench

@@ -11,7 +11,7 @@
 #include <vector>
 
 namespace loopbench {
-namespace {
+namespace lanes_test {
 
 /// Distance from a long double in units of the last place of the result.
 double Ulps(double value, long double exact) {
@@ -75,5 +75,5 @@ TEST(Lanes, MoveOnAndBack) {
   }
 }
 
-}  // namespace
+}  // namespace lanes_test
 }  // namespace loopbench

@@ -9,7 +9,7 @@
 #include "mechanism/algebra/decompositions.h"
 
 namespace loopbench {
-namespace {
+namespace least_squares_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -81,5 +81,5 @@ TEST(LeastSquaresTest, DampedMinimisesBoth) {
   }
 }
 
-}  // namespace
+}  // namespace least_squares_test
 }  // namespace loopbench

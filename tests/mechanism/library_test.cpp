@@ -8,7 +8,7 @@
 #include "odca/odca.h"
 
 namespace loopbench {
-namespace {
+namespace library_test {
 
 struct Shape {
   int loops, freedom;
@@ -89,5 +89,5 @@ TEST(LibraryTest, ArmsAreOpenAndRingsHaveOneLoopThatTakesSixSpeeds) {
   EXPECT_EQ(ShapeOf<Spatial>(Arm(6, true)).freedom, 1);
 }
 
-}  // namespace
+}  // namespace library_test
 }  // namespace loopbench

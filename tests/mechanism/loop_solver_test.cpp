@@ -14,7 +14,7 @@
 #include "tests/contract/comparison.h"
 
 namespace loopbench {
-namespace {
+namespace loop_solver_test {
 
 using testing::Random;
 
@@ -212,5 +212,5 @@ TEST(LoopSolverTest, UnitsChangeNeitherRankNorSolution) {
   }
 }
 
-}  // namespace
+}  // namespace loop_solver_test
 }  // namespace loopbench

@@ -11,7 +11,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench {
-namespace {
+namespace mobility_test {
 
 using testing::Shipped;
 
@@ -158,5 +158,5 @@ TEST(RankOfGeometry, KnowsEachPartByItself) {
   }
 }
 
-}  // namespace
+}  // namespace mobility_test
 }  // namespace loopbench

@@ -11,7 +11,7 @@
 #include "mechanism/start/assembly.h"
 
 namespace loopbench {
-namespace {
+namespace nearest_start_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -279,5 +279,5 @@ TEST(NearestStartTest, HeldValuesAreExact) {
   }
 }
 
-}  // namespace
+}  // namespace nearest_start_test
 }  // namespace loopbench

@@ -12,7 +12,7 @@
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench {
-namespace {
+namespace poses_test {
 
 using Eigen::Vector3d;
 
@@ -160,5 +160,5 @@ TEST(Poses, OfFreeBodiesInSpace) {
   EXPECT_LE((p - *d.initial.poses[0].at).norm(), 256 * kEps);
 }
 
-}  // namespace
+}  // namespace poses_test
 }  // namespace loopbench

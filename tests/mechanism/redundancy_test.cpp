@@ -13,7 +13,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench {
-namespace {
+namespace redundancy_test {
 
 using testing::Shipped;
 
@@ -231,5 +231,5 @@ TEST(RedundancyTest, ReleasedDirectionsAreStillMeasured) {
   EXPECT_EQ(b.joints()[3].rows(), 2);
 }
 
-}  // namespace
+}  // namespace redundancy_test
 }  // namespace loopbench

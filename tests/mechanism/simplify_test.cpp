@@ -12,7 +12,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench::testing {
-namespace {
+namespace simplify_test {
 
 const Eigen::Vector3d kOrigin = Eigen::Vector3d::Zero(), kX = Eigen::Vector3d::UnitX();
 
@@ -364,5 +364,5 @@ TEST(SimplifiedTest, RandomMechanismsHaveModelsThatStart) {
   EXPECT_GT(applied, 20) << "otherwise nothing was tested";
 }
 
-}  // namespace
+}  // namespace simplify_test
 }  // namespace loopbench::testing

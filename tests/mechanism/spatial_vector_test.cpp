@@ -11,7 +11,7 @@
 #include "tests/contract/generators.h"
 
 namespace loopbench {
-namespace {
+namespace spatial_vector_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -131,5 +131,5 @@ TEST(QuaternionTest, OrientationsGoThereAndBack) {
   }
 }
 
-}  // namespace
+}  // namespace spatial_vector_test
 }  // namespace loopbench

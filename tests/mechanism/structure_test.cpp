@@ -10,7 +10,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench {
-namespace {
+namespace structure_test {
 
 using testing::Shipped;
 
@@ -204,5 +204,5 @@ TEST(StructureTest, NearlyFlatTriangleIsBadlyConditioned) {
   }
 }
 
-}  // namespace
+}  // namespace structure_test
 }  // namespace loopbench

@@ -9,7 +9,7 @@
 #include "tests/contract/time_oracle.h"
 
 namespace loopbench {
-namespace {
+namespace time_function_test {
 
 using testing::Jet;
 using testing::OracleAt;
@@ -157,5 +157,5 @@ TEST(TimeFunctionTest, WhatIsWrongWithADescriptionIsNamed) {
   EXPECT_NE(Validate(TimeTable{.times = {0.0, NAN}, .values = {1.0, 2.0}}), "");
 }
 
-}  // namespace
+}  // namespace time_function_test
 }  // namespace loopbench

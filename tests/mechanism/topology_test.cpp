@@ -10,7 +10,7 @@
 #include "tests/contract/generators.h"
 
 namespace loopbench {
-namespace {
+namespace topology_test {
 
 /// Four-bar whose joints are listed OA, AB, BC, OC and carry no values.
 MechanismDescription FourBar() {
@@ -97,5 +97,5 @@ TEST(TopologyTest, ReversedJointsAreWalkedAgainstTheirDirection) {
   EXPECT_EQ(mechanism.tree()[1].sign, -1);
 }
 
-}  // namespace
+}  // namespace topology_test
 }  // namespace loopbench

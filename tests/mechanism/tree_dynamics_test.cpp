@@ -10,7 +10,7 @@
 #include "tests/contract/generators.h"
 
 namespace loopbench {
-namespace {
+namespace tree_dynamics_test {
 
 using testing::Equations;
 using testing::Oracle;
@@ -121,5 +121,5 @@ TYPED_TEST(TreeDynamicsTest, JacobianIsTheDerivativeOfTheMismatch) {
   });
 }
 
-}  // namespace
+}  // namespace tree_dynamics_test
 }  // namespace loopbench

@@ -8,7 +8,7 @@
 #include <set>
 
 namespace loopbench {
-namespace {
+namespace worker_pool_test {
 
 TEST(WorkerPool, DoesEachPieceOnce) {
   for (const int threads : {1, 2, 3, 8}) {
@@ -56,5 +56,5 @@ TEST(WorkerPool, WorkersThatSleepWakeUp) {
   }
 }
 
-}  // namespace
+}  // namespace worker_pool_test
 }  // namespace loopbench

@@ -14,7 +14,7 @@
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::arms {
-namespace {
+namespace arm_sweep_test {
 
 Both Compare(const Mechanism<Spatial, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
              const Numbers& u, int bodies_of_group = ArmSweep::kBodiesOfGroup) {
@@ -215,5 +215,5 @@ TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {
   EXPECT_EQ(ProductsOf([&] { OppositeBefore(turn, F, force); }), Operations::kOpposite);
 }
 
-}  // namespace
+}  // namespace arm_sweep_test
 }  // namespace loopbench::odca::arms

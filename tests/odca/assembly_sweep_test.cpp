@@ -12,7 +12,7 @@
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
-namespace {
+namespace assembly_sweep_test {
 
 using Model = Mechanism<Planar, double>;
 
@@ -210,5 +210,5 @@ TEST(AssemblySweep, LeavesOthersToTheGeneralSweep) {
   EXPECT_EQ(make(slides), nullptr);
 }
 
-}  // namespace
+}  // namespace assembly_sweep_test
 }  // namespace loopbench::odca::pins

@@ -15,7 +15,7 @@
 #include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
-namespace {
+namespace extremes_test {
 
 constexpr SpaceKind kPlane = SpaceKind::kPlanar, kSpace = SpaceKind::kSpatial;
 constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -144,5 +144,5 @@ TEST(ExtremesTest, SmallOnesAgreeWithTheOracle) {
   loops.Finish();
 }
 
-}  // namespace
+}  // namespace extremes_test
 }  // namespace loopbench::odca

@@ -13,7 +13,7 @@
 #include "harness/text/files.h"
 
 namespace loopbench::odca {
-namespace {
+namespace index_test {
 
 namespace fs = std::filesystem;
 
@@ -168,5 +168,5 @@ TEST(PaperIndexTest, CommentsCiteWhatTheIndexMapsToTheirFile) {
   EXPECT_GE(citations, 40u);
 }
 
-}  // namespace
+}  // namespace index_test
 }  // namespace loopbench::odca

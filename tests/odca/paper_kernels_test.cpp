@@ -10,7 +10,7 @@
 #include "tests/odca/paper_series.h"
 
 namespace loopbench::odca::paper {
-namespace {
+namespace paper_kernels_test {
 
 /// Of the kernels' numbers, which are projected on the D of pins.
 RealMatrix ToReal(const pins::Matrix2<double>& A) {
@@ -243,5 +243,5 @@ TEST(PaperTest, RevoluteKernelsAreThePrintedFormulas) {
   EXPECT_GE(tally.assemblies, 5 * tally.scenes);
 }
 
-}  // namespace
+}  // namespace paper_kernels_test
 }  // namespace loopbench::odca::paper

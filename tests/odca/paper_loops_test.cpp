@@ -11,7 +11,7 @@
 #include "tests/odca/paper_series.h"
 
 namespace loopbench::odca::paper {
-namespace {
+namespace paper_loops_test {
 
 /// Figure 4: Ground, 1, 2, 3, Ground are the upper loop, 2, 4, 5, 6, 2 the lower one. Body 2 has
 /// its handle 2+ where the joints to 1 and 4 are, 2- where those to 3 and 6 are; it is Q of all
@@ -202,5 +202,5 @@ TEST(PaperTest, Equation72LacksAFactorInPrint) {
   EXPECT_LE(3 * tally.left_out, tally.scenes);
 }
 
-}  // namespace
+}  // namespace paper_loops_test
 }  // namespace loopbench::odca::paper

@@ -9,7 +9,7 @@
 #include "tests/odca/paper_series.h"
 
 namespace loopbench::odca::paper {
-namespace {
+namespace paper_test {
 
 MechanismDescription ChainOfKinds(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("paper-chain", space, seed);
@@ -168,5 +168,5 @@ TEST(PaperTest, ChiOfAPlanarLoopInSpaceIsNotPositiveDefinite) {
   EXPECT_GE(eigenvalues[3], 1e-4L * largest);
 }
 
-}  // namespace
+}  // namespace paper_test
 }  // namespace loopbench::odca::paper

@@ -9,7 +9,7 @@
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
-namespace {
+namespace path_lane_test {
 
 using LaneSweep = PathSweepOf<Lanes>;
 
@@ -152,5 +152,5 @@ TEST_P(PathLaneTest, ServesSolversOfRunsSideBySide) {
   EXPECT_EQ(testing::CountAllocations(), before);
 }
 
-}  // namespace
+}  // namespace path_lane_test
 }  // namespace loopbench::odca::pins

@@ -15,7 +15,7 @@
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
-namespace {
+namespace path_sweep_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -270,5 +270,5 @@ TEST(Paths, AreFoundInAnyOrderOfJoints) {
   EXPECT_EQ(bodies(4, Joints{{0, 1, 2, 2}, {1, 1, 3, 2}, {2, 1, 4, 2}}), Found{}) << "a hub";
 }
 
-}  // namespace
+}  // namespace path_sweep_test
 }  // namespace loopbench::odca::pins

@@ -16,7 +16,7 @@
 #include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
-namespace {
+namespace plan_test {
 
 using testing::ConsistentState;
 using testing::RelativeError;
@@ -370,5 +370,5 @@ TEST(PlanTest, EveryOptionGivesTheSameAccelerations) {
   }
 }
 
-}  // namespace
+}  // namespace plan_test
 }  // namespace loopbench::odca

@@ -11,7 +11,7 @@
 #include "tests/odca/served.h"
 
 namespace loopbench::odca {
-namespace {
+namespace short_cut_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -318,5 +318,5 @@ TYPED_TEST(ShortCutTest, AllocatesNothing) {
   }
 }
 
-}  // namespace
+}  // namespace short_cut_test
 }  // namespace loopbench::odca

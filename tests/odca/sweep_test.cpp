@@ -11,7 +11,7 @@
 #include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
-namespace {
+namespace sweep_test {
 
 /// Operations of one evaluation; any position will do.
 long Operations(const MechanismDescription& description, SolverKind solver) {
@@ -76,5 +76,5 @@ TEST(SweepTest, LongDoubleAgreesWithDouble) {
 }
 #endif
 
-}  // namespace
+}  // namespace sweep_test
 }  // namespace loopbench::odca

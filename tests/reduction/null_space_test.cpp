@@ -10,7 +10,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench::reduction {
-namespace {
+namespace null_space_test {
 
 using testing::Random;
 using testing::Shipped;
@@ -165,5 +165,5 @@ TEST(NullSpaceTest, DirectionsFadeOutWithoutAJump) {
   EXPECT_LT(before, 1e-6);
 }
 
-}  // namespace
+}  // namespace null_space_test
 }  // namespace loopbench::reduction

@@ -12,7 +12,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench::reduction {
-namespace {
+namespace partition_test {
 
 using testing::Random;
 using testing::Shipped;
@@ -138,5 +138,5 @@ TEST(PartitionTest, RankDoesNotAskForMasses) {
   }
 }
 
-}  // namespace
+}  // namespace partition_test
 }  // namespace loopbench::reduction

@@ -12,7 +12,7 @@
 #include "tests/contract/generators.h"
 
 namespace loopbench::reduction {
-namespace {
+namespace sparse_lu_test {
 
 using testing::Random;
 
@@ -182,5 +182,5 @@ TEST(SparseLu, IsTheSameAfterOtherPivots) {
   EXPECT_GT(found - others, 20);
 }
 
-}  // namespace
+}  // namespace sparse_lu_test
 }  // namespace loopbench::reduction

@@ -17,7 +17,7 @@
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench::reduction {
-namespace {
+namespace sparse_partition_test {
 
 using testing::ConsistentState;
 using testing::Random;
@@ -345,5 +345,5 @@ TEST(Reduction, IsRightForTenThousandWindows) {
   EXPECT_GT(std::abs(most), 1.0);
 }
 
-}  // namespace
+}  // namespace sparse_partition_test
 }  // namespace loopbench::reduction

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <iostream>
 #include <numbers>
+#include <tuple>
 #include <vector>
 
 #include "harness/config/formulations.h"
 #include "harness/run/ensemble.h"
+#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
 #include "tests/harness/integrator_problems.h"
 #include "tests/reference/cases.h"
@@ -210,42 +212,131 @@ TEST(LadderOfForty, EndsWhereThePublishedOneDoes) {
   EXPECT_NEAR(tip.y(), end.y, 1e-5);
 }
 
-/// A parallelogram with one heavy or light bar, near the position in line: the accelerations of the
-/// swinging motion, which the regularized equations alone miss by up to 600 rad/s^2.
+/// A wheel on Ground that turns twice as fast as the first crank, and the rotor of a motor in the
+/// joint AB. Returns what they add to the moment of inertia about the pivot of the crank.
+double AddWheelAndRotor(MechanismDescription& description) {
+  BodyDescription wheel;
+  wheel.name = "wheel";
+  wheel.mass = 1.0;
+  wheel.inertia = 3.0 * Eigen::Matrix3d::Identity();
+  description.bodies.push_back(wheel);
+  description.joints.push_back(Revolute("W", 0, {0.0, 2.0, 0.0},
+                                        static_cast<int>(description.bodies.size()) - 1,
+                                        Eigen::Vector3d::Zero()));
+  description.couplings.push_back({"gear", {{4, 1.0}, {0, -2.0}}, 0.0});
+  description.joints[1].rotor_inertia = 0.5;
+  return 4.0 * 3.0 + 0.5;
+}
+
+/// A parallelogram with one heavy or light bar, with and without a wheel and a rotor, near the
+/// position in line: the accelerations of the swinging motion, which the regularized equations
+/// alone miss by up to 600 rad/s^2.
 TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
   // Round-off of 1e-16 in positions at the ends of the interpolated interval, 8e-3 rad from the
   // position in line, enters the forces there by its third power: 2e-9 of 10 m/s^2.
   const double bound = 1e-8;
-  for (const int bar : {1, 2, 3}) {
-    for (const double mass : {1.0, 1e6, 1e-6}) {
-      MechanismDescription description = Shipped("parallelogram").description;
-      std::vector<BodyDescription>& bodies = description.bodies;
-      bodies[bar].mass = mass;
-      bodies[bar].inertia = mass * Eigen::Matrix3d::Identity();
-      // The middle bar translates; each other one turns about its end, its inertia m * (1 m)^2.
-      const double torque = bodies[1].mass / 2 + bodies[2].mass + bodies[3].mass / 2;
-      const double inertia = 1.25 * bodies[1].mass + bodies[2].mass + 1.25 * bodies[3].mass;
-      const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
-      for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-        SCOPED_TRACE(fmt::format("{}, bar {} of {} kg", formulation, bar, mass));
-        const auto system = MakeFormulation<Planar>(
-            formulation, mechanism,
-            {.enforcement = Enforcement::kPosition, .solver = SolverKind::kRankRevealing});
-        const auto positions = [](double angle) {
-          return VectorX<double>{{-std::numbers::pi / 2 + angle, -angle, std::numbers::pi + angle}};
-        };
-        const auto velocities = [](double speed) {
-          return VectorX<double>{{speed, -speed, speed}};
-        };
-        ASSERT_EQ(system->Start(0.0, positions(0.06), velocities(0.0)), Outcome::kFinished);
-        std::vector<double> state(6), rates(6);
-        for (const double angle : {1e-3, 3e-4, 1e-4, 2e-5, 1e-6, -1e-5, -2e-4}) {
-          system->ToState(positions(angle), velocities(-0.13), state);
-          ASSERT_EQ(system->Examine(0.0, state, rates), Outcome::kFinished);
-          const double expected = -9.81 * std::sin(angle) * torque / inertia;
-          EXPECT_NEAR(rates[3], expected, bound) << angle;
-          EXPECT_NEAR(rates[4], -expected, bound) << angle;
-          EXPECT_NEAR(rates[5], expected, bound) << angle;
+  for (const auto& [bar, mass, is_coupled] : {std::tuple{1, 1.0, false},
+                                              {1, 1e6, false},
+                                              {1, 1e-6, false},
+                                              {2, 1e6, false},
+                                              {2, 1e-6, false},
+                                              {3, 1e6, false},
+                                              {3, 1e-6, false},
+                                              {1, 1.0, true},
+                                              {1, 1e6, true},
+                                              {2, 1e6, true},
+                                              {3, 1e6, true},
+                                              {3, 1e-6, true}}) {
+    MechanismDescription description = Shipped("parallelogram").description;
+    std::vector<BodyDescription>& bodies = description.bodies;
+    bodies[bar].mass = mass;
+    bodies[bar].inertia = mass * Eigen::Matrix3d::Identity();
+    // The middle bar translates; each other one turns about its end, its inertia m * (1 m)^2.
+    const double torque = bodies[1].mass / 2 + bodies[2].mass + bodies[3].mass / 2;
+    const double inertia = 1.25 * bodies[1].mass + bodies[2].mass + 1.25 * bodies[3].mass +
+                           (is_coupled ? AddWheelAndRotor(description) : 0.0);
+    const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+    // per angle of the cranks, by joint
+    const std::vector<double> ratios = {1.0, -1.0, 1.0, 0.0, 2.0};
+    const auto by_joint = [&](const std::vector<double>& at_rest, double factor) {
+      VectorX<double> values(mechanism.num_u());
+      for (std::size_t j = 0; j < mechanism.joints().size(); ++j) {
+        const int place = mechanism.joints()[j].u_offset;
+        if (place >= 0) values[place] = at_rest[j] + ratios[j] * factor;
+      }
+      return values;
+    };
+    const double pi = std::numbers::pi;
+    const std::vector<double> hanging = {-pi / 2, 0.0, pi, 0.0, -pi}, none(5, 0.0);
+    for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+      SCOPED_TRACE(fmt::format("{}, bar {} of {} kg{}", formulation, bar, mass,
+                               is_coupled ? ", wheel and rotor" : ""));
+      const auto system = MakeFormulation<Planar>(
+          formulation, mechanism,
+          {.enforcement = Enforcement::kPosition, .solver = SolverKind::kRankRevealing});
+      ASSERT_EQ(system->Start(0.0, by_joint(hanging, 0.06), by_joint(none, 0.0)),
+                Outcome::kFinished);
+      std::vector<double> state(system->size()), rates(state.size());
+      for (const double angle : {1e-3, 3e-4, 1e-4, 2e-5, 1e-6, -1e-5, -2e-4}) {
+        system->ToState(by_joint(hanging, angle), by_joint(none, -0.13), state);
+        ASSERT_EQ(system->Examine(0.0, state, rates), Outcome::kFinished);
+        const VectorX<double> expected = by_joint(none, -9.81 * std::sin(angle) * torque / inertia);
+        for (int i = 0; i < mechanism.num_u(); ++i) {
+          EXPECT_NEAR(rates[mechanism.num_q() + i], expected[i], bound) << angle;
+        }
+      }
+    }
+  }
+}
+
+/// The same parallelogram in space. Its third bar has spherical joints at both ends.
+TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranchInSpace) {
+  const double bound = 1e-8;  // as above
+  for (const auto& [bar, mass] :
+       {std::pair{1, 1.0}, {1, 1e6}, {1, 1e-6}, {2, 1e6}, {2, 1e-6}, {3, 1e6}, {3, 1e-6}}) {
+    MechanismDescription description =
+        InSpace(Shipped("parallelogram").description, Eigen::Vector3d::Zero());
+    std::vector<BodyDescription>& bodies = description.bodies;
+    bodies[bar].mass = mass;
+    bodies[bar].inertia = mass * Eigen::Matrix3d::Identity();
+    JointDescription &closing = description.joints[2], &pivot = description.joints[3];
+    closing.type = pivot.type = JointType::kSpherical;
+    closing.cut = true;
+    pivot.cut = false;
+    std::swap(pivot.from, pivot.to);
+    description.initial = {};
+    const double torque = bodies[1].mass / 2 + bodies[2].mass + bodies[3].mass / 2;
+    const double inertia = 1.25 * bodies[1].mass + bodies[2].mass + 1.25 * bodies[3].mass;
+    const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
+    const auto& joints = mechanism.joints();
+    const auto positions = [&](double angle) {
+      const double half = (std::numbers::pi / 2 + angle) / 2;  // of the third bar
+      VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+      q[joints[0].q_offset] = -std::numbers::pi / 2 + angle;
+      q[joints[1].q_offset] = -angle;
+      q[joints[3].q_offset] = std::cos(half);
+      q[joints[3].q_offset + 3] = std::sin(half);
+      return q;
+    };
+    const auto velocities = [&](double speed) {
+      VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
+      u[joints[0].u_offset] = u[joints[3].u_offset + 2] = speed;
+      u[joints[1].u_offset] = -speed;
+      return u;
+    };
+    for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+      SCOPED_TRACE(fmt::format("{}, bar {} of {} kg", formulation, bar, mass));
+      const auto system = MakeFormulation<Spatial>(
+          formulation, mechanism,
+          {.enforcement = Enforcement::kPosition, .solver = SolverKind::kRankRevealing});
+      ASSERT_EQ(system->Start(0.0, positions(0.06), velocities(0.0)), Outcome::kFinished);
+      std::vector<double> state(system->size()), rates(state.size());
+      for (const double angle : {1e-3, 3e-4, 1e-4, 2e-5, 1e-6, -1e-5, -2e-4}) {
+        system->ToState(positions(angle), velocities(-0.13), state);
+        ASSERT_EQ(system->Examine(0.0, state, rates), Outcome::kFinished);
+        const VectorX<double> expected = velocities(-9.81 * std::sin(angle) * torque / inertia);
+        for (int i = 0; i < mechanism.num_u(); ++i) {
+          EXPECT_NEAR(rates[mechanism.num_q() + i], expected[i], bound) << angle;
         }
       }
     }

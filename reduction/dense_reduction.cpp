@@ -34,7 +34,16 @@ DenseReduction<Space, S>::DenseReduction(const Mechanism<Space, S>& mechanism,
       zero_(VectorX<S>::Zero(mechanism.num_u())),
       c_(zero_),
       residual_(zero_),
-      bias_(VectorX<S>::Zero(mechanism.num_rows())) {
+      bias_(VectorX<S>::Zero(mechanism.num_rows())),
+      speed_scale_(VectorX<S>::Ones(mechanism.num_u())) {
+  for (const Joint<Space, S>& joint : mechanism.joints()) {
+    for (int i = 0, u = joint.u_offset; i < (joint.in_tree() ? joint.kind->num_u : 0); ++i) {
+      if (mechanism.DriveOf(joint, i) >= 0) continue;
+      const bool turns = joint.kind->axes[i] < Space::kRot;
+      if (turns) speed_scale_[u] = S(1) / mechanism.length();
+      ++u;
+    }
+  }
   if (kind_ == SolverKind::kRankRevealing && !at_velocity_ && mechanism.num_rows() > 0) {
     null_space_ = std::make_unique<NullSpace<Space, S>>(mechanism);
   }
@@ -73,6 +82,8 @@ void DenseReduction<Space, S>::SetPartition(const Partition<S>& partition) {
   rows_rhs_.setZero(rows_.size());
   dependent_speeds_.setZero(r);
   independent_speeds_.setZero(f);
+  pivot_scale_.setZero(r);
+  for (int k = 0; k < r; ++k) pivot_scale_[k] = speed_scale_[dependent_[k]];
   lu_ = Eigen::PartialPivLU<MatrixX<S>>(r);
   if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f).eval());
 }
@@ -87,7 +98,7 @@ S DenseReduction<Space, S>::FactorDependencies() {
     for (int i = 0; i < J_I_.cols(); ++i) J_I_(k, i) = J_(rows_[k], independent_[i]);
   }
   lu_.compute(J_D_);
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs().cwiseProduct(pivot_scale_);
   return pivots.minCoeff() / pivots.maxCoeff();
 }
 

@@ -69,7 +69,7 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   void AppendMode(std::vector<int>& mode) const override;
 
  private:
-  /// LU of J_D, J being current; the reciprocal condition.
+  /// LU of J_D, J being current; the ratio of its pivots, with rotations as lengths.
   S FactorDependencies();
   /// Computes c of (2) with `target` instead of gamma.
   void Dependent(const VectorX<S>& target, VectorX<S>& x);
@@ -89,6 +89,8 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   bool outgrown_ = false;  ///< the rank exceeds the partition's
   MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
   VectorX<S> zero_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
+  VectorX<S> speed_scale_;  ///< one over the mechanism's length for rotations, else 1
+  VectorX<S> pivot_scale_;  ///< of dependent speeds
   Eigen::PartialPivLU<MatrixX<S>> lu_;
   Eigen::LLT<MatrixX<S>> reduced_factor_;
   std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published

@@ -67,7 +67,7 @@ void AddRankWarnings(const MechanismDescription& description, const Structure& s
     warnings->push_back(
         {WarningKind::kRounded,
          fmt::format(
-             "{} constraints of {} differ from dependent ones by {:.2g} rad or lengths, within "
+             "{} constraints of {} differ from dependent ones by {:.2g} rad or lengths, about "
              "the accuracy {:g} of the input: runs remove them",
              structure.redundant.size(), joints, structure.rounding, description.accuracy)});
   }

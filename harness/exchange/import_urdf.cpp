@@ -171,6 +171,21 @@ void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
   draft->AddMimic(*mimic, follower, {leader, multiplier}, offset);
 }
 
+/// Followers start where their leaders place them. Other joints start at zero.
+void PlaceFollowers(ImportDraft* draft) {
+  MechanismDescription& d = draft->description;
+  std::vector<double> start(d.joints.size(), 0.0);
+  for (std::size_t pass = 0; pass < d.couplings.size(); ++pass) {  // followers of followers
+    for (const CouplingDescription& mimic : d.couplings) {
+      const CouplingDescription::Part &follower = mimic.parts[0], &leader = mimic.parts[1];
+      start[follower.joint] = (mimic.offset - leader.ratio * start[leader.joint]) / follower.ratio;
+    }
+  }
+  for (int j = 0; j < std::ssize(start); ++j) {
+    if (start[j] != 0.0) d.initial.coordinates.push_back({j, {start[j]}});
+  }
+}
+
 // Loops, which URDF itself excludes: extensions of other programs.
 
 /// Reads a <loop_joint>. Drake's RigidBodyTree (parseLoop): frames on `link1` and `link2` with one
@@ -232,6 +247,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   const int first = draft->last_joint() + 1;
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);
+  PlaceFollowers(draft);
   for (const XmlElement& loop : root.Children("loop_joint")) AddLoop(loop, ground, draft);
   for (const XmlElement& ball : root.Children(kDrakeBall)) {
     draft->AddBall(

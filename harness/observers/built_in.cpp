@@ -60,6 +60,23 @@ void Keep(double* largest, double value) {
   if (!std::isnan(*largest) && !(value <= *largest)) *largest = value;
 }
 
+/// Directions released for the accuracy of the input are open by this many accuracies at most, as
+/// long as runs release suitable ones (self_stress.h).
+constexpr double kMostOpen = 100.0;
+
+/// Violation of a constraint, with released directions if they are open beyond the accuracy.
+template <class Space>
+Direction<Space, double> ViolationOf(const Kinematics<Space, double>& kinematics, int index) {
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  const Velocity<Space, double> mismatch = kinematics.ConstraintMismatch(index);
+  const Direction<Space, double> whole = kinematics.Forbidden(index, mismatch);
+  const double most = kMostOpen * mechanism.accuracy();
+  const bool is_open =
+      !mechanism.released().empty() &&
+      (whole.angular.norm() > most || whole.linear.norm() > most * mechanism.length());
+  return is_open ? whole : kinematics.Constrained(index, mismatch);
+}
+
 /// Largest violation of some joints: points and rotations apart; joint with the worst points.
 struct Largest {
   double shift = 0.0, rotation = 0.0;
@@ -67,8 +84,7 @@ struct Largest {
 
   template <class Space>
   void Add(const Kinematics<Space, double>& kinematics, int index) {
-    const Direction<Space, double> mismatch =
-        kinematics.Constrained(index, kinematics.ConstraintMismatch(index));
+    const Direction<Space, double> mismatch = ViolationOf(kinematics, index);
     Keep(&rotation, mismatch.angular.norm());
     const double s = mismatch.linear.norm();
     if (joint < 0 || !(s <= shift)) {

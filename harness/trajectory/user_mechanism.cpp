@@ -311,7 +311,7 @@ struct Reactions<Space>::Work {
     std::vector<int> place(w.size(), -1);
     Eigen::Index rows = 0, columns = 0;
     std::vector<Coefficients> entries;
-    const auto enter = [&](int body, const Direction<Space, double>& at_centre, double sign) {
+    const auto enter = [&](int body, const auto& at_centre, double sign) {
       if (body == kGround) return;
       if (place[body] < 0) {
         place[body] = static_cast<int>(rows);
@@ -335,10 +335,11 @@ struct Reactions<Space>::Work {
     for (const Coupling<double>& coupling : user.mechanism().couplings()) {
       const double most = SizeOfForce(coupling);
       for (const auto& [j, ratio] : coupling.parts) {
-        const Direction<Space, double>& H = user.DirectionOfSpeed(j, 0);
-        const double scale = ratio * At(j).kind->inverse_H_squared / most;
-        enter(At(j).to, ShiftForce<Space, double>(H, State(j).r_Q), scale);
-        enter(At(j).from, ShiftForce<Space, double>(H, State(j).r_P), -scale);
+        const Wrench<Space, double> F = WrenchOfEffort<Space, double>(
+            user.DirectionOfSpeed(j, 0), At(j).kind->inverse_H_squared, 1.0);
+        const double scale = ratio / most;
+        enter(At(j).to, ShiftForce<Space, double>(F, State(j).r_Q), scale);
+        enter(At(j).from, ShiftForce<Space, double>(F, State(j).r_P), -scale);
       }
       ++columns;
     }
@@ -451,10 +452,9 @@ Wrench<Space, double> Reactions<Space>::Of(int joint, const Rotation<Space, doub
   std::vector<Wrench<Space, double>> open = work_->open[joint];
   for (int i = 0; i < given.num_drives; ++i) {
     const Direction<Space, double>& D = state.D(i);
-    const Velocity<Space, double> along = D * (1 / D.squaredNorm());
     const auto without = [&](Wrench<Space, double>& wrench) {
-      const double part = wrench.dot(along);
-      wrench -= D * part;
+      const double effort = wrench.dot(Velocity<Space, double>(D * 1.0));
+      wrench -= WrenchOfEffort<Space, double>(D, 1 / D.squaredNorm(), effort);
     };
     without(reaction);
     std::ranges::for_each(open, without);

@@ -27,8 +27,7 @@ void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q
   const bool changed = stress_ != nullptr && kinematics_.released() != released_;
   if (changed) kinematics_.Release(released_);
   kinematics_.UpdatePosition(q);
-  if (stress_ == nullptr) return;
-  if (stress_->Factor(kinematics_)) return;
+  if (stress() == nullptr || stress_->Factor(kinematics_)) return;
   kinematics_.Release(stress_->Choose(kinematics_));
   const VectorX<S> here = kinematics_.q();
   kinematics_.UpdatePosition(here);
@@ -36,19 +35,20 @@ void FactoredState<Space, S>::SetPositions(const Eigen::Ref<const VectorX<S>>& q
 }
 
 template <class Space, class S>
-void FactoredState<Space, S>::AcceptReleased() {
-  if (stress_ == nullptr) return;
+bool FactoredState<Space, S>::AcceptReleased() {
+  const bool is_rounded = stress() == nullptr;
+  if (stress_ == nullptr || (is_rounded && stress_->Factor(kinematics_))) return false;
   released_ = stress_->Choose(kinematics_);
-  if (kinematics_.released() != released_) {
-    const VectorX<S> q = kinematics_.q(), u = kinematics_.u();
-    SetPositions(q);
-    SetSpeeds(u);
-  }
+  if (kinematics_.released() == released_) return false;
+  const VectorX<S> q = kinematics_.q(), u = kinematics_.u();
+  SetPositions(q);
+  SetSpeeds(u);
+  return is_rounded;
 }
 
 template <class Space, class S>
 void FactoredState<Space, S>::ShareSpeeds(VectorX<S>& u) {
-  if (stress_ == nullptr || stress_->is_exact()) return;
+  if (stress() == nullptr || stress_->is_exact()) return;
   SetSpeeds(u);
   solver_.Correct(stress_->ShareOfSpeeds(kinematics_), change_);
   u += change_;

@@ -20,8 +20,8 @@ class FactoredState {
         solver_(solver),
         target_(VectorX<S>::Zero(mechanism.num_equations())),
         change_(VectorX<S>::Zero(mechanism.num_u())),
-        stress_(mechanism.is_redundant() ? std::make_unique<SelfStress<Space, S>>(mechanism)
-                                         : nullptr),
+        stress_(mechanism.released().empty() ? nullptr
+                                             : std::make_unique<SelfStress<Space, S>>(mechanism)),
         released_(mechanism.released()) {}
 
   const VectorX<S>& q() const { return kinematics_.q(); }
@@ -46,12 +46,16 @@ class FactoredState {
   Outcome Correct(const VectorX<S>& violation, VectorX<S>& change);
 
   /// Self-stresses at the current positions; null without redundant constraints.
-  SelfStress<Space, S>* stress() const { return stress_.get(); }
+  SelfStress<Space, S>* stress() const {
+    return mechanism().is_redundant() ? stress_.get() : nullptr;
+  }
   /// Adds to speeds the share of the released directions (self_stress.h), after Factor().
   void ShareSpeeds(VectorX<S>& u);
   /// Releases the most suitable directions at the current positions from now on. The equations stay
-  /// the same to first order in the drift.
-  void AcceptReleased();
+  /// the same to first order in the drift. Directions released for the accuracy of the input stay
+  /// as long as they are suitable. Returns true if others replaced them: these are open by about
+  /// the accuracy.
+  bool AcceptReleased();
   /// Releases the mechanism's choice again: runs do not depend on runs before.
   void ForgetReleased() { released_ = mechanism().released(); }
 

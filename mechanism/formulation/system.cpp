@@ -270,6 +270,17 @@ bool System<Space, S>::NeedsNoReview() const {
 }
 
 template <class Space, class S>
+bool System<Space, S>::ReplaceReleased() {
+  if (!state_.AcceptReleased()) return false;
+  if (closing_ == nullptr) {
+    closing_ = MakeLevel(mechanism_, FormulationOptions{.enforcement = Enforcement::kPosition});
+  }
+  state_.ForgetFactors();
+  closing_->Accept(state_, S(0));
+  return true;
+}
+
+template <class Space, class S>
 bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   const bool is_projected =
       MayTakeShortCut() && level_->Project(*solver_, y.first(mechanism_.num_q()),
@@ -292,11 +303,11 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.AcceptStep();
   accepted_t_ = t;
-  state_.AcceptReleased();
+  const bool changed_rows = ReplaceReleased();
   const bool changed_solver = solver_->Review(kinematics);
   if (changed_solver) state_.ForgetFactors();
   if (drives_ != nullptr && IsOffBranch()) drives_->LeaveBranch();
-  const bool changed = changed_solver || accepted == Accepted::kModeChanged;
+  const bool changed = changed_solver || changed_rows || accepted == Accepted::kModeChanged;
   if (changed) ++mode_changes_;
   if (compiled_ != nullptr) compiled_->StepAccepted();
   step_end_version_ = kinematics.position_version();

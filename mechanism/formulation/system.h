@@ -158,13 +158,15 @@ class System final : public Ode<S> {
   /// Returns true if accepting the last Derivative()'s step changes nothing and needs no data from
   /// it.
   bool NeedsNoReview() const;
+  /// FactoredState::AcceptReleased(). Closes joints along directions that are imposed again.
+  bool ReplaceReleased();
   /// Returns true if the last evaluation was the derivative at this (t, y).
   bool IsAt(S t, std::span<const S> y) const;
 
   const Mechanism<Space, S>& mechanism_;
   FormulationOptions options_;
   std::unique_ptr<ConstraintSolver<Space, S>> solver_;
-  std::unique_ptr<Level<Space, S>> level_;
+  std::unique_ptr<Level<Space, S>> level_, closing_;  ///< closing_: for ReplaceReleased()
   FactoredState<Space, S> state_;
   TreeDynamics<Space, S> dynamics_;
   std::unique_ptr<Drives<Space, S>> drives_;  ///< null without prescribed motions

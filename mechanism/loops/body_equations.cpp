@@ -56,7 +56,8 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
     const JointState<Space, S>& state = kinematics.joints()[step.joint];
     auto F = Wrench<Space, S>::Zero();
     for (int i = 0; i < state.num_u; ++i) {
-      F += state.H(i) * (joint.kind->inverse_H_squared * force[joint.u_offset + i]);
+      F += WrenchOfEffort<Space, S>(state.H(i), joint.kind->inverse_H_squared,
+                                    force[joint.u_offset + i]);
     }
     wrenches_[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
     wrenches_[joint.from] -= ShiftForce<Space, S>(F, state.r_P);

@@ -228,7 +228,7 @@ bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
     }
   }
   FactorInPlace(C_);
-  Turn(kinematics);
+  if (mechanism_->is_redundant()) Turn(kinematics);
   return T_.size() == 0 || (pivot >= S(1e-4) && T_.cwiseAbs().maxCoeff() <= S(10));
 }
 

@@ -48,9 +48,10 @@ class SelfStress {
   /// `mechanism` releases directions, and must outlive this.
   explicit SelfStress(const Mechanism<Space, S>& mechanism);
 
-  /// J, T and W at the positions of `kinematics`, and its imposed directions turned as above. No
-  /// other call may come first. No allocation. False if other released directions serve better
-  /// here: elements of T exceed ten, which costs a digit, or imposed rows are nearly dependent.
+  /// J, T and W at the positions of `kinematics`, and its imposed directions turned as above,
+  /// unless the released ones are constraints within the accuracy of the input only. No other call
+  /// may come first. No allocation. False if other released directions serve better here: elements
+  /// of T exceed ten, which costs a digit, or imposed rows are nearly dependent.
   bool Factor(Kinematics<Space, S>& kinematics);
   /// The released directions that serve best here, as many of each joint as the mechanism releases.
   /// Allocates.

@@ -215,8 +215,8 @@ std::span<const Wrench<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     for (const auto& [index, ratio] : mechanism.couplings()[c].parts) {
       const Joint<Space, S>& joint = mechanism.joints()[index];
       const JointState<Space, S>& state = kinematics.joints()[index];
-      const Wrench<Space, S> F = state.basis[0] * (joint.kind->inverse_H_squared * ratio *
-                                                   lambda[mechanism.num_rows() + c]);
+      const Wrench<Space, S> F = WrenchOfEffort<Space, S>(
+          state.basis[0], joint.kind->inverse_H_squared, ratio * lambda[mechanism.num_rows() + c]);
       F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
       F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
     }
@@ -344,9 +344,9 @@ void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
   for (const auto& [index, inertia] : kinematics.mechanism().rotors()) {
     const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
     const JointState<Space, S>& state = kinematics.joints()[index];
-    const Direction<Space, S>& H = state.basis[0];
-    const Wrench<Space, S> F = H * (joint.kind->inverse_H_squared * inertia *
-                                    CoordinateAcceleration<Space, S>(kinematics, index, A));
+    const Wrench<Space, S> F =
+        WrenchOfEffort<Space, S>(state.basis[0], joint.kind->inverse_H_squared,
+                                 inertia * CoordinateAcceleration<Space, S>(kinematics, index, A));
     wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
     wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
   }

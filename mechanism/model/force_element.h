@@ -88,14 +88,14 @@ struct PointOfBody {
   }
 };
 
-/// H tau / |H|^2 at Mo on Q, its opposite on P, both moved to the centres of mass. The power of it
-/// is tau u, because the joint's relative motion is H u.
+/// The effort tau of a joint at Mo on Q, its opposite on P, both moved to the centres of mass.
 template <class Space, class S>
 void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
                    std::span<Wrench<Space, S>> wrenches) {
   const auto& joint = kinematics.mechanism().joints()[index];
   const auto& state = kinematics.joints()[index];
-  const Wrench<Space, S> F = state.H(0) * (tau * joint.kind->inverse_H_squared);
+  const Wrench<Space, S> F =
+      WrenchOfEffort<Space, S>(state.H(0), joint.kind->inverse_H_squared, tau);
   wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
   wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
 }

@@ -50,6 +50,16 @@ struct JointState {
   }
 };
 
+/// The wrench at Mo of an effort along a coordinate with the direction H: its power is tau u. An
+/// effort on a screw is a moment. The force along the axis belongs to the constraint of its thread.
+template <class Space, class S>
+Wrench<Space, S> WrenchOfEffort(const Direction<Space, S>& H, const S& inverse_H_squared,
+                                const S& tau) {
+  const bool is_unit = inverse_H_squared == S(1);
+  if (is_unit || H.angular.isZero() || H.linear.isZero()) return H * (tau * inverse_H_squared);
+  return {H.angular * (tau / H.angular.squaredNorm()), Linear<Space, S>::Zero()};
+}
+
 template <class Space, class S>
 class Kinematics {
  public:
@@ -116,7 +126,13 @@ class Kinematics {
   template <class Kind>
   Direction<Space, S> Constrained(int joint, const SpatialVector<Space, S, Kind>& V) const {
     const JointState<Space, S>& state = joints_[joint];
-    if (!mechanism_->is_redundant()) return state.Sum(state.Along(V, state.rows()), state.rows());
+    if (mechanism_->is_redundant()) return Forbidden(joint, V);
+    return state.Sum(state.Along(V, state.rows()), state.rows());
+  }
+  /// The part of a relative motion across the free directions of a joint.
+  template <class Kind>
+  Direction<Space, S> Forbidden(int joint, const SpatialVector<Space, S, Kind>& V) const {
+    const JointState<Space, S>& state = joints_[joint];
     Direction<Space, S> part(V.angular, V.linear);
     for (int i = 0; i < state.num_u; ++i) {
       part -= state.H(i) * (state.H(i).dot(V) / state.H(i).squaredNorm());

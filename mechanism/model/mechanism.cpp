@@ -80,6 +80,7 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   const Topology joint_topology = BuildTopology(description, Coordinates::kJoint);
   num_loops_ = static_cast<int>(joint_topology.constraints.size());
   rounded_ = description.rounded;
+  accuracy_ = description.accuracy;
   for (const TreeEdge& edge : joint_topology.edges) {
     const JointType type = edge.joint < 0 ? JointType::kFree : description.joints[edge.joint].type;
     num_joint_speeds_ += KindOf<Space, S>(type).num_u;

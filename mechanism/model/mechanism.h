@@ -137,6 +137,8 @@ class Mechanism {
   const std::vector<Released>& released() const { return released_; }
   /// Returns true if released directions are constraints that drift (self_stress.h), not rounded.
   bool is_redundant() const { return !released_.empty() && !rounded_; }
+  /// Share of a length, or angle [rad], by which released directions may stay open.
+  double accuracy() const { return accuracy_; }
   const ForceElements<Space, S>& forces() const { return forces_; }
   const Linear<Space, S>& gravity() const { return gravity_; }
   /// Returns true if power is supplied or dissipated: otherwise total energy is conserved.
@@ -198,6 +200,7 @@ class Mechanism {
   std::vector<Rotor<S>> rotors_;
   std::vector<Released> released_;
   bool rounded_ = false;
+  double accuracy_ = 0.0;
   ForceElements<Space, S> forces_;
   Linear<Space, S> gravity_;
   S length_ = S(1);

@@ -16,6 +16,14 @@ constexpr double kPi = std::numbers::pi;
 constexpr int kMaxIterations = 200;
 /// Positions whose guesses are all missed by less [rad or lengths] are taken for the nearest.
 constexpr double kNear = 0.1;
+/// If the drawn position closes within the accuracy of the input, exact closures within this
+/// distance [rad or lengths] are taken instead. Some redundant constraints that are rounded close
+/// exactly far away only, or nowhere: a loop that opens by the square of a small motion x closes
+/// again within x = sqrt(1e-5).
+constexpr double kDrawn = 0.01;
+/// Least damping on the way to the least residual near a drawn position: motions that hardly close
+/// the loops stay small.
+constexpr double kStayDamping = 1e-3;
 
 /// The search ends when so many starts in a row have found nothing nearer: a branch that every
 /// fourth start leads to is missed by one search in 1e6. Positions count as nearer beyond round-off
@@ -63,7 +71,17 @@ class Closure {
   void Run(Start<double>* start) {
     Vector q = guess_, e = Residual(q);
     if (e.size() > 0 || HasTargets()) {
-      bool closed = Close(kMaxIterations, &q, &e);
+      const bool is_drawn =
+          IsRounded(e) && !HasTargets() && guesses_.Farthest(kinematics_) <= kNear;
+      bool closed = Close(kMaxIterations, 1e-16, &q, &e);
+      if (is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > kDrawn) {
+        q = guess_;
+        e = Residual(q);
+        Close(kMaxIterations, kStayDamping, &q, &e);
+        start->position_residual = InSi(e, units_.With(kinematics_, guesses_.held()));
+        start->q = q;
+        return;
+      }
       Vector nearest = q;
       if (closed) Unwind(&nearest);
       Place(nearest);
@@ -94,13 +112,14 @@ class Closure {
   }
 
   /// Returns true if a residual is within the accuracy of the input: in rad, or relative to the
-  /// arms of the joints that close the loops.
+  /// distances from the joints that close the loops to other joints of their bodies.
   bool IsRounded(const Vector& e) const {
     Vector most = Vector::Zero(e.size());
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
       const JointState<Space, double>& state = kinematics_.joints()[index];
-      const double arm = std::max(state.r_P.norm(), state.r_Q.norm());
+      const double arm = std::max({Reach(joint.from, joint.X_PF.p), Reach(joint.to, joint.X_QM.p),
+                                   joint.kind->parameter});  // length of a rod
       for (int i = 0; i < joint.num_constraints(); ++i) {
         const bool turns = state.D(i).angular.squaredNorm() > 0.0;
         most[joint.row + i] = (turns ? 1.0 : std::min(mechanism_.length(), arm) / units_.length);
@@ -108,6 +127,16 @@ class Closure {
     }
     most.segment(mechanism_.num_rows(), mechanism_.couplings().size()).setOnes();
     return (e.cwiseAbs().array() <= description_.accuracy * most.array()).all();
+  }
+
+  /// Largest distance of a body's joints from one of them.
+  double Reach(int body, const Linear<Space, double>& from) const {
+    double farthest = 0.0;
+    for (const Joint<Space, double>& joint : mechanism_.joints()) {
+      if (joint.from == body) farthest = std::max(farthest, (joint.X_PF.p - from).norm());
+      if (joint.to == body) farthest = std::max(farthest, (joint.X_QM.p - from).norm());
+    }
+    return farthest;
   }
 
   void Place(const Vector& q) {
@@ -154,7 +183,7 @@ class Closure {
   }
 
   /// Levenberg-Marquardt from q, with the residual e, to a closed position: whether it gets there.
-  bool Close(int iterations, Vector* q, Vector* e) {
+  bool Close(int iterations, double least_damping, Vector* q, Vector* e) {
     double damping = 1e-3;
     const VectorX<double> row_units = units_.With(kinematics_, guesses_.held());
     // where every coordinate is prescribed there is nothing to move
@@ -175,7 +204,7 @@ class Closure {
         damping *= 1e-3;  // the loop's own step multiplies by ten
       }
       if (!improved) break;
-      damping = std::max(damping, 1e-16);
+      damping = std::max(damping, least_damping);
     }
     return e->template lpNorm<Eigen::Infinity>() <= closed_;
   }
@@ -245,7 +274,7 @@ class Closure {
     Vector turned = guesses_.Unwound(*q);
     if (turned == *q) return;
     Vector e = Residual(turned);
-    if (Close(kTrialIterations, &turned, &e) && Distance(turned) < Distance(*q)) *q = turned;
+    if (Close(kTrialIterations, 1e-16, &turned, &e) && Distance(turned) < Distance(*q)) *q = turned;
   }
 
   double Distance(const Vector& q) {
@@ -288,7 +317,7 @@ class Closure {
       q = Move(q, d);
       Pull(start == 0 ? 0 : static_cast<std::size_t>(start) % std::size(kPulls), &q);
       Vector e = Residual(q);
-      if (!Close(kTrialIterations, &q, &e)) continue;
+      if (!Close(kTrialIterations, 1e-16, &q, &e)) continue;
       Unwind(&q);
       const double distance = Distance(q);
       if (distance >= (1.0 - kNearer) * least) continue;

@@ -48,11 +48,19 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
   for (ForceDescription force : description.forces) {
     if (const int* joint = PartsOf(force).joint; joint != nullptr) has_force[*joint] = true;
   }
+  // A link is about twice as long as the distances in length(). Weights do not depend on the unit
+  // of length, which is a power of two.
+  const double per_link = units.length / (2.0 * mechanism.length());
   for (const JointValues& values : description.initial.coordinates) {
     const Joint<Space, double>& joint = mechanism.joints()[values.joint];
+    const auto weight = [&](int coordinate) {
+      return values.weight * (joint.kind->axes[coordinate] < Space::kRot ? 1.0 : per_link);
+    };
     if (joint.in_tree()) {
       if (!is_held_[values.joint]) SetColumns(joint, &guessed_);
-      weights_.segment(joint.u_offset, joint.num_u()).setConstant(values.weight);
+      for (int i = 0, u = joint.u_offset; i < joint.kind->num_u; ++i) {
+        if (mechanism.DriveOf(joint, i) < 0) weights_[u++] = weight(i);
+      }
       continue;
     }
     if (joint.num_u() == 0) continue;  // prescribed
@@ -64,7 +72,7 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
       if (IsGiven(*joint.kind, values.values.data(), i)) {
         cut.free.push_back({values.joint, free});
         cut.weights.conservativeResize(cut.weights.size() + 1);
-        cut.weights[cut.weights.size() - 1] = values.weight;
+        cut.weights[cut.weights.size() - 1] = weight(i);
       }
       ++free;
     }

@@ -29,7 +29,7 @@ class Guesses {
   /// Free coordinates of cut joints that have values: fixed ones, and others.
   const std::vector<OfCutJoint>& held() const { return held_.free; }
   const std::vector<OfCutJoint>& loose() const { return loose_.free; }
-  /// Weights of the differences from guesses: by speed, 1 without a guess; of loose().
+  /// Weights of the differences from guesses, in units: by speed, 1 without a guess; of loose().
   const VectorX<double>& weights() const { return weights_; }
   const VectorX<double>& loose_weights() const { return loose_.weights; }
 

@@ -180,6 +180,10 @@ TEST(ImportUrdf, MimicsAreCouplings) {
   EXPECT_EQ(coupling.parts[0].ratio, 1.0);
   EXPECT_EQ(coupling.parts[1].ratio, -0.25);
   EXPECT_EQ(coupling.offset, 0.1);
+  // the leader starts at zero
+  ASSERT_EQ(imported.description.initial.coordinates.size(), 1u);
+  EXPECT_EQ(imported.description.initial.coordinates[0].joint, coupling.parts[0].joint);
+  EXPECT_EQ(imported.description.initial.coordinates[0].values, std::vector<double>{0.1});
   EXPECT_FALSE(HasNote(imported, "<mimic>", ""));
   EXPECT_EQ(ImportText(robot("<mimic joint=\"j\"/>"), "file.urdf")
                 .description.couplings[0]

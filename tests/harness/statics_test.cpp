@@ -232,5 +232,17 @@ TEST(StaticsTest, WhatNothingHoldsIsNamed) {
   EXPECT_NEAR(Values(hanging)["reaction:S:fz"], 2 * kGravity, 100 * kEps * 20);
 }
 
+/// The torque of a drive holds a nut on a vertical screw: 20 N of weight times 0.5 m/rad. The
+/// thread takes the whole weight, and with it the opposite torque.
+TEST(StaticsTest, TheThreadOfAScrewCarriesTheWholeWeight) {
+  auto value = Values(Of(std::string(R"({"name": "nut", "space": "spatial", "gravity": [0, 0, -10],
+    "bodies": [{"name": "nut", "mass": 2, "inertia": 0.1}],
+    "joints": [{"name": "H", "type": "helical", "pitch": 0.5, "axis": [0, 0, 1],
+                "from": {"body": "ground"}, "to": {"body": "nut"}}],
+    "forces": [{"type": "joint_torque", "joint": "H", "value": 10}]})")));
+  EXPECT_NEAR(value["reaction:H:fz"], 20.0, 20.0 * 16 * kEps);
+  EXPECT_NEAR(value["reaction:H:mz"], -10.0, 10.0 * 16 * kEps);
+}
+
 }  // namespace statics_test
 }  // namespace loopbench::harness

@@ -113,6 +113,25 @@ TEST(Poses, WeightsDecideBetweenContradictoryTargets) {
   EXPECT_NEAR(StartOf<Planar>(&d).q[0], 22.0 / 14.0, 1e-6);
 }
 
+/// Angles and lengths of links count alike, whatever the unit of length is.
+TEST(Poses, TheNearestStartDoesNotDependOnTheSize) {
+  const auto angles = [](double size) {
+    MechanismDescription d = Arm();
+    for (BodyDescription& body : d.bodies) body.com *= size;
+    for (JointDescription& joint : d.joints) joint.from.position *= size;
+    d.initial.coordinates = {{0, {0.2}}, {1, {0.1}}};
+    d.initial.poses = {TipAt(2.4 * size, 1.1 * size, false)};
+    d.initial.poses[0].point *= size;
+    return StartOf<Planar>(&d).q;
+  };
+  const VectorX<double> expected = angles(1.0);
+  EXPECT_GT((expected - Eigen::Vector2d(0.2, 0.1)).norm(), 0.05);
+  // The minimum of a sum of squares is known to the root of round-off.
+  for (const double size : {1.5, 0.3, 1e-3}) {
+    EXPECT_LT((angles(size) - expected).norm(), 8 * std::sqrt(kEps)) << size;
+  }
+}
+
 /// A double rocker whose coupler point decides the branch and the one freedom.
 TEST(Poses, OfALoopAreClosedPositions) {
   MechanismDescription d = Arm();

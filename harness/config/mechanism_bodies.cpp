@@ -124,9 +124,7 @@ const Fields<Draft>& GroundFields() {
 }
 
 void ReadBodies(const JsonNode& node, Draft& draft) {
-  const std::vector<JsonNode> elements = node.Elements("bodies");
-  if (node.value().is_array() && elements.empty()) node.Fail("at least one body");
-  for (const JsonNode& element : elements) {
+  for (const JsonNode& element : node.Elements("bodies", "at least one body")) {
     draft.bodies.push_back(ReadPart(BodyFields(), element, draft));
     draft.body_names.Add(draft.bodies.back().name);
   }

@@ -32,8 +32,7 @@ struct QuantityDraft : PublishedQuantity {
 };
 
 void ReadTimes(const JsonNode& node, SeriesDraft& draft) {
-  const std::vector<JsonNode> elements = node.Elements("times");
-  if (node.value().is_array() && elements.empty()) node.Fail("at least one time");
+  const std::vector<JsonNode> elements = node.Elements("times", "at least one time");
   if (elements.size() > kMaxTimes) {
     node.FailAs(fmt::format("{} times", elements.size()), fmt::format("at most {}", kMaxTimes));
     return;
@@ -164,9 +163,7 @@ const Fields<QuantityDraft>& QuantityFields() {
 }
 
 void ReadQuantities(const JsonNode& node, SeriesDraft& draft) {
-  const std::vector<JsonNode> elements = node.Elements("quantities");
-  if (node.value().is_array() && elements.empty()) node.Fail("at least one quantity");
-  for (const JsonNode& element : elements) {
+  for (const JsonNode& element : node.Elements("quantities", "at least one quantity")) {
     QuantityDraft quantity;
     quantity.series = &draft;
     QuantityFields().Read(element, &quantity);

@@ -192,12 +192,13 @@ std::vector<std::pair<std::string, JsonNode>> JsonNode::Members() const {
   return members;
 }
 
-std::vector<JsonNode> JsonNode::Elements(std::string_view what) const {
+std::vector<JsonNode> JsonNode::Elements(std::string_view what, std::string_view least) const {
   std::vector<JsonNode> elements;
   if (!value_->is_array()) {
     Fail(fmt::format("an array of {}", what));
     return elements;
   }
+  if (!least.empty() && value_->empty()) Fail(least);
   for (std::size_t i = 0; i < value_->size(); ++i) {
     elements.push_back(Child((*value_)[i], std::to_string(i)));
   }

@@ -205,7 +205,8 @@ class JsonNode {
   std::vector<std::pair<std::string, JsonNode>> Members() const;
 
   /// Returns the elements of an array; reports other values. `what` names the elements ("joints").
-  std::vector<JsonNode> Elements(std::string_view what) const;
+  /// Reports an empty array if there is a text for `least`, such as "at least one joint".
+  std::vector<JsonNode> Elements(std::string_view what, std::string_view least = "") const;
   /// Returns the elements of a non-empty array, or the value itself: `"x": 1` for `"x": [1]`.
   std::vector<JsonNode> OneOrMore(std::string_view what) const;
 

@@ -8,15 +8,11 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 
-#include "harness/config/selection_reader.h"
-#include "harness/json/fields.h"
 #include "harness/judge/demand.h"
-#include "harness/judge/rule_schemas.h"
 #include "harness/record/noise.h"
 #include "harness/tables/table.h"
 #include "harness/text/escape.h"
@@ -197,166 +193,6 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
   }
   return result;
 }
-namespace {
-
-/// Reads `key` if the comparison uses it, otherwise reports it.
-std::optional<JsonNode> Belonging(const JsonNode& check, const std::string& key, bool belongs,
-                                  const std::string& expected) {
-  if (belongs) return check.Required(key, expected);
-  if (const std::optional<JsonNode> node = check.Optional(key)) {
-    node->Fail("no \"" + key + "\" with this \"compare\"");
-  }
-  return std::nullopt;
-}
-
-const NameList kRelationNames = {"<=", ">=", "within", "is", "is-not"};
-constexpr Relation kRelations[] = {Relation::kAtMost, Relation::kAtLeast, Relation::kWithin,
-                                   Relation::kIs, Relation::kIsNot};
-
-void ReadMeasure(const JsonNode& node, Check& check) { check.demand.measure = node.Text(); }
-
-void ReadRelation(const JsonNode& node, Check& check) {
-  check.demand.relation = kRelations[node.Choice(kRelationNames, "a comparison").value_or(0)];
-}
-
-/// Reads the keys of the comparison and checks the statistic.
-void ReadDemand(const JsonNode& node, Check& check) {
-  Demand& demand = check.demand;
-  const bool words = demand.IsText(), within = demand.relation == Relation::kWithin;
-  if (const auto threshold = Belonging(node, "threshold", !words, "a number")) {
-    demand.number = threshold->Number();
-  }
-  if (const auto tolerance = Belonging(node, "tolerance", within, "a number >= 0")) {
-    demand.tolerance = tolerance->Number(kNotNegative);
-  }
-  if (const auto word = Belonging(node, "word", words, kAnyText)) demand.word = word->Text();
-
-  const bool quantified = check.statistic == Statistic::kAll || check.statistic == Statistic::kAny;
-  const std::optional<JsonNode> statistic = node.Optional("statistic");
-  if (statistic && words && !quantified) statistic->Fail("\"all\" or \"any\" for a word");
-  if (statistic && !check.relative_to.empty() && quantified) {
-    statistic->Fail("\"max\", \"min\" or \"mean\" for a ratio");
-  }
-}
-
-constexpr const char* kDemandRules = R"({"allOf": [
-  {"if": {"properties": {"compare": {"enum": ["is", "is-not"]}}},
-   "then": {"required": ["word"], "not": {"required": ["threshold"]},
-            "properties": {"statistic": {"enum": ["all", "any"]}}},
-   "else": {"required": ["threshold"], "not": {"required": ["word"]}}},
-  {"if": {"properties": {"compare": {"const": "within"}}},
-   "then": {"required": ["tolerance"]}, "else": {"not": {"required": ["tolerance"]}}},
-  {"if": {"required": ["relative_to"]},
-   "then": {"properties": {"statistic": {"enum": ["max", "min", "mean"]}}}}]})";
-
-const Fields<Check>& CheckFields() {
-  static const Fields<Check> fields(
-      "check", "Condition on a statistic of selected records.",
-      {{"label", Text(&Check::label), "Condition in words.", kAnyText},
-       {"select", SelectionOf(&Check::select), "Selected records.", "an object of keys and values"},
-       {"relative_to", SelectionOf(&Check::relative_to, 1),
-        "Records whose statistic divides the statistic of the selected records."},
-       {"require", SelectionOf(&Check::require, 1),
-        "Conditions on every selected record; otherwise the check fails."},
-       {"measure", By(TextSchema(), ReadMeasure), "Key of the records.", kAnyText},
-       {"statistic", Choice(&Check::statistic, {"max", "min", "mean", "all", "any"}, "a statistic"),
-        "Statistic over the selected records.", "a statistic"},
-       {"compare", By(ChoiceSchema(kRelationNames.all()), ReadRelation), "Relation.",
-        "a comparison"},
-       {"threshold", NumberSchema(), "Threshold of <=, >= and within."},
-       {"tolerance", NumberSchema(kNotNegative), "Tolerance of within, around the threshold."},
-       {"word", TextSchema(), "Word of is and is-not."},
-       {"", By(Json::parse(kDemandRules), ReadDemand)},
-       {"failed_runs", Choice(&Check::failed_runs_hold, {"fail", "hold"}, "what a failed run does"),
-        "hold: runs that did not finish satisfy a check that expects failure."}});
-  return fields;
-}
-
-const Fields<Wording>& WordingFields() {
-  static const Fields<Wording> fields(
-      "wording", "Sentences that are printed after the verdict.",
-      {{"reproduced", Text(&Wording::reproduced), "Sentence if all checks hold."},
-       {"not_reproduced", Text(&Wording::not_reproduced), "Sentence if no check holds."},
-       {"partially_reproduced", Text(&Wording::only_under), "Sentence if some checks hold."},
-       {"not_measured", Text(&Wording::not_measured), "Sentence if no check was measured."}});
-  return fields;
-}
-
-/// Rule with the common selection of its checks.
-struct RuleInFile : ClaimRule {
-  Selection common;
-};
-
-void ReadChecks(const JsonNode& node, RuleInFile& rule) {
-  std::vector<std::string> labels;
-  for (const JsonNode& element : node.Elements("checks")) {
-    Check& check = rule.checks.emplace_back();
-    if (CheckFields().Read(element, &check)) {
-      check.select.insert(check.select.begin(), rule.common.begin(), rule.common.end());
-      Selection& base = check.relative_to;
-      if (!base.empty()) base.insert(base.begin(), rule.common.begin(), rule.common.end());
-    }
-    ReportRepeated(element, "label", check.label, &labels);
-  }
-  if (node.value().is_array() && labels.empty()) node.Fail("at least one check");
-}
-
-const Fields<RuleInFile>& RuleFields() {
-  static const Fields<RuleInFile> fields(
-      "claim", "A claim and its checks, which must all hold.",
-      {{"id", Text(&ClaimRule::id), "Unique identifier of the claim.", kAnyText},
-       {"claim", Text(&ClaimRule::claim), "The claim in one sentence.", kAnyText},
-       {"where", Text(&ClaimRule::where), "Section or figure that makes the claim.", kAnyText},
-       {"note", Text(&ClaimRule::note), "Origin of the thresholds."},
-       {"select", SelectionOf(&RuleInFile::common, 1), "Selection that is added to every check."},
-       {"checks", By(ArraySchema(CheckFields().Schema(), 1), ReadChecks), "Checks.",
-        "an array of checks"},
-       {"wording", Object(&ClaimRule::wording, WordingFields())}});
-  return fields;
-}
-
-struct ClaimsFile {
-  std::vector<ClaimRule> rules;
-};
-
-void ReadRules(const JsonNode& node, ClaimsFile& file) {
-  std::vector<std::string> ids;
-  for (const JsonNode& element : node.Elements("claims")) {
-    RuleInFile rule;
-    RuleFields().Read(element, &rule);
-    ReportRepeated(element, "id", rule.id, &ids);
-    file.rules.push_back(std::move(rule));
-  }
-}
-
-const Fields<ClaimsFile>& ClaimsFields() {
-  static const Fields<ClaimsFile> fields(
-      "claims",
-      "Rules that turn stored records into verdicts (loopbench check-claims). The program also "
-      "checks that ids, and labels of one claim, are different.",
-      DocumentRows<ClaimsFile>({{"claims", By(ArraySchema(RuleFields().Schema()), ReadRules),
-                                 "List of claims.", "an array of claims"}}));
-  return fields;
-}
-
-}  // namespace
-
-Json ClaimsSchema() { return ClaimsFields().OwnSchema(); }
-
-std::vector<ClaimRule> ReadClaims(const std::filesystem::path& path) {
-  return ParseClaims(ReadTextFile(path), path.string());
-}
-
-std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& file) {
-  const Json document = ParseDocument(text, file);
-  ErrorList errors(file, text);
-  const JsonNode root(document, "", errors);
-  ClaimsFile claims;
-  if (ExpectDocument(root, FileKind::kClaims)) ClaimsFields().ReadRows(root, &claims);
-  errors.ThrowIfAny();
-  return claims.rules;
-}
-
 namespace {
 
 std::string VerdictColour(const Record& row, const TableColumn& column) {

@@ -295,13 +295,17 @@ MechanismFile MakeGrid(const Family& family, int windows, int storeys) {
   return made;
 }
 
-}  // namespace
-
+/// Member of a family used as a mechanism, with its counts.
+struct FamilyMember {
+  MechanismFile mechanism;
+  std::string counts;  ///< "10", "3x4"
+};
 Json FamilySchema() {
   return Named("family", EitherSchema({ChainFields().Schema(), LadderFields().Schema(),
                                        GridFields().Schema()}));
 }
 
+/// Returns all members of {"family": ...}; `room` is the maximum number of bodies.
 std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
   constexpr auto kMake = std::array{MakeChain, MakeLadder, MakeGrid};
   const auto name = node.Required("family", "a family");
@@ -336,8 +340,6 @@ std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t ro
 }
 
 // "problems" of an experiment file and their mechanisms.
-
-namespace {
 
 /// Reads the mechanism file of a problem; its errors are added to the experiment's errors.
 void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentProblem* problem) {
@@ -449,9 +451,7 @@ std::size_t BodiesOf(const ExperimentProblem& problem) {
 void ReadProblems(const JsonNode& node, ExperimentFile& experiment) {
   std::set<std::string> names;
   std::size_t bodies = 0;
-  const std::vector<JsonNode> elements = node.Elements("problems");
-  if (node.value().is_array() && elements.empty()) node.Fail("at least one problem");
-  for (const JsonNode& element : elements) {
+  for (const JsonNode& element : node.Elements("problems", "at least one problem")) {
     const std::size_t room = kMaxBodies - std::min(kMaxBodies, bodies);
     for (ExperimentProblem& problem : ReadProblem(element, *experiment.files, room)) {
       if (!problem.name.empty() && !names.insert(problem.name).second) {

@@ -71,14 +71,6 @@ const Fields<ExperimentFile>& ExperimentFileFields();
 
 /// Reader of "problems" with their mechanisms; a family with several counts gives several problems.
 FieldValue<ExperimentFile> ProblemsValue();
-/// Member of a family used as a mechanism, with its counts.
-struct FamilyMember {
-  MechanismFile mechanism;
-  std::string counts;  ///< "10", "3x4"
-};
-/// Returns all members of {"family": ...}; `room` is the maximum number of bodies.
-std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room);
-Json FamilySchema();
 /// Returns a list of methods, each entry expanded.
 std::vector<Method> ReadMethods(const JsonNode& node);
 Json MethodsSchema();
@@ -192,10 +184,6 @@ class ExperimentFields {
   Origins& origins_;
   MechanismFiles& files_;
 };
-
-/// Returns the tokens of a JSON Pointer, or nothing if it is invalid (no leading "/", "~" without 0
-/// or 1).
-std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer);
 
 // "sweep" of an experiment file: axes that are crossed, each the values of one field.
 //

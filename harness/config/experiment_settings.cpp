@@ -399,8 +399,8 @@ std::string NameInLimits(const Json& limits, const std::string& token) {
   return limits.contains(token) || !limits.contains(other) ? token : other;
 }
 
-}  // namespace
-
+/// Returns the tokens of a JSON Pointer, or nothing if it is invalid (no leading "/", "~" without 0
+/// or 1).
 std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) {
   if (pointer.empty() || pointer.front() != '/') return std::nullopt;
   std::vector<std::string> tokens;
@@ -417,6 +417,8 @@ std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer
   }
   return tokens;
 }
+
+}  // namespace
 
 bool ExperimentFields::TakeIn(Json& node, const std::string& pointer, FieldTargets* found) {
   const std::filesystem::path path = files_.Resolve(node.get<std::string>());

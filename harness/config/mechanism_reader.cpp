@@ -85,111 +85,6 @@ Json RotationSchema() { return EitherSchema({NumberSchema(), ArraySchema(NumberS
 
 Json PlaceSchema() { return Named("place", EitherSchema({TextSchema(), VectorSchema()})); }
 
-namespace {
-
-void ReadGravity(const JsonNode& node, Draft& draft) {
-  draft.gravity = ReadVector(node, draft.space);
-}
-
-Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.space); }
-
-// without bodies, every reference to a body would be a consequential error
-bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
-
-/// Assembles a file with targets and takes over the coordinates of the result.
-void MeetTargets(const JsonNode& root, Draft& draft) {
-  if (draft.initial.poses.empty() || !root.errors().empty() || !Validate(draft).empty()) return;
-  const std::string why = ResolvePoses(&draft);
-  if (why.empty()) return;
-  root.Optional("initial")->Optional("poses")->FailAs(why, "targets that the loops allow");
-}
-
-}  // namespace
-
-const Fields<Draft>& MechanismFileFields() {
-  static const Fields<Draft> fields(
-      "mechanism",
-      "Bodies, joints, forces and initial values in SI units; angles in rad. The program also "
-      "checks that names exist, that inertias are positive definite and physically possible, and "
-      "that each joint has as many values as coordinates.",
-      DocumentRows<Draft>(
-          {{"name", Text(&Draft::name), "Name of the mechanism.", "a name"},
-           {"comment", Text(&Draft::comment), "Free text for readers."},
-           {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
-            "planar: all motion is in the x-y plane, and third components are 0."},
-           {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
-            "Acceleration of gravity [m/s^2] in ground axes.",
-            "an array of 2 or 3 numbers [m/s^2]"},
-           {"ground", GroundValue()},
-           {"bodies", BodiesValue(), "Moving bodies.", "an array of bodies", HasNoBodies},
-           {"joints", JointsValue(), "Joints between the bodies.", "an array of joints"},
-           {"couplings", CouplingsValue(),
-            "Linear relations of joint coordinates: gears, racks, differentials."},
-           {"forces", ForcesValue(), "Forces other than gravity."},
-           {"initial", Section(InitialFields())},
-           {"independent", IndependentValue(),
-            "Independent speeds of the fixed coordinate reduction: joint names for joint "
-            "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute coordinates."},
-           {"accuracy", Number(&Draft::accuracy, kPositive),
-            "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. "
-            "Loops with smaller gaps are closed; constraints with smaller differences are "
-            "redundant."},
-           {"known_solution", Section(ObservationFields())},
-           {"expect", ExpectValue()}}));
-  return fields;
-}
-
-Json MechanismSchema() { return MechanismFileFields().OwnSchema(); }
-
-MechanismFile ReadMechanism(const std::filesystem::path& path) {
-  return ParseMechanism(ReadTextFile(path), path.string());
-}
-
-MechanismFile ParseMechanism(std::string_view text, const std::string& file) {
-  return ReadDocument(text, file, ReadMechanismObject);
-}
-
-MechanismFile ReadMechanismObject(const JsonNode& root) {
-  MechanismFile result;
-  result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
-  Draft draft;
-  draft.bodies[kGround].name = "ground";
-  draft.body_names.Add("ground");
-  if (ExpectDocument(root, FileKind::kMechanism)) {
-    MechanismFileFields().ReadRows(root, &draft);
-    MeetTargets(root, draft);
-  }
-  result.observe = std::move(draft.observe);
-  result.description = std::move(static_cast<MechanismDescription&>(draft));
-  return result;
-}
-
-namespace {
-
-void RefuseReleased(const MechanismDescription& description) {
-  for (const JointDescription& joint : description.joints) {
-    if (joint.released.empty()) continue;
-    throw ConfigError(fmt::format(
-        "{}: joint \"{}\": found released directions, expected none: no mechanism file says them",
-        description.name, joint.name));
-  }
-}
-
-}  // namespace
-
-std::string MechanismText(const MechanismDescription& description,
-                          const ObservedQuantities& observe, const std::string& comment) {
-  RefuseReleased(description);
-  Draft draft;
-  static_cast<MechanismDescription&>(draft) = description;
-  draft.bodies[kGround].name = "ground";
-  draft.observe = observe;
-  draft.comment = comment;
-  std::string text = JsonText(MechanismFileFields().Write(draft));
-  ParseMechanism(text, description.name + " (written)");
-  return text;
-}
-
 // "initial", "independent", "observe" and "expect" of a mechanism file.
 
 namespace {
@@ -255,6 +150,20 @@ Json WriteJointValues(const Draft& draft, const std::vector<JointValues>& list, 
     written[joint.name] = count == 1 ? Json(one.values[0]) : Json(one.values);
   }
   return written.empty() ? Json() : written;
+}
+
+/// Returns the field of the coordinates or speeds of joints.
+FieldValue<Draft> JointValuesOf(std::vector<JointValues> InitialDescription::*list, bool speeds) {
+  constexpr std::size_t kMaxValues = 7;  // free joint in space
+  static const Json values =
+      Named("jointValues",
+            MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMaxValues)})));
+  return {values,
+          [=](const JsonNode& node, Draft& draft) {
+            draft.initial.*list = ReadJointValues(node, draft, speeds);
+          },
+          nullptr,
+          [=](const Draft& draft) { return WriteJointValues(draft, draft.initial.*list, speeds); }};
 }
 
 /// Names of speeds: joints with one speed, and owners of several speeds, named
@@ -377,14 +286,6 @@ Json NamesSchema() {
   return schema;
 }
 
-void ReadCoordinates(const JsonNode& node, Draft& draft) {
-  draft.initial.coordinates = ReadJointValues(node, draft, false);
-}
-
-Json WriteCoordinates(const Draft& draft) {
-  return WriteJointValues(draft, draft.initial.coordinates, false);
-}
-
 void ReadWeights(const JsonNode& node, Draft& draft) {
   if (!node.ExpectObject(draft.joint_names)) return;
   for (const auto& [name, weight] : node.Members()) {
@@ -456,12 +357,6 @@ Json WritePoses(const Draft& draft) {
   return poses.empty() ? Json() : poses;
 }
 
-void ReadSpeeds(const JsonNode& node, Draft& draft) {
-  draft.initial.speeds = ReadJointValues(node, draft, true);
-}
-
-Json WriteSpeeds(const Draft& draft) { return WriteJointValues(draft, draft.initial.speeds, true); }
-
 void ReadBranch(const JsonNode& node, Draft& draft) {
   for (const JsonNode& element : node.Elements("combinations of body angles")) {
     draft.observe.branch_invariants.push_back(ReadCombination(element, draft));
@@ -520,25 +415,13 @@ Json WriteExpect(const Draft& draft) {
 
 }  // namespace
 
-FieldValue<Draft> ExpectValue() {
-  return By(ExpectationFields().Schema(), ReadExpect, WriteExpect);
-}
-
-FieldValue<Draft> IndependentValue() {
-  return By(NamesSchema(), ReadIndependent, WriteIndependent);
-}
-
 const Fields<Draft>& InitialFields() {
-  constexpr std::size_t kMaxValues = 7;  // free joint in space
-  static const Json values =
-      Named("jointValues",
-            MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMaxValues)})));
   static const Fields<Draft> fields(
       "initial", "Initial coordinates and speeds. Missing values are found by assembly.",
-      {{"coordinates", By(values, ReadCoordinates, WriteCoordinates),
+      {{"coordinates", JointValuesOf(&InitialDescription::coordinates, false),
         "Guesses by joint, or exact values for \"fixed\" joints. Revolute [rad], prismatic [m], "
         "free joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
-       {"speeds", By(values, ReadSpeeds, WriteSpeeds),
+       {"speeds", JointValuesOf(&InitialDescription::speeds, true),
         "Speeds by joint [rad/s or m/s]. The assembly of the loops keeps all of them."},
        {"fixed", By(NamesSchema(), ReadHeld, WriteHeld),
         "Joints whose coordinates the assembly keeps."},
@@ -560,6 +443,109 @@ const Fields<Draft>& ObservationFields() {
        {"length", By(NumberSchema(kPositive), ReadLength, WriteLength),
         "Characteristic bar length [m]; default: 1."}});
   return fields;
+}
+
+// The whole file.
+
+namespace {
+
+void ReadGravity(const JsonNode& node, Draft& draft) {
+  draft.gravity = ReadVector(node, draft.space);
+}
+
+Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.space); }
+
+// without bodies, every reference to a body would be a consequential error
+bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
+
+/// Assembles a file with targets and takes over the coordinates of the result.
+void MeetTargets(const JsonNode& root, Draft& draft) {
+  if (draft.initial.poses.empty() || !root.errors().empty() || !Validate(draft).empty()) return;
+  const std::string why = ResolvePoses(&draft);
+  if (why.empty()) return;
+  root.Optional("initial")->Optional("poses")->FailAs(why, "targets that the loops allow");
+}
+
+const Fields<Draft>& MechanismFileFields() {
+  static const Fields<Draft> fields(
+      "mechanism",
+      "Bodies, joints, forces and initial values in SI units; angles in rad. The program also "
+      "checks that names exist, that inertias are positive definite and physically possible, and "
+      "that each joint has as many values as coordinates.",
+      DocumentRows<Draft>(
+          {{"name", Text(&Draft::name), "Name of the mechanism.", "a name"},
+           {"comment", Text(&Draft::comment), "Free text for readers."},
+           {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
+            "planar: all motion is in the x-y plane, and third components are 0."},
+           {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
+            "Acceleration of gravity [m/s^2] in ground axes.",
+            "an array of 2 or 3 numbers [m/s^2]"},
+           {"ground", GroundValue()},
+           {"bodies", BodiesValue(), "Moving bodies.", "an array of bodies", HasNoBodies},
+           {"joints", JointsValue(), "Joints between the bodies.", "an array of joints"},
+           {"couplings", CouplingsValue(),
+            "Linear relations of joint coordinates: gears, racks, differentials."},
+           {"forces", ForcesValue(), "Forces other than gravity."},
+           {"initial", Section(InitialFields())},
+           {"independent", By(NamesSchema(), ReadIndependent, WriteIndependent),
+            "Independent speeds of the fixed coordinate reduction: joint names for joint "
+            "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute coordinates."},
+           {"accuracy", Number(&Draft::accuracy, kPositive),
+            "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. "
+            "Loops with smaller gaps are closed; constraints with smaller differences are "
+            "redundant."},
+           {"known_solution", Section(ObservationFields())},
+           {"expect", By(ExpectationFields().Schema(), ReadExpect, WriteExpect)}}));
+  return fields;
+}
+
+void RefuseReleased(const MechanismDescription& description) {
+  for (const JointDescription& joint : description.joints) {
+    if (joint.released.empty()) continue;
+    throw ConfigError(fmt::format(
+        "{}: joint \"{}\": found released directions, expected none: no mechanism file says them",
+        description.name, joint.name));
+  }
+}
+
+}  // namespace
+
+Json MechanismSchema() { return MechanismFileFields().OwnSchema(); }
+
+MechanismFile ReadMechanism(const std::filesystem::path& path) {
+  return ParseMechanism(ReadTextFile(path), path.string());
+}
+
+MechanismFile ParseMechanism(std::string_view text, const std::string& file) {
+  return ReadDocument(text, file, ReadMechanismObject);
+}
+
+MechanismFile ReadMechanismObject(const JsonNode& root) {
+  MechanismFile result;
+  result.canonical = root.value().dump(-1, ' ', false, Json::error_handler_t::replace);
+  Draft draft;
+  draft.bodies[kGround].name = "ground";
+  draft.body_names.Add("ground");
+  if (ExpectDocument(root, FileKind::kMechanism)) {
+    MechanismFileFields().ReadRows(root, &draft);
+    MeetTargets(root, draft);
+  }
+  result.observe = std::move(draft.observe);
+  result.description = std::move(static_cast<MechanismDescription&>(draft));
+  return result;
+}
+
+std::string MechanismText(const MechanismDescription& description,
+                          const ObservedQuantities& observe, const std::string& comment) {
+  RefuseReleased(description);
+  Draft draft;
+  static_cast<MechanismDescription&>(draft) = description;
+  draft.bodies[kGround].name = "ground";
+  draft.observe = observe;
+  draft.comment = comment;
+  std::string text = JsonText(MechanismFileFields().Write(draft));
+  ParseMechanism(text, description.name + " (written)");
+  return text;
 }
 
 }  // namespace loopbench::harness

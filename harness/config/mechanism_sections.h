@@ -40,16 +40,12 @@ inline constexpr std::string_view kSpatialCure = "\"space\": \"spatial\" at the 
 /// Reads a mechanism; `root` is the top level of a file or a value inside an experiment.
 MechanismFile ReadMechanismObject(const JsonNode& root);
 
-/// Fields of a mechanism file.
-const Fields<Draft>& MechanismFileFields();
 /// Fields of the sections of the same names.
 FieldValue<Draft> GroundValue();
 FieldValue<Draft> BodiesValue();
 FieldValue<Draft> JointsValue();
 FieldValue<Draft> CouplingsValue();
 FieldValue<Draft> ForcesValue();
-FieldValue<Draft> IndependentValue();
-FieldValue<Draft> ExpectValue();
 const Fields<Draft>& InitialFields();
 const Fields<Draft>& ObservationFields();
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "harness/config/butcher_table.h"
+#include "harness/config/options.h"
 
 namespace loopbench::harness {
 

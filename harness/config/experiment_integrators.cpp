@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "harness/config/butcher_table.h"
 #include "harness/config/experiment_sections.h"
+#include "harness/config/options.h"
 #include "harness/text/files.h"
 #include "harness/text/words.h"
 

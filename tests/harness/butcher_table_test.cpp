@@ -1,6 +1,4 @@
 // Butcher tables of ARKODE, of files and of programs, and their order conditions.
-#include "harness/config/butcher_table.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

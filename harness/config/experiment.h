@@ -174,7 +174,7 @@ struct ReferenceOptions {
   double cpu_s = 20.0;  ///< CPU time of one integration [s]; it certifies the completed part
 };
 
-/// Quantities in rows of a trajectory, in the order of columns (harness/trajectory/columns.h).
+/// Quantities in rows of a trajectory, in the order of columns (harness/trajectory/trajectory.h).
 enum class OutputPart { kJoints, kBodies, kPoints, kReactions, kForces, kEnergy };
 template <>
 inline constexpr std::array<std::string_view, 6> kNames<OutputPart> = {

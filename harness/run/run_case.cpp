@@ -19,7 +19,7 @@
 #include "harness/run/peers.h"
 #include "harness/run/side_by_side.h"
 #include "harness/text/hash.h"
-#include "harness/trajectory/recorder.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

@@ -17,7 +17,7 @@
 #include "harness/reference/reference.h"
 #include "harness/run/ensemble.h"
 #include "harness/run/side_by_side.h"
-#include "harness/trajectory/recorder.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/formulation/forward_jacobian.h"
 
 namespace loopbench::harness {

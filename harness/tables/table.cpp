@@ -101,7 +101,7 @@ std::string Cell(const Record& row, const TableColumn& column) {
 
 std::vector<RowGroup> Groups(const Table& table) {
   if (table.group.empty()) return {{"", table.rows}};
-  const TableColumn column{table.group, table.group, Format::kShortest, {}};
+  const TableColumn column{table.group, table.group, Format::kShortest};
   std::vector<RowGroup> groups;
   for (const Record& row : table.rows) {
     const std::string cell = Cell(row, column);
@@ -287,7 +287,7 @@ struct LatexColumn {
   bool is_broken = false;
 };
 
-LatexColumn Measured(const Table& table, const TableColumn& column) {
+LatexColumn LatexColumnOf(const Table& table, const TableColumn& column) {
   LatexColumn one{column, WidthOfText(column.header)};
   for (const Record& row : table.rows) one.width = std::max(one.width, WidthOfCell(row, column));
   if (column.format == Format::kText && one.width > kMaxOfText) {
@@ -363,7 +363,7 @@ std::string Preamble(const std::vector<LatexColumn>& columns, const Setting& set
 std::string ToLatex(const Table& table) {
   std::vector<LatexColumn> columns;
   for (const TableColumn& column : ColumnsUnderHeading(table)) {
-    columns.push_back(Measured(table, column));
+    columns.push_back(LatexColumnOf(table, column));
   }
   std::vector<std::size_t> left;
   std::vector<LatexColumn> shown = columns;

@@ -7,10 +7,159 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <span>
 #include <stdexcept>
 
 namespace loopbench::harness {
 namespace {
+
+constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+
+/// Returns the index of a column, or kNowhere.
+std::size_t PlaceOf(const TrajectoryColumn& column, const std::vector<TrajectoryColumn>& columns) {
+  const auto at = std::ranges::find(columns, column);
+  return at == columns.end() ? kNowhere : static_cast<std::size_t>(at - columns.begin());
+}
+
+/// Returns the indices of all of `wanted`; adds absent ones to `missing`.
+std::vector<std::size_t> PlacesOf(std::span<const TrajectoryColumn> wanted,
+                                  const std::vector<TrajectoryColumn>& columns,
+                                  std::vector<std::string>* missing) {
+  std::vector<std::size_t> places;
+  for (const TrajectoryColumn& column : wanted) {
+    places.push_back(PlaceOf(column, columns));
+    if (places.back() == kNowhere) missing->push_back(column.Label());
+  }
+  return places;
+}
+
+std::string Listed(const std::vector<std::string>& labels) {
+  constexpr std::size_t kMost = 6;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, labels.size()); ++i) {
+    text += fmt::format("{}\"{}\"", i == 0 ? "" : ", ", labels[i]);
+  }
+  if (labels.size() > kMost) text += fmt::format(" and {} more", labels.size() - kMost);
+  return text;
+}
+
+/// Mechanism in a position given by joint coordinates.
+template <class Space>
+struct MotionByJoints {
+  MotionByJoints(const MechanismDescription& user, const std::vector<TrajectoryColumn>& all,
+                 std::vector<std::string>* missing, std::vector<std::string>* no_speed)
+      : compiled(Compile(user, CompileOptions::None())),
+        mechanism(Unreleased(user), Coordinates::kJoint),
+        kinematics(mechanism),
+        q(VectorX<double>::Zero(mechanism.num_q())),
+        u(VectorX<double>::Zero(mechanism.num_u())) {
+    for (const TreeStep& step : mechanism.tree()) {
+      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+      if (joint.description < 0) {
+        // only a virtual joint leads there
+        missing->push_back("a joint of body " + mechanism.body_names()[step.child]);
+        continue;
+      }
+      const auto columns = JointColumns(user, static_cast<std::size_t>(joint.description));
+      // prescribed coordinates follow their function; file values are ignored
+      std::vector<TrajectoryColumn> q_of, u_of;
+      for (int i = 0; i < joint.kind->num_q; ++i) {
+        if (mechanism.DriveOf(joint, i) < 0) q_of.push_back(columns[i]);
+      }
+      for (int i = 0; i < joint.kind->num_u; ++i) {
+        if (mechanism.DriveOf(joint, i) < 0) u_of.push_back(columns[joint.kind->num_q + i]);
+      }
+      for (const std::size_t at : PlacesOf(q_of, all, missing)) of_q.push_back(at);
+      for (const std::size_t at : PlacesOf(u_of, all, no_speed)) of_u.push_back(at);
+    }
+  }
+
+  void Set(double t, const std::vector<double>& row, bool has_speeds,
+           std::vector<BodyMotion>* bodies) {
+    std::size_t next_q = 0, next_u = 0;
+    for (const TreeStep& step : mechanism.tree()) {
+      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+      for (int i = 0; i < joint.num_q(); ++i) q[joint.q_offset + i] = row[of_q[next_q++]];
+      for (int i = 0; i < joint.num_u(); ++i) {
+        const std::size_t at = of_u[next_u++];
+        if (has_speeds) u[joint.u_offset + i] = row[at];
+      }
+    }
+    kinematics.SetTime(t);
+    kinematics.UpdatePosition(q);
+    kinematics.UpdateVelocity(u);
+    EnterPart<Space>(compiled, 0, kinematics, {}, bodies);
+  }
+
+  Compiled compiled;
+  Mechanism<Space, double> mechanism;
+  Kinematics<Space, double> kinematics;
+  VectorX<double> q, u;
+  std::vector<std::size_t> of_q, of_u;  ///< columns, in the order of the tree
+};
+
+/// Poses of all bodies, row by row. They come from body columns, or from the coordinates of joints
+/// that lead to each body (`explain` lists joints that close loops). Speeds are read if complete.
+template <class Space>
+class MotionReader {
+ public:
+  /// Throws std::runtime_error with the missing columns.
+  MotionReader(const MechanismDescription& user, const std::vector<TrajectoryColumn>& columns,
+               const std::string& file)
+      : bodies_(user.bodies.size()), of_body_(user.bodies.size()) {
+    std::vector<std::string> no_pose, no_speed, no_joint;
+    for (std::size_t b = 1; b < user.bodies.size(); ++b) {
+      const std::vector<TrajectoryColumn> wanted = BodyColumns(user, b);
+      const std::span all(wanted);
+      of_body_[b] = PlacesOf(all.first(kPose), columns, &no_pose);
+      const auto speeds = PlacesOf(all.subspan(kPose), columns, &no_speed);
+      of_body_[b].insert(of_body_[b].end(), speeds.begin(), speeds.end());
+    }
+    has_speeds_ = no_speed.empty();
+    if (no_pose.empty()) return;
+    no_speed.clear();
+    joints_.emplace(user, columns, &no_joint, &no_speed);
+    has_speeds_ = no_speed.empty();
+    if (no_joint.empty()) return;
+    throw std::runtime_error(
+        fmt::format("{}: found neither the poses of all bodies nor the coordinates of joints that "
+                    "lead to them, expected {}, or else {}",
+                    file, Listed(no_pose), Listed(no_joint)));
+  }
+
+  bool from_joints() const { return joints_.has_value(); }
+  bool has_speeds() const { return has_speeds_; }
+
+  /// Returns motions by the user's body; speeds are zero if they are not given.
+  const std::vector<BodyMotion>& Read(double t, const std::vector<double>& row) {
+    if (joints_) {
+      joints_->Set(t, row, has_speeds_, &bodies_);
+      return bodies_;
+    }
+    for (std::size_t b = 1; b < bodies_.size(); ++b) {
+      const std::vector<std::size_t>& at = of_body_[b];
+      BodyMotion& body = bodies_[b];
+      body.pose = PoseColumns{at, kPlanar}.At(row.data());
+      if (kPlanar) body.angle = row[at[2]];
+      if (!has_speeds_) continue;
+      const auto value = [&](std::size_t i) { return row[at[kPose + i]]; };
+      body.velocity = {value(0), value(1), kPlanar ? 0.0 : value(2)};
+      body.angular_velocity = kPlanar ? Eigen::Vector3d(0.0, 0.0, value(2))
+                                      : Eigen::Vector3d(value(3), value(4), value(5));
+    }
+    return bodies_;
+  }
+
+ private:
+  static constexpr bool kPlanar = Space::kRot == 1;
+  static constexpr std::size_t kPose = kPlanar ? 3 : 7;  ///< number of its columns
+
+  std::vector<BodyMotion> bodies_;
+  std::vector<std::vector<std::size_t>> of_body_;  ///< pose and speeds
+  std::optional<MotionByJoints<Space>> joints_;    ///< for files without the poses
+  bool has_speeds_ = false;
+};
 
 /// Columns of a position and its speed.
 struct Pair {
@@ -95,14 +244,11 @@ class Checker {
     for (std::size_t j = 0; j < user.joints.size(); ++j) {
       given_.emplace_back();
       for (const TrajectoryColumn& column : JointColumns(user, j)) {
-        const auto at = std::ranges::find(reader.columns(), column);
-        given_.back().push_back(at == reader.columns().end()
-                                    ? kNowhere
-                                    : static_cast<std::size_t>(at - reader.columns().begin()));
+        given_.back().push_back(PlaceOf(column, reader.columns()));
       }
     }
-    supplied_ = Work("supplied");
-    dissipated_ = Work("dissipated");
+    supplied_ = PlaceOf({"energy", "", "supplied", "J"}, reader.columns());
+    dissipated_ = PlaceOf({"energy", "", "dissipated", "J"}, reader.columns());
     if (!check_.has_speeds) {
       check_.no_energy = "there are no speeds";
     } else if (mechanism_.mechanism().has_power() &&
@@ -132,14 +278,6 @@ class Checker {
   }
 
  private:
-  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
-
-  std::size_t Work(const std::string& part) const {
-    const auto& columns = reader_.columns();
-    const auto at = std::ranges::find(columns, TrajectoryColumn{"energy", "", part, "J"});
-    return at == columns.end() ? kNowhere : static_cast<std::size_t>(at - columns.begin());
-  }
-
   void Add(double t, const std::vector<double>& row) {
     if (check_.rows++ == 0) check_.from = t;
     check_.to = t;
@@ -191,7 +329,7 @@ class Checker {
   TrajectoryReader& reader_;
   std::string file_;
   const MechanismDescription& user_;
-  MotionReader motion_;
+  MotionReader<Space> motion_;
   UserMechanism<Space> mechanism_;
   std::vector<Pair> pairs_;
   std::vector<std::size_t> motions_;             ///< columns of the mechanism's motion
@@ -216,10 +354,9 @@ TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
 std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory& theirs) {
   std::vector<SharedColumn> shared;
   for (std::size_t i = 0; i < ours.columns.size(); ++i) {
-    const auto at = std::ranges::find(theirs.columns, ours.columns[i]);
-    if (i == ours.time || ours.columns[i].kind.empty() || at == theirs.columns.end()) continue;
-    shared.push_back({ours.columns[i].Label(), ours.columns[i].unit, i,
-                      static_cast<std::size_t>(at - theirs.columns.begin())});
+    const std::size_t at = PlaceOf(ours.columns[i], theirs.columns);
+    if (i == ours.time || ours.columns[i].kind.empty() || at == kNowhere) continue;
+    shared.push_back({ours.columns[i].Label(), ours.columns[i].unit, i, at});
   }
   return shared;
 }

@@ -1,7 +1,6 @@
 // Checks of trajectories against the equations and against each other.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,27 +52,9 @@ struct TrajectoryCheck {
   std::vector<std::string> unknown;  ///< labels that do not exist in the mechanism
 };
 
-/// Poses of all bodies, row by row. They come from body columns, or from the coordinates of joints
-/// that lead to each body (`explain` lists joints that close loops). Speeds are read if complete.
-class MotionReader {
- public:
-  /// Throws std::runtime_error with the missing columns.
-  MotionReader(const MechanismDescription& user, const std::vector<TrajectoryColumn>& columns,
-               const std::string& file);
-  ~MotionReader();
-
-  bool from_joints() const;
-  bool has_speeds() const;
-  /// Returns motions by the user's body; speeds are zero if they are not given.
-  const std::vector<BodyMotion>& Read(double t, const std::vector<double>& row);
-
- private:
-  struct Work;
-  std::unique_ptr<Work> work_;
-};
-
-/// Checks row by row, with fixed memory. Throws as TrajectoryReader and MotionReader, and
-/// std::runtime_error for no rows or a row with a non-finite number in a motion column.
+/// Checks row by row, with fixed memory. Throws as TrajectoryReader, and
+/// std::runtime_error for missing columns, no rows or a row with a non-finite number in a motion
+/// column.
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user);
 

@@ -1,5 +1,3 @@
-#include "harness/trajectory/columns.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <utility>
 
 #include "harness/text/escape.h"
+#include "harness/trajectory/trajectory.h"
 #include "harness/trajectory/user_mechanism.h"
 
 namespace loopbench::harness {

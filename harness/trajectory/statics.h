@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/trajectory/columns.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -18,10 +19,10 @@
 #include "harness/text/escape.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
-#include "harness/trajectory/check.h"
 #include "mechanism/algebra/space.h"
 
 namespace loopbench::harness {
+
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -213,168 +214,6 @@ std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
 }
 namespace {
 
-/// Indices of columns in a file, and the missing columns.
-class Places {
- public:
-  explicit Places(const std::vector<TrajectoryColumn>& columns) : columns_(columns) {}
-
-  /// Returns the indices of all of `wanted`; adds absent ones to `missing`.
-  std::vector<std::size_t> Of(const std::vector<TrajectoryColumn>& wanted,
-                              std::vector<std::string>* missing) const {
-    std::vector<std::size_t> places;
-    for (const TrajectoryColumn& column : wanted) {
-      const auto at = std::ranges::find(columns_, column);
-      if (at == columns_.end()) missing->push_back(column.Label());
-      places.push_back(static_cast<std::size_t>(at - columns_.begin()));
-    }
-    return places;
-  }
-
- private:
-  const std::vector<TrajectoryColumn>& columns_;
-};
-
-std::string Listed(const std::vector<std::string>& labels) {
-  constexpr std::size_t kMost = 6;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(kMost, labels.size()); ++i) {
-    text += fmt::format("{}\"{}\"", i == 0 ? "" : ", ", labels[i]);
-  }
-  if (labels.size() > kMost) text += fmt::format(" and {} more", labels.size() - kMost);
-  return text;
-}
-
-/// Mechanism in a position given by joint coordinates.
-struct ByJoints {
-  virtual ~ByJoints() = default;
-  virtual void Set(double t, const std::vector<double>& row, bool has_speeds,
-                   std::vector<BodyMotion>* bodies) = 0;
-};
-
-template <class Space>
-struct ByJointsIn final : ByJoints {
-  ByJointsIn(const MechanismDescription& user, const Places& places,
-             std::vector<std::string>* missing, std::vector<std::string>* no_speed)
-      : compiled(Compile(user, CompileOptions::None())),
-        mechanism(Unreleased(user), Coordinates::kJoint),
-        kinematics(mechanism),
-        q(VectorX<double>::Zero(mechanism.num_q())),
-        u(VectorX<double>::Zero(mechanism.num_u())) {
-    for (const TreeStep& step : mechanism.tree()) {
-      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
-      if (joint.description < 0) {
-        // only a virtual joint leads there
-        missing->push_back("a joint of body " + mechanism.body_names()[step.child]);
-        continue;
-      }
-      const auto columns = JointColumns(user, static_cast<std::size_t>(joint.description));
-      // prescribed coordinates follow their function; file values are ignored
-      std::vector<TrajectoryColumn> q_of, u_of;
-      for (int i = 0; i < joint.kind->num_q; ++i) {
-        if (mechanism.DriveOf(joint, i) < 0) q_of.push_back(columns[i]);
-      }
-      for (int i = 0; i < joint.kind->num_u; ++i) {
-        if (mechanism.DriveOf(joint, i) < 0) u_of.push_back(columns[joint.kind->num_q + i]);
-      }
-      for (const std::size_t at : places.Of(q_of, missing)) of_q.push_back(at);
-      for (const std::size_t at : places.Of(u_of, no_speed)) of_u.push_back(at);
-    }
-  }
-
-  void Set(double t, const std::vector<double>& row, bool has_speeds,
-           std::vector<BodyMotion>* bodies) override {
-    std::size_t next_q = 0, next_u = 0;
-    for (const TreeStep& step : mechanism.tree()) {
-      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
-      for (int i = 0; i < joint.num_q(); ++i) q[joint.q_offset + i] = row[of_q[next_q++]];
-      for (int i = 0; i < joint.num_u(); ++i) {
-        const std::size_t at = of_u[next_u++];
-        if (has_speeds) u[joint.u_offset + i] = row[at];
-      }
-    }
-    kinematics.SetTime(t);
-    kinematics.UpdatePosition(q);
-    kinematics.UpdateVelocity(u);
-    EnterPart<Space>(compiled, 0, kinematics, {}, bodies);
-  }
-
-  Compiled compiled;
-  Mechanism<Space, double> mechanism;
-  Kinematics<Space, double> kinematics;
-  VectorX<double> q, u;
-  std::vector<std::size_t> of_q, of_u;  ///< columns, in the order of the tree
-};
-
-}  // namespace
-
-struct MotionReader::Work {
-  const MechanismDescription& user;
-  std::vector<BodyMotion> bodies;
-  std::vector<std::vector<std::size_t>> of_body;  ///< pose and speeds; empty: from joints
-  std::unique_ptr<ByJoints> joints;
-  bool has_speeds = false;
-};
-
-MotionReader::MotionReader(const MechanismDescription& user,
-                           const std::vector<TrajectoryColumn>& columns, const std::string& file)
-    : work_(new Work{user, std::vector<BodyMotion>(user.bodies.size()), {}, nullptr, false}) {
-  const Places places(columns);
-  const std::size_t pose = user.space == SpaceKind::kPlanar ? 3 : 7;
-  std::vector<std::string> no_pose, no_speed;
-  work_->of_body.resize(user.bodies.size());
-  for (std::size_t b = 1; b < user.bodies.size(); ++b) {
-    const auto wanted = BodyColumns(user, b);
-    const auto speeds = wanted.begin() + static_cast<std::ptrdiff_t>(pose);
-    work_->of_body[b] = places.Of({wanted.begin(), speeds}, &no_pose);
-    const auto more = places.Of({speeds, wanted.end()}, &no_speed);
-    work_->of_body[b].insert(work_->of_body[b].end(), more.begin(), more.end());
-  }
-  work_->has_speeds = no_speed.empty();
-  if (no_pose.empty()) return;
-  work_->of_body.clear();
-  std::vector<std::string> no_joint;
-  no_speed.clear();
-  if (user.space == SpaceKind::kPlanar) {
-    work_->joints = std::make_unique<ByJointsIn<Planar>>(user, places, &no_joint, &no_speed);
-  } else {
-    work_->joints = std::make_unique<ByJointsIn<Spatial>>(user, places, &no_joint, &no_speed);
-  }
-  work_->has_speeds = no_speed.empty();
-  if (no_joint.empty()) return;
-  throw std::runtime_error(
-      fmt::format("{}: found neither the poses of all bodies nor the coordinates of joints that "
-                  "lead to them, expected {}, or else {}",
-                  file, Listed(no_pose), Listed(no_joint)));
-}
-
-MotionReader::~MotionReader() = default;
-
-bool MotionReader::from_joints() const { return work_->joints != nullptr; }
-bool MotionReader::has_speeds() const { return work_->has_speeds; }
-
-const std::vector<BodyMotion>& MotionReader::Read(double t, const std::vector<double>& row) {
-  Work& work = *work_;
-  if (work.joints) {
-    work.joints->Set(t, row, work.has_speeds, &work.bodies);
-    return work.bodies;
-  }
-  const bool planar = work.user.space == SpaceKind::kPlanar;
-  const std::size_t pose = planar ? 3 : 7;
-  for (std::size_t b = 1; b < work.bodies.size(); ++b) {
-    const std::vector<std::size_t>& at = work.of_body[b];
-    BodyMotion& body = work.bodies[b];
-    body.pose = PoseColumns{at, planar}.At(row.data());
-    if (planar) body.angle = row[at[2]];
-    if (!work.has_speeds) continue;
-    const auto value = [&](std::size_t i) { return row[at[pose + i]]; };
-    body.velocity = {value(0), value(1), planar ? 0.0 : value(2)};
-    body.angular_velocity = planar ? Eigen::Vector3d(0.0, 0.0, value(2))
-                                   : Eigen::Vector3d(value(3), value(4), value(5));
-  }
-  return work.bodies;
-}
-namespace {
-
 constexpr std::size_t kBuffer = 1 << 20;
 constexpr const char* kPart = ".part";
 
@@ -511,5 +350,140 @@ std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
   }
   return missing;
 }
+
+namespace {
+
+std::string_view HowOf(const OutputOptions& output) {
+  if (output.accepted_steps) return "accepted steps";
+  return output.exact ? "exact times" : "dense output";
+}
+
+constexpr const char* kOpen =
+    "nan, because redundant constraints share a load in no one way, in {} of {} rows: {}";
+
+}  // namespace
+
+template <class Space>
+Recorder<Space>::Recorder(const MechanismDescription& user, const Compiled& compiled,
+                          const Mechanism<Space, double>& mechanism, const TrajectoryTask& task)
+    : user_(user),
+      compiled_(compiled),
+      task_(task),
+      dynamics_(mechanism),
+      A_(static_cast<std::size_t>(mechanism.num_bodies())),
+      points_(PointsOf(user)),
+      rows_(MakeRowWriter(user, task_.output)) {
+  moment_.bodies = AtRest(compiled);
+  moment_.followed.assign(user.joints.size(), kNaN);
+}
+
+template <class Space>
+void Recorder<Space>::TakeAt(double t, System<Space, double>& system, std::span<const double> y,
+                             std::span<const double> lower) {
+  const auto n = static_cast<std::size_t>(system.state_size());
+  if (lower.data() != y.data() && system.FromState(t, lower.first(n)) == Outcome::kFinished) {
+    lower_.emplace(moment_.bodies);
+    EnterPart<Space>(compiled_, 0, system.kinematics(), {}, &*lower_);
+  }
+  bool has_accelerations = task_.output.Has(OutputPart::kReactions);
+  if (has_accelerations) {
+    ydot_.resize(n);
+    has_accelerations = system.Examine(t, y.first(n), ydot_) == Outcome::kFinished;
+  } else {
+    system.FromState(t, y.first(n));
+  }
+  Take(t, system, has_accelerations, y.subspan(n));
+}
+
+template <class Space>
+void Recorder<Space>::Take(double t, const System<Space, double>& system, bool has_accelerations,
+                           std::span<const double> work) {
+  const Kinematics<Space, double>& kinematics = system.kinematics();
+  std::span<const Acceleration<Space, double>> accelerations;
+  if (has_accelerations) {
+    dynamics_.BodyAccelerations(kinematics, system.udot(), A_);
+    accelerations = A_;
+  }
+  moment_.t = t;
+  const double none = system.mechanism().has_power() ? kNaN : 0.0;
+  moment_.supplied = work.empty() ? none : work[0];
+  moment_.dissipated = work.empty() ? none : work[1];
+  EnterPart<Space>(compiled_, 0, kinematics, accelerations, &moment_.bodies);
+  const auto& joints = kinematics.mechanism().joints();
+  for (std::size_t j = 0; j < compiled_.joints.size(); ++j) {
+    const JointImage& image = compiled_.joints[j];
+    if (image.part < 0 || joints[image.joint].kind->num_u != 1) continue;
+    const double value = kinematics.JointCoordinate(image.joint);
+    moment_.followed[j] = image.mirrored ? -value : value;
+  }
+  for (std::size_t i = 0; lower_ && i < points_.size(); ++i) {
+    const auto& [body, at] = points_[i];
+    const Eigen::Vector3d apart = (*lower_)[body].PointAt(at) - moment_.bodies[body].PointAt(at);
+    interpolation_ = std::max(interpolation_, apart.norm());
+  }
+  lower_.reset();
+  rows_->Write(moment_, &row_);
+  if (!file_) Open();
+  file_->Write(row_);
+}
+
+template <class Space>
+void Recorder<Space>::Open() {
+  file_.emplace(task_.path, TrajectoryColumns(user_, task_.output), Notes());
+}
+
+template <class Space>
+std::vector<std::string> Recorder<Space>::Notes() const {
+  const OutputOptions& output = task_.output;
+  std::vector<std::string> notes = {fmt::format(
+      "{}: {}; SI units; bodies at their origins, in ground axes", task_.title, HowOf(output))};
+  if (output.Has(OutputPart::kReactions)) {
+    notes.push_back(fmt::format(
+        "reaction: on the joint's second body, moment about the joint's point there, in {}; "
+        "without "
+        "drives and joint forces. drive: along the coordinate, power = drive times speed",
+        output.axes == OutputAxes::kGround ? "ground axes"
+                                           : "axes of the joint's frame on its first body"));
+  }
+  if (output.Has(OutputPart::kForces)) {
+    notes.push_back(
+        "force: effort along the coordinate on the joint's second body; tension pulls both points "
+        "together; fx fy fz on the body at the point, in ground axes");
+  }
+  return notes;
+}
+
+template <class Space>
+void Recorder<Space>::Finish(Record& record) {
+  if (!file_) Open();
+  const std::int64_t rows = file_->rows();
+  // columns without a value in equally many rows share a line
+  std::vector<std::string> notes;
+  std::int64_t open = 0;
+  const auto columns = rows_->Open();
+  for (auto at = columns.begin(); at != columns.end();) {
+    const auto end = std::find_if(at, columns.end(),
+                                  [&](const auto& other) { return other.second != at->second; });
+    std::string labels;
+    for (auto one = at; one != end; ++one) {
+      labels += (labels.empty() ? "" : ", ") + one->first;
+      open += one->second;
+    }
+    notes.push_back(fmt::format(kOpen, at->second, rows, labels));
+    at = end;
+  }
+  const std::string hash = file_->Finish(notes);
+  record.Set("trajectory", task_.path.filename().string());
+  record.Set("trajectory_hash", hash);
+  record.Set("trajectory_output", std::string(HowOf(task_.output)));
+  record.Set("trajectory_rows", rows);
+  if (open > 0) record.Set("trajectory_open", open);
+  if (!task_.output.accepted_steps && !task_.output.exact) {
+    record.Set("trajectory_interpolation_max", interpolation_);
+  }
+}
+
+template class Recorder<Planar>;
+template class Recorder<Spatial>;
 
 }  // namespace loopbench::harness

@@ -1,25 +1,97 @@
-// Trajectories as files of a run: layout, reader, writer, their places in a store.
+// Trajectories as files of a run: columns, reader, writer, their places in a store, and the
+// recorder of a run.
 #pragma once
 
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "harness/config/experiment.h"
 #include "harness/record/record.h"
+#include "harness/reference/reference.h"
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
-#include "harness/trajectory/columns.h"
+#include "harness/trajectory/user_mechanism.h"
 #include "mechanism/description/joint_frames.h"
+#include "mechanism/formulation/system.h"
+#include "mechanism/loops/tree_dynamics.h"
 
 namespace loopbench::harness {
 
+// Columns of a trajectory: names, units and order.
+//
+//   t [s]
+//   joint:NAME:COORDINATE [rad|m|1]      then its speeds: "angle speed [rad/s]", "wx [rad/s]"
+//   body:NAME:x [m] y z, angle [rad] or qw [1] qx qy qz, vx [m/s] vy vz, w [rad/s] or wx wy wz
+//   point:BODY:POINT:x [m] y z, vx [m/s] vy vz
+//   reaction:JOINT:fx [N] fy fz, mx [N m] my mz
+//   drive:JOINT:COORDINATE [N m|N]
+//   force:INDEX:KIND:JOINT:effort [N m|N], force:INDEX:KIND:tension [N], force:INDEX:KIND:fx [N]
+//   ... energy:kinetic [J] potential, supplied, dissipated
+//
+// Planar trajectories omit z, qw, mx etc. In names a backslash precedes ':' and '\', and control
+// characters are made visible: labels are unique and have one line. CSV quotes the rest.
+
+struct TrajectoryColumn {
+  std::string kind;       ///< "joint", "body", ...; "t"
+  std::string name;       ///< name of the part, as written between the colons; may be empty
+  std::string component;  ///< "angle", "x", ...
+  std::string unit;
+
+  /// Returns "joint:A:angle [rad]".
+  std::string Label() const;
+  friend bool operator==(const TrajectoryColumn&, const TrajectoryColumn&) = default;
+};
+
+/// Returns a name as written in labels.
+std::string LabelName(std::string_view name);
+
+/// Parses a label; returns nothing if it is invalid.
+std::optional<TrajectoryColumn> ParseLabel(std::string_view label);
+
+/// Returns all columns of a mechanism, "t [s]" first.
+std::vector<TrajectoryColumn> TrajectoryColumns(const MechanismDescription& user,
+                                                const OutputOptions& output);
+
+/// Return the columns of a joint (coordinates, then speeds) or a body (pose, then speeds).
+std::vector<TrajectoryColumn> JointColumns(const MechanismDescription& user, std::size_t joint);
+std::vector<TrajectoryColumn> BodyColumns(const MechanismDescription& user, std::size_t body);
+
+// One row of a trajectory: all quantities of the user's mechanism at one time.
+
+/// State of a mechanism at one time of a run.
+struct RunSample {
+  double t = 0.0;
+  std::vector<BodyMotion> bodies;  ///< by the user's body
+  /// By the user's joint: its coordinate with full turns if the run integrates it, else NaN.
+  std::vector<double> followed;
+  double supplied = 0.0, dissipated = 0.0;  ///< work since the start [J]; NaN if unknown
+};
+
+class RowWriter {
+ public:
+  virtual ~RowWriter() = default;
+  /// Writes the quantities of TrajectoryColumns(), in their order. Spatial angles and signs of
+  /// quaternions are continuous: closest to the last row, or to a followed coordinate.
+  virtual void Write(const RunSample& moment, std::vector<double>* row) = 0;
+  /// Returns labels of reactions and drives that were not unique so far, with the number of rows.
+  virtual std::vector<std::pair<std::string, std::int64_t>> Open() const = 0;
+};
+
+/// Makes a writer for planar or spatial mechanisms. The arguments must outlive it.
+std::unique_ptr<RowWriter> MakeRowWriter(const MechanismDescription& user,
+                                         const OutputOptions& output);
+
 // A trajectory file: columns of numbers over time.
 //
-// The file is CSV: lines that begin with "#" are notes, followed by a line of labels (columns.h)
+// The file is CSV: lines that begin with "#" are notes, followed by a line of labels (above)
 // and a line per time. An unknown number is nan or an empty cell. The writer of a run uses all
 // requested columns. The reader also accepts files of other programs with any subset of these
 // labels, in any order.
@@ -154,5 +226,54 @@ void VerifyTrajectory(const Record& record, const std::filesystem::path& file);
 std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
                                           const std::vector<std::filesystem::path>& stores,
                                           const std::filesystem::path& target);
+
+// Recorder of a run: converts integrator states into trajectory rows of the user's mechanism.
+
+/// Output file and options of a trajectory.
+struct TrajectoryTask {
+  const OutputOptions& output;
+  std::filesystem::path path;
+  std::string title;  ///< title of the case
+};
+
+/// Recorder for a mechanism that runs as one part; never used inside a right-hand side.
+template <class Space>
+class Recorder {
+ public:
+  /// `user`, `compiled`, `mechanism` and the references in `task` must outlive it.
+  Recorder(const MechanismDescription& user, const Compiled& compiled,
+           const Mechanism<Space, double>& mechanism, const TrajectoryTask& task);
+
+  /// Writes a row for an integrator state at a step end or between steps. The state contains
+  /// positions, speeds, and works if integrated. `lower` has a larger interpolation error, or is
+  /// the same state.
+  void TakeAt(double t, System<Space, double>& system, std::span<const double> y,
+              std::span<const double> lower);
+  /// Writes a row from the evaluated state of `system`; known accelerations are its udot(). `work`
+  /// contains supplied and dissipated work; empty if not integrated.
+  void Take(double t, const System<Space, double>& system, bool has_accelerations,
+            std::span<const double> work);
+
+  /// Completes the file and sets its record keys. Without recorded states the file has no rows.
+  void Finish(Record& record);
+
+ private:
+  void Open();
+  std::vector<std::string> Notes() const;
+
+  const MechanismDescription& user_;
+  const Compiled& compiled_;
+  TrajectoryTask task_;
+  TreeDynamics<Space, double> dynamics_;
+  std::vector<Acceleration<Space, double>> A_;
+  RunSample moment_;
+  std::optional<std::vector<BodyMotion>> lower_;  ///< motions of the state with the larger error
+  std::vector<double> ydot_;
+  std::vector<MeasuredPoint> points_;  ///< points for comparing interpolation degrees
+  double interpolation_ = 0.0;         ///< [m]
+  std::unique_ptr<RowWriter> rows_;
+  std::optional<TrajectoryWriter> file_;  ///< opened with the first row
+  std::vector<double> row_;
+};
 
 }  // namespace loopbench::harness

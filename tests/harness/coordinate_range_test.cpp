@@ -1,12 +1,11 @@
 // Ranges of driven coordinates against closed forms of triangles.
-#include "harness/analysis/coordinate_range.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
+#include "harness/analysis/structure_hints.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/places.h"
 

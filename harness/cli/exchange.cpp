@@ -23,9 +23,8 @@
 #include "harness/run/case_identity.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
-#include "harness/view/html.h"
 #include "harness/view/picture.h"
-#include "harness/view/svg.h"
+#include "harness/view/writers.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

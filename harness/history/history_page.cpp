@@ -10,7 +10,7 @@
 #include "harness/history/history_series.h"
 #include "harness/judge/demand.h"
 #include "harness/text/escape.h"
-#include "harness/view/html.h"
+#include "harness/view/writers.h"
 
 namespace loopbench::harness {
 namespace {

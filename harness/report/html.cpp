@@ -14,7 +14,7 @@
 #include "harness/tables/warning_notes.h"
 #include "harness/text/escape.h"
 #include "harness/text/words.h"
-#include "harness/view/html.h"
+#include "harness/view/writers.h"
 
 namespace loopbench::harness {
 namespace {

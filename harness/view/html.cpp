@@ -1,5 +1,3 @@
-#include "harness/view/html.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -7,7 +5,7 @@
 
 #include "harness/text/escape.h"
 #include "harness/view/picture.h"
-#include "harness/view/svg.h"
+#include "harness/view/writers.h"
 
 namespace loopbench::harness {
 namespace {
@@ -210,10 +208,6 @@ std::string ToHtml(const Picture& picture) {
 }
 namespace {
 
-TableColumn Words(const char* key, const char* header) {
-  return {.key = key, .header = header, .format = Format::kText};
-}
-
 /// Returns six digits; zero below `round_off`.
 std::string Number(double value, double round_off) {
   return fmt::format("{:.6g}", std::abs(value) < round_off ? 0.0 : value);
@@ -230,8 +224,7 @@ class Writer {
   void AddPlace(const std::string& prefix, const std::string& what, Table* table) const {
     for (const char axis : {'x', 'y', 'z'}) {
       if (axis == 'z' && picture_.planar) continue;
-      table->columns.push_back(
-          {.key = prefix + axis, .header = what + axis + " [m]", .format = Format::kText});
+      table->columns.push_back({prefix + axis, what + axis + " [m]"});
     }
   }
   void SetPlace(const std::string& prefix, const Vector3d& p, Record* row) const {
@@ -242,15 +235,14 @@ class Writer {
 
   Table Bodies() const {
     Table table{.title = picture_.assembled ? "Bodies, as assembled" : "Bodies, as the file says"};
-    table.columns = {Words("name", "body")};
+    table.columns = {{"name", "body"}};
     AddPlace("", "", &table);
-    table.columns.push_back(Words("turn", picture_.planar ? "angle [rad]" : "turn [rad]"));
+    table.columns.push_back({"turn", picture_.planar ? "angle [rad]" : "turn [rad]"});
     AddPlace("com", "com ", &table);
-    table.columns.push_back(Words("gone", "in a run"));
+    table.columns.push_back({"gone", "in a run"});
     for (std::size_t b = 1; b < picture_.bodies; ++b) {
       const Frame& X = picture_.start[b];
-      Record& row = table.rows.emplace_back();
-      row.Set("name", picture_.items[b].name);
+      Record& row = AddRow({picture_.items[b].name}, &table);
       SetPlace("", X.p, &row);
       row.Set("turn", TurnText(X.R));
       SetPlace("com", picture_.centres[b].In(picture_.start), &row);
@@ -270,15 +262,13 @@ class Writer {
 
   Table Joints() const {
     Table table{.title = "Joints"};
-    table.columns = {Words("name", "joint"), Words("what", "what")};
+    table.columns = {{"name", "joint"}, {"what", "what"}};
     AddPlace("", "", &table);
-    table.columns.push_back(Words("redundant", "redundant"));
-    table.columns.push_back(Words("gone", "in a run"));
+    table.columns.push_back({"redundant", "redundant"});
+    table.columns.push_back({"gone", "in a run"});
     for (std::size_t j = 0; j < picture_.joints; ++j) {
       const PictureItem& item = picture_.items[picture_.ItemOfJoint(static_cast<int>(j))];
-      Record& row = table.rows.emplace_back();
-      row.Set("name", item.name);
-      row.Set("what", item.detail);
+      Record& row = AddRow({item.name, item.detail}, &table);
       SetPlace("", item.anchor.In(picture_.start), &row);
       row.Set("redundant", fmt::format("{}", fmt::join(item.redundant, "; ")));
       row.Set("gone", item.gone);
@@ -288,14 +278,12 @@ class Writer {
 
   Table Forces() const {
     Table table{.title = "Forces"};
-    table.columns = {Words("name", "force"), Words("what", "what")};
+    table.columns = {{"name", "force"}, {"what", "what"}};
     AddPlace("", "", &table);
     AddPlace("to", "to ", &table);
     for (std::size_t i = picture_.bodies + picture_.joints; i < picture_.items.size(); ++i) {
       const PictureItem& item = picture_.items[i];
-      Record& row = table.rows.emplace_back();
-      row.Set("name", item.name);
-      row.Set("what", item.detail);
+      Record& row = AddRow({item.name, item.detail}, &table);
       SetPlace("", item.anchor.In(picture_.start), &row);
       for (const PictureShape& shape : picture_.shapes) {
         const bool between = shape.places.size() == 2 &&
@@ -309,31 +297,27 @@ class Writer {
 
   Table Loops() const {
     Table table{.title = "Loops"};
-    table.columns = {Words("name", "cut joint"), Words("gap", "open as the file says [m]"),
-                     Words("turn", "[rad]"), Words("left", "assembled [m]"),
-                     Words("bodies", "bodies")};
+    table.columns = {{"name", "cut joint"},
+                     {"gap", "open as the file says [m]"},
+                     {"turn", "[rad]"},
+                     {"left", "assembled [m]"},
+                     {"bodies", "bodies"}};
     for (const PictureLoop& loop : picture_.loops) {
-      Record& row = table.rows.emplace_back();
-      row.Set("name", picture_.items[picture_.ItemOfJoint(loop.cut_joint)].name);
-      row.Set("gap", Number(loop.gap, small_));
-      row.Set("turn", Number(loop.turn, 1e-12));
-      row.Set("left", Number(loop.left, small_));
       std::vector<std::string> names;
       for (const int b : loop.bodies)
         names.push_back(picture_.items[static_cast<std::size_t>(b)].name);
-      row.Set("bodies", fmt::format("{}", fmt::join(names, " ")));
+      AddRow({picture_.items[picture_.ItemOfJoint(loop.cut_joint)].name, Number(loop.gap, small_),
+              Number(loop.turn, 1e-12), Number(loop.left, small_),
+              fmt::format("{}", fmt::join(names, " "))},
+             &table);
     }
     return table;
   }
 
   Table Motions() const {
     Table table{.title = "Motions"};
-    table.columns = {Words("name", "motion"), Words("what", "how far")};
-    for (const PictureMotion& motion : picture_.motions) {
-      Record& row = table.rows.emplace_back();
-      row.Set("name", motion.name);
-      row.Set("what", motion.text);
-    }
+    table.columns = {{"name", "motion"}, {"what", "how far"}};
+    for (const PictureMotion& motion : picture_.motions) AddRow({motion.name, motion.text}, &table);
     return table;
   }
 

@@ -1,11 +1,10 @@
-#include "harness/view/motions.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "harness/view/picture.h"
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/singular_values.h"

@@ -8,8 +8,6 @@
 #include <numbers>
 
 #include "harness/analysis/model_warnings.h"
-#include "harness/view/motions.h"
-#include "harness/view/shapes.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/simplify/compile.h"
 #include "mechanism/simplify/structure.h"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mechanism/description/joint_frames.h"
+#include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
 
@@ -15,7 +16,7 @@ namespace loopbench::harness {
 // A shape is a list of points, each fixed on a body. Its kind defines how they are joined, its
 // style the part that they represent. Any writer can draw it from a pose for every body: the SVG
 // writer once, web/scene.js for every frame. The form of each symbol (a slider is a box on a guide)
-// is therefore defined once, in shapes.h. Writers define how lines and discs are painted.
+// is therefore defined once, in shapes.cpp. Writers define how lines and discs are painted.
 //
 // Lengths in m, angles in rad. Poses are those of the user's bodies at their origins, in ground
 // axes, however the mechanism is compiled.
@@ -189,5 +190,53 @@ Eigen::Matrix3d ViewNamed(const Picture& picture, const std::string& name);
 /// limits, with a `margin` on each side. Sets `*height`. [px]
 Camera FitTo(const Picture& picture, const std::vector<const Poses*>& poses,
              const Eigen::Matrix3d& R, double width, double margin, double* height);
+
+// Outlines of bodies: convex hulls of their attachment points.
+
+/// Returns faces of the convex hull as lists of indices into `points`. One point gives none, points
+/// in line give one face with two corners, points in a plane one polygon, others triangles. Points
+/// closer than `tolerance` [m] are merged. More than 24 points that span a volume give no faces.
+std::vector<std::vector<int>> HullFaces(const std::vector<Eigen::Vector3d>& points,
+                                        double tolerance);
+
+// Symbols of bodies, joints and forces, built from attachment points.
+//
+// Sizes are multiples of Picture::symbol, half the size of a pin. A shape between two bodies (a
+// spring, a rod, the guide of a slider) has points on both, so that it follows them.
+
+/// Frames of a joint on its bodies, its axis included: in body axes, from body origins.
+struct JointPlaces {
+  Frame F, M;
+};
+JointPlaces PlacesOf(const JointDescription& joint);
+
+/// Returns the points of each body where joints and point forces act, in body axes. With fewer than
+/// two such points, the named points are added, then the centre of mass.
+std::vector<std::vector<Eigen::Vector3d>> Attachments(const MechanismDescription& description);
+
+/// Sets anchors of items and all shapes. Requires items, `start`, `up`, `symbol` and `extent`.
+void AddShapes(const MechanismDescription& description, Picture* picture);
+
+// Motions for a picture: each degree of freedom swings to and fro with all loops closed in every
+// frame. Prescribed motions run once.
+//
+// In the chosen basis of admissible speeds each motion moves one joint by one unit and stops the
+// leading joints of the other motions. Each motion is therefore named after a joint. A motion is
+// followed in small steps: a step along the projection of its last direction, then a position
+// projection onto the loops (excursion.h finds ranks in the same way). Links keep their lengths to
+// round-off. The swing ends early if the loops cannot close. If even the first step fails (speeds
+// of a singular configuration without a finite motion), bodies move along the speed itself by a
+// small angle, and the text states this.
+
+/// Returns the poses of the bodies of a mechanism that was compiled from `description` unchanged.
+template <class Space>
+Poses PosesOf(const MechanismDescription& description, const Kinematics<Space, double>& kinematics);
+
+/// Finds at most kMaxMotions motions from the closed position q in joint coordinates; none for
+/// loops with more than kMaxFollowed speeds. `left_out` gives the reason.
+template <class Space>
+std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
+                                       const Mechanism<Space, double>& mechanism,
+                                       const VectorX<double>& q, std::string* left_out);
 
 }  // namespace loopbench::harness

@@ -1,10 +1,12 @@
-#include "harness/view/shapes.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
+#include <vector>
+
+#include "harness/view/picture.h"
 
 namespace loopbench::harness {
 namespace {
@@ -105,23 +107,6 @@ JointPlaces PlacesOf(const JointDescription& joint) {
   return {PoseOf(joint.from) * aligned, PoseOf(joint.to) * aligned};
 }
 
-void Pen::Box(ShapeStyle style, int body, const Frame& X, const Vector3d& half) {
-  const auto face = [&](int normal, double side) {
-    const int a = (normal + 1) % 3, b = (normal + 2) % 3;
-    std::vector<Vector3d> corners(4, side * half[normal] * Vector3d::Unit(normal));
-    for (std::size_t i = 0; i < 4; ++i) {
-      corners[i][a] = (i == 0 || i == 3 ? -1 : 1) * half[a];
-      corners[i][b] = (i < 2 ? -1 : 1) * half[b];
-    }
-    Add(ShapeKind::kArea, style, On(body, X, corners));
-  };
-  if (picture_->planar) return face(2, 0.0);
-  for (int normal = 0; normal < 3; ++normal) {
-    face(normal, -1.0);
-    face(normal, 1.0);
-  }
-}
-
 std::vector<std::vector<Vector3d>> Attachments(const MechanismDescription& description) {
   std::vector<std::vector<Vector3d>> points(description.bodies.size());
   const auto add = [&](int body, const Vector3d& at) {
@@ -148,160 +133,51 @@ std::vector<std::vector<Vector3d>> Attachments(const MechanismDescription& descr
 
 namespace {
 
-void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>& points,
-             bool boxed, Pen pen, Picture* picture) {
-  const auto on_body = [index](const Vector3d& at) {
-    return PicturePlace{.body = index, .at = at};
-  };
-  const auto faces = HullFaces(points, 0.3 * pen.size());
-  PictureItem& item = picture->items[static_cast<std::size_t>(index)];
-  Vector3d middle = Vector3d::Zero();
-  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
-  for (const std::vector<int>& face : faces) {
-    std::vector<PicturePlace> corners;
-    for (const int i : face) corners.push_back(on_body(points[static_cast<std::size_t>(i)]));
-    if (face.size() == 2) {
-      middle = 0.5 * (corners[0].at + corners[1].at);
-      pen.Add(ShapeKind::kBar, ShapeStyle::kBody, corners, 0.55);
-    } else {
-      pen.Add(ShapeKind::kArea, ShapeStyle::kBody, corners, picture->planar ? 0.55 : 0.0);
+/// Adds shapes of one item to a picture.
+class Pen {
+ public:
+  Pen(Picture* picture, std::size_t item) : picture_(picture), item_(static_cast<int>(item)) {}
+
+  double size() const { return picture_->symbol; }
+  /// Adds a shape; radius and shift are given in symbol sizes.
+  void Add(ShapeKind kind, ShapeStyle style, std::vector<PicturePlace> places, double radius = 0.0,
+           double aside = 0.0) {
+    picture_->shapes.push_back(
+        {kind, style, item_, radius * size(), aside * size(), std::move(places)});
+  }
+  /// Returns points of a frame on a body, given in symbol sizes.
+  std::vector<PicturePlace> On(int body, const Frame& X,
+                               const std::vector<Vector3d>& points) const {
+    std::vector<PicturePlace> places;
+    for (const Vector3d& point : points) {
+      places.push_back({.body = body, .at = X.p + X.R * (size() * point)});
+    }
+    return places;
+  }
+  /// Adds a box about the origin of a frame, with half sides `half` [symbol sizes]; flat if planar.
+  void Box(ShapeStyle style, int body, const Frame& X, const Vector3d& half) {
+    const auto face = [&](int normal, double side) {
+      const int a = (normal + 1) % 3, b = (normal + 2) % 3;
+      std::vector<Vector3d> corners(4, side * half[normal] * Vector3d::Unit(normal));
+      for (std::size_t i = 0; i < 4; ++i) {
+        corners[i][a] = (i == 0 || i == 3 ? -1 : 1) * half[a];
+        corners[i][b] = (i < 2 ? -1 : 1) * half[b];
+      }
+      Add(ShapeKind::kArea, style, On(body, X, corners));
+    };
+    if (picture_->planar) return face(2, 0.0);
+    for (int normal = 0; normal < 3; ++normal) {
+      face(normal, -1.0);
+      face(normal, 1.0);
     }
   }
-  const bool star = faces.empty() && !HullFaces({middle, points.front()}, 0.3 * pen.size()).empty();
-  for (std::size_t i = 0; star && i < points.size(); ++i) {
-    pen.Add(ShapeKind::kBar, ShapeStyle::kBody, {on_body(middle), on_body(points[i])}, 0.3);
-  }
-  // a body with a single attachment that slides already has the slider's box
-  if (faces.empty() && !star && !boxed) {
-    pen.Add(ShapeKind::kDisc, ShapeStyle::kBody, {on_body(middle)}, 1.7);
-  }
-  item.anchor = on_body(middle);
-  if (picture->bodies > kMaxDetailed) return;
-  // a line connects a centre of mass outside of the body
-  const bool inside = std::ranges::any_of(
-      points, [&](const Vector3d& p) { return (p - body.com).norm() <= 0.5 * pen.size(); });
-  if (!inside && !faces.empty() && faces.front().size() == 2) {
-    const Vector3d a = points[static_cast<std::size_t>(faces.front()[0])],
-                   along = points[static_cast<std::size_t>(faces.front()[1])] - a;
-    const double share = std::clamp(along.dot(body.com - a) / along.squaredNorm(), 0.0, 1.0);
-    const Vector3d foot = a + share * along;
-    if ((foot - body.com).norm() > 0.6 * pen.size()) {
-      pen.Add(ShapeKind::kLine, ShapeStyle::kCentre, {on_body(foot), on_body(body.com)});
-    }
-  }
-  pen.Add(ShapeKind::kCentre, ShapeStyle::kCentre, {on_body(body.com)}, 0.6);
-}
 
-}  // namespace
-
-void AddShapes(const MechanismDescription& description, Picture* picture) {
-  const auto points = Attachments(description);
-  std::vector<bool> boxed(description.bodies.size(), false);
-  for (const JointDescription& joint : description.joints) {
-    if (joint.type == JointType::kPrismatic) boxed[static_cast<std::size_t>(joint.to.body)] = true;
-  }
-  for (std::size_t b = 1; b < description.bodies.size(); ++b) {
-    AddBody(description.bodies[b], static_cast<int>(b), points[b], boxed[b], Pen(picture, b),
-            picture);
-  }
-  for (std::size_t f = 0; f < description.forces.size(); ++f) {
-    const std::size_t item = picture->bodies + picture->joints + f;
-    picture->items[item].anchor =
-        AddForceShapes(description, description.forces[f], Pen(picture, item), *picture);
-  }
-  for (std::size_t j = 0; j < description.joints.size(); ++j) {
-    const JointDescription& joint = description.joints[j];
-    const std::size_t item = picture->ItemOfJoint(static_cast<int>(j));
-    picture->items[item].anchor = {.body = joint.to.body, .at = joint.to.position};
-    AddJointShapes(joint, Pen(picture, item), *picture);
-  }
-  std::ranges::stable_sort(picture->shapes, {},
-                           [](const PictureShape& shape) { return TraitsOf(shape.style).floor; });
-}
-
-// Symbols of forces: springs, dashpots, arrows. Forces of other programs have an arrow at a joint,
-// or a ring at each of their points.
-
-namespace {
-
-/// Adds a shape between the frames of a sliding joint, next to its guide.
-void AddBeside(const JointDescription& joint, ShapeKind kind, ShapeStyle style, double y, Pen pen) {
-  const JointPlaces X = PlacesOf(joint);
-  pen.Add(kind, style,
-          {pen.On(joint.from.body, X.F, {{0, y, 0}}).front(),
-           pen.On(joint.to.body, X.M, {{0, y, 0}}).front()},
-          0.7);
-}
-
-/// Adds part of a circle or spiral about z of a frame; angles in half turns.
-void AddArc(int body, const Frame& X, double angle, double sweep, double radius, double growth,
-            ShapeStyle style, Pen pen) {
-  Points arc;
-  constexpr int kCorners = 44;
-  for (int i = 0; i <= kCorners; ++i) {
-    const double at = (angle + sweep * i / kCorners) * std::numbers::pi;
-    const double r = radius + growth * i / kCorners;
-    arc.push_back({r * std::cos(at), r * std::sin(at), 0});
-  }
-  pen.Add(ShapeKind::kLine, style, pen.On(body, X, arc));
-}
-
-void AddAtJoint(const JointDescription& joint, bool length, const ForceDescription& force,
-                Pen pen) {
-  const JointPlaces X = PlacesOf(joint);
-  if (std::holds_alternative<JointSpring>(force)) {
-    if (length) return AddBeside(joint, ShapeKind::kSpring, ShapeStyle::kSpring, 1.9, pen);
-    return AddArc(joint.from.body, X.F, 0.0, 5.5, 0.9, 1.3, ShapeStyle::kSpring, pen);
-  }
-  if (std::holds_alternative<JointDamper>(force)) {
-    if (length) return AddBeside(joint, ShapeKind::kDamper, ShapeStyle::kDamper, -1.9, pen);
-    AddArc(joint.to.body, X.M, 1.0, 0.5, 1.5, 0.0, ShapeStyle::kDamper, pen);
-    return AddArc(joint.from.body, X.F, 0.9, 0.7, 1.9, 0.0, ShapeStyle::kDamper, pen);
-  }
-  AddSweep(joint, length, ShapeStyle::kForce, 3.1, pen);
-}
-
-}  // namespace
-
-PicturePlace AddForceShapes(const MechanismDescription& description, ForceDescription force,
-                            Pen pen, const Picture& picture) {
-  const ForceParts parts = PartsOf(force);
-  if (parts.joint != nullptr) {
-    const JointDescription& joint = description.joints[static_cast<std::size_t>(*parts.joint)];
-    AddAtJoint(joint, ValueWords(joint.type, description.space, false).at(0).is_length(), force,
-               pen);
-    return {.body = joint.to.body, .at = joint.to.position};
-  }
-  std::vector<PicturePlace> places;
-  for (const BodyPoint* point : parts.points) {
-    places.push_back({.body = point->body, .at = point->at});
-    if (point->body == kGround) AddFoot(point->at, pen, picture);
-  }
-  if (const auto* spring = std::get_if<SpringDamper>(&force)) {
-    const bool both = spring->stiffness > 0.0 && spring->damping > 0.0;
-    if (spring->stiffness > 0.0 || spring->damping == 0.0) {
-      pen.Add(ShapeKind::kSpring, ShapeStyle::kSpring, places, 0.8, both ? 1.0 : 0.0);
-    }
-    if (spring->damping > 0.0) {
-      pen.Add(ShapeKind::kDamper, ShapeStyle::kDamper, places, 0.8, both ? -1.0 : 0.0);
-    }
-  } else if (parts.force != nullptr && parts.force->norm() > 0.0) {
-    constexpr double kLong = 7.0;
-    PicturePlace tip = places.front();
-    const Vector3d arrow = kLong * pen.size() * parts.force->normalized();
-    (*parts.in_body_axes ? tip.at : tip.offset) += arrow;
-    pen.Add(ShapeKind::kArrow, ShapeStyle::kForce, {places.front(), tip});
-  } else {
-    for (const PicturePlace& place : places) {
-      pen.Add(ShapeKind::kDisc, ShapeStyle::kDamper, {place}, 1.3);
-    }
-  }
-  return places.empty() ? PicturePlace{} : places.front();
-}
+ private:
+  Picture* picture_;
+  int item_;
+};
 
 // Symbols of joints, by their free directions. Joints of other programs have a plain diamond.
-
-namespace {
 
 /// Adds hatched ground `below` the origin of a frame whose y points down.
 void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {
@@ -317,7 +193,45 @@ void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {
   }
 }
 
-/// Draws one joint. z is its rotation axis, x its sliding axis.
+/// Adds the support of a point of Ground: a hatched triangle, or a pyramid in space.
+void AddFoot(const Vector3d& at, Pen pen, const Picture& picture) {
+  const Vector3d along = picture.planar ? Vector3d::UnitX() : picture.up.unitOrthogonal();
+  const Vector3d down = -picture.up;
+  Frame foot{Eigen::Matrix3d::Identity(), at};
+  foot.R << along, down, down.cross(along);
+  if (picture.planar) {
+    pen.Add(ShapeKind::kArea, ShapeStyle::kGround,
+            pen.On(kGround, foot, {{0, 0, 0}, {-1.6, 2.4, 0}, {1.6, 2.4, 0}}));
+    return Hatch(foot, -1.6, 1.6, 2.4, pen);
+  }
+  // a pyramid with its base on the ground
+  const Points base = {{-1.5, 2.2, -1.5}, {1.5, 2.2, -1.5}, {1.5, 2.2, 1.5}, {-1.5, 2.2, 1.5}};
+  pen.Add(ShapeKind::kArea, ShapeStyle::kGround, pen.On(kGround, foot, base));
+  for (const Vector3d& corner : base) {
+    pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On(kGround, foot, {{0, 0, 0}, corner}));
+  }
+}
+
+/// Adds an arrow along x of a joint's frame F (z if its axis is z), or about z.
+void AddSweep(const JointDescription& joint, bool straight, ShapeStyle style, double radius,
+              Pen pen) {
+  Points points;
+  if (straight) {
+    const bool along_z = TraitsOf(joint.type).own_axis == 'z';
+    points = along_z ? Points{{radius, 0, 0}, {radius, 0, 4.5}}
+                     : Points{{0, radius, 0}, {4.5, radius, 0}};
+  } else {
+    constexpr int kCorners = 16;
+    for (int i = 0; i <= kCorners; ++i) {
+      const double angle = (0.3 + 1.3 * i / kCorners) * std::numbers::pi;
+      points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
+    }
+  }
+  pen.Add(ShapeKind::kArrow, style, pen.On(joint.from.body, PlacesOf(joint).F, points));
+}
+
+/// Draws one joint; guides span the distance of the bodies at the picture's start. z is its
+/// rotation axis, x its sliding axis.
 class JointSymbol {
  public:
   JointSymbol(const JointDescription& joint, Pen pen, const Picture& picture)
@@ -467,45 +381,154 @@ class JointSymbol {
   JointPlaces places_;
 };
 
-}  // namespace
+// Symbols of forces: springs, dashpots, arrows. Forces of other programs have an arrow at a joint,
+// or a ring at each of their points.
 
-void AddFoot(const Vector3d& at, Pen pen, const Picture& picture) {
-  const Vector3d along = picture.planar ? Vector3d::UnitX() : picture.up.unitOrthogonal();
-  const Vector3d down = -picture.up;
-  Frame foot{Eigen::Matrix3d::Identity(), at};
-  foot.R << along, down, down.cross(along);
-  if (picture.planar) {
-    pen.Add(ShapeKind::kArea, ShapeStyle::kGround,
-            pen.On(kGround, foot, {{0, 0, 0}, {-1.6, 2.4, 0}, {1.6, 2.4, 0}}));
-    return Hatch(foot, -1.6, 1.6, 2.4, pen);
-  }
-  // a pyramid with its base on the ground
-  const Points base = {{-1.5, 2.2, -1.5}, {1.5, 2.2, -1.5}, {1.5, 2.2, 1.5}, {-1.5, 2.2, 1.5}};
-  pen.Add(ShapeKind::kArea, ShapeStyle::kGround, pen.On(kGround, foot, base));
-  for (const Vector3d& corner : base) {
-    pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On(kGround, foot, {{0, 0, 0}, corner}));
-  }
+/// Adds a shape between the frames of a sliding joint, next to its guide.
+void AddBeside(const JointDescription& joint, ShapeKind kind, ShapeStyle style, double y, Pen pen) {
+  const JointPlaces X = PlacesOf(joint);
+  pen.Add(kind, style,
+          {pen.On(joint.from.body, X.F, {{0, y, 0}}).front(),
+           pen.On(joint.to.body, X.M, {{0, y, 0}}).front()},
+          0.7);
 }
 
-void AddSweep(const JointDescription& joint, bool straight, ShapeStyle style, double radius,
-              Pen pen) {
-  Points points;
-  if (straight) {
-    const bool along_z = TraitsOf(joint.type).own_axis == 'z';
-    points = along_z ? Points{{radius, 0, 0}, {radius, 0, 4.5}}
-                     : Points{{0, radius, 0}, {4.5, radius, 0}};
+/// Adds part of a circle or spiral about z of a frame; angles in half turns.
+void AddArc(int body, const Frame& X, double angle, double sweep, double radius, double growth,
+            ShapeStyle style, Pen pen) {
+  Points arc;
+  constexpr int kCorners = 44;
+  for (int i = 0; i <= kCorners; ++i) {
+    const double at = (angle + sweep * i / kCorners) * std::numbers::pi;
+    const double r = radius + growth * i / kCorners;
+    arc.push_back({r * std::cos(at), r * std::sin(at), 0});
+  }
+  pen.Add(ShapeKind::kLine, style, pen.On(body, X, arc));
+}
+
+void AddAtJoint(const JointDescription& joint, bool length, const ForceDescription& force,
+                Pen pen) {
+  const JointPlaces X = PlacesOf(joint);
+  if (std::holds_alternative<JointSpring>(force)) {
+    if (length) return AddBeside(joint, ShapeKind::kSpring, ShapeStyle::kSpring, 1.9, pen);
+    return AddArc(joint.from.body, X.F, 0.0, 5.5, 0.9, 1.3, ShapeStyle::kSpring, pen);
+  }
+  if (std::holds_alternative<JointDamper>(force)) {
+    if (length) return AddBeside(joint, ShapeKind::kDamper, ShapeStyle::kDamper, -1.9, pen);
+    AddArc(joint.to.body, X.M, 1.0, 0.5, 1.5, 0.0, ShapeStyle::kDamper, pen);
+    return AddArc(joint.from.body, X.F, 0.9, 0.7, 1.9, 0.0, ShapeStyle::kDamper, pen);
+  }
+  AddSweep(joint, length, ShapeStyle::kForce, 3.1, pen);
+}
+
+/// Adds the shapes of a force; returns the position of its name.
+PicturePlace AddForceShapes(const MechanismDescription& description, ForceDescription force,
+                            Pen pen, const Picture& picture) {
+  const ForceParts parts = PartsOf(force);
+  if (parts.joint != nullptr) {
+    const JointDescription& joint = description.joints[static_cast<std::size_t>(*parts.joint)];
+    AddAtJoint(joint, ValueWords(joint.type, description.space, false).at(0).is_length(), force,
+               pen);
+    return {.body = joint.to.body, .at = joint.to.position};
+  }
+  std::vector<PicturePlace> places;
+  for (const BodyPoint* point : parts.points) {
+    places.push_back({.body = point->body, .at = point->at});
+    if (point->body == kGround) AddFoot(point->at, pen, picture);
+  }
+  if (const auto* spring = std::get_if<SpringDamper>(&force)) {
+    const bool both = spring->stiffness > 0.0 && spring->damping > 0.0;
+    if (spring->stiffness > 0.0 || spring->damping == 0.0) {
+      pen.Add(ShapeKind::kSpring, ShapeStyle::kSpring, places, 0.8, both ? 1.0 : 0.0);
+    }
+    if (spring->damping > 0.0) {
+      pen.Add(ShapeKind::kDamper, ShapeStyle::kDamper, places, 0.8, both ? -1.0 : 0.0);
+    }
+  } else if (parts.force != nullptr && parts.force->norm() > 0.0) {
+    constexpr double kLong = 7.0;
+    PicturePlace tip = places.front();
+    const Vector3d arrow = kLong * pen.size() * parts.force->normalized();
+    (*parts.in_body_axes ? tip.at : tip.offset) += arrow;
+    pen.Add(ShapeKind::kArrow, ShapeStyle::kForce, {places.front(), tip});
   } else {
-    constexpr int kCorners = 16;
-    for (int i = 0; i <= kCorners; ++i) {
-      const double angle = (0.3 + 1.3 * i / kCorners) * std::numbers::pi;
-      points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
+    for (const PicturePlace& place : places) {
+      pen.Add(ShapeKind::kDisc, ShapeStyle::kDamper, {place}, 1.3);
     }
   }
-  pen.Add(ShapeKind::kArrow, style, pen.On(joint.from.body, PlacesOf(joint).F, points));
+  return places.empty() ? PicturePlace{} : places.front();
 }
 
-void AddJointShapes(const JointDescription& joint, Pen pen, const Picture& picture) {
-  JointSymbol(joint, pen, picture).Draw();
+// Shapes of bodies, and of the whole picture.
+
+void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>& points,
+             bool boxed, Pen pen, Picture* picture) {
+  const auto on_body = [index](const Vector3d& at) {
+    return PicturePlace{.body = index, .at = at};
+  };
+  const auto faces = HullFaces(points, 0.3 * pen.size());
+  PictureItem& item = picture->items[static_cast<std::size_t>(index)];
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
+  for (const std::vector<int>& face : faces) {
+    std::vector<PicturePlace> corners;
+    for (const int i : face) corners.push_back(on_body(points[static_cast<std::size_t>(i)]));
+    if (face.size() == 2) {
+      middle = 0.5 * (corners[0].at + corners[1].at);
+      pen.Add(ShapeKind::kBar, ShapeStyle::kBody, corners, 0.55);
+    } else {
+      pen.Add(ShapeKind::kArea, ShapeStyle::kBody, corners, picture->planar ? 0.55 : 0.0);
+    }
+  }
+  const bool star = faces.empty() && !HullFaces({middle, points.front()}, 0.3 * pen.size()).empty();
+  for (std::size_t i = 0; star && i < points.size(); ++i) {
+    pen.Add(ShapeKind::kBar, ShapeStyle::kBody, {on_body(middle), on_body(points[i])}, 0.3);
+  }
+  // a body with a single attachment that slides already has the slider's box
+  if (faces.empty() && !star && !boxed) {
+    pen.Add(ShapeKind::kDisc, ShapeStyle::kBody, {on_body(middle)}, 1.7);
+  }
+  item.anchor = on_body(middle);
+  if (picture->bodies > kMaxDetailed) return;
+  // a line connects a centre of mass outside of the body
+  const bool inside = std::ranges::any_of(
+      points, [&](const Vector3d& p) { return (p - body.com).norm() <= 0.5 * pen.size(); });
+  if (!inside && !faces.empty() && faces.front().size() == 2) {
+    const Vector3d a = points[static_cast<std::size_t>(faces.front()[0])],
+                   along = points[static_cast<std::size_t>(faces.front()[1])] - a;
+    const double share = std::clamp(along.dot(body.com - a) / along.squaredNorm(), 0.0, 1.0);
+    const Vector3d foot = a + share * along;
+    if ((foot - body.com).norm() > 0.6 * pen.size()) {
+      pen.Add(ShapeKind::kLine, ShapeStyle::kCentre, {on_body(foot), on_body(body.com)});
+    }
+  }
+  pen.Add(ShapeKind::kCentre, ShapeStyle::kCentre, {on_body(body.com)}, 0.6);
+}
+
+}  // namespace
+
+void AddShapes(const MechanismDescription& description, Picture* picture) {
+  const auto points = Attachments(description);
+  std::vector<bool> boxed(description.bodies.size(), false);
+  for (const JointDescription& joint : description.joints) {
+    if (joint.type == JointType::kPrismatic) boxed[static_cast<std::size_t>(joint.to.body)] = true;
+  }
+  for (std::size_t b = 1; b < description.bodies.size(); ++b) {
+    AddBody(description.bodies[b], static_cast<int>(b), points[b], boxed[b], Pen(picture, b),
+            picture);
+  }
+  for (std::size_t f = 0; f < description.forces.size(); ++f) {
+    const std::size_t item = picture->bodies + picture->joints + f;
+    picture->items[item].anchor =
+        AddForceShapes(description, description.forces[f], Pen(picture, item), *picture);
+  }
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    const JointDescription& joint = description.joints[j];
+    const std::size_t item = picture->ItemOfJoint(static_cast<int>(j));
+    picture->items[item].anchor = {.body = joint.to.body, .at = joint.to.position};
+    JointSymbol(joint, Pen(picture, item), *picture).Draw();
+  }
+  std::ranges::stable_sort(picture->shapes, {},
+                           [](const PictureShape& shape) { return TraitsOf(shape.style).floor; });
 }
 
 }  // namespace loopbench::harness

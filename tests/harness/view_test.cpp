@@ -8,9 +8,8 @@
 #include <regex>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/view/html.h"
-#include "harness/view/shapes.h"
-#include "harness/view/svg.h"
+#include "harness/view/picture.h"
+#include "harness/view/writers.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/similarity.h"
 #include "mechanism/simplify/structure.h"

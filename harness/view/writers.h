@@ -1,4 +1,4 @@
-// Writers of a picture: JSON, an HTML page, and tables.
+// Writers of a picture: SVG, JSON, an HTML page, and tables.
 #pragma once
 
 #include <string>
@@ -9,6 +9,20 @@
 #include "harness/view/picture.h"
 
 namespace loopbench::harness {
+
+// SVG of a picture, for papers: line widths for print, 8-point fonts, light fills and dark lines
+// that stay visible in greyscale. The file is self-contained, without style sheet and script.
+
+struct SvgOptions {
+  std::string view = "oblique";  ///< name from ViewNames()
+  /// Draws only the mechanism: no outline of the given poses, no loop openings, no text below.
+  bool plain = false;
+};
+
+std::string ToSvg(const Picture& picture, const SvgOptions& options);
+
+/// Returns the largest length of 1, 2 or 5 times a power of ten that is at most `longest`.
+double RoundLength(double longest);
 
 // JSON of a picture.
 

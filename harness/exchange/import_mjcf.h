@@ -148,7 +148,6 @@ class MjcfModel {
   std::set<int> links;  ///< bodies without mass between two hinges of one body of MuJoCo
   std::vector<MjcfReplicate> replicates;
 
-  // import_mjcf_replicas.cpp
   /// Returns the next copy of the contents of a <replicate>; nullptr stands for no replica.
   const MjcfReplica* AddReplica(const XmlElement& element, const MjcfReplica* around,
                                 const std::string& suffix);

@@ -393,6 +393,15 @@ void RunInProcesses(std::size_t count, int jobs,
   };
   RunInProcesses(next, jobs, work, limits, done, news);
 }
+
+ProcessResult RunInProcess(const ProcessLimits& limits, const std::function<std::string()>& work) {
+  ProcessResult result;
+  RunInProcesses(
+      1, 1, [&](std::size_t) { return work(); }, [&](std::size_t) { return limits; },
+      [&](std::size_t, const ProcessResult& ended) { result = ended; });
+  return result;
+}
+
 namespace {
 
 /// @param deliver  receives the printed text, before any exception
@@ -402,16 +411,12 @@ int FromChild(const std::string& name, const ProcessLimits& limits,
   const MemoryFile output("stdout");
   ProcessResult result;
   try {
-    RunInProcesses(
-        1, 1,
-        [&](std::size_t) {
-          // line by line, so that a killed child loses no complete line
-          ::dup2(output.descriptor(), STDOUT_FILENO);
-          ::setlinebuf(stdout);
-          return std::to_string(FinishOutput(work()));
-        },
-        [&](std::size_t) { return limits; },
-        [&](std::size_t, const ProcessResult& ended) { result = ended; });
+    result = RunInProcess(limits, [&] {
+      // line by line, so that a killed child loses no complete line
+      ::dup2(output.descriptor(), STDOUT_FILENO);
+      ::setlinebuf(stdout);
+      return std::to_string(FinishOutput(work()));
+    });
   } catch (const SystemFault&) {
     deliver(output.Text());
     throw;

@@ -153,6 +153,9 @@ void RunInProcesses(std::size_t count, int jobs,
                     const std::function<void(std::size_t, const ProcessResult&)>& done,
                     const ProcessNews& news = {});
 
+/// Runs `work` alone in the same way.
+ProcessResult RunInProcess(const ProcessLimits& limits, const std::function<std::string()>& work);
+
 /// Returns the table outcome of a piece without an answer: "crashed", "process-time-limit" or
 /// "memory-limit".
 std::string_view OutcomeOf(ProcessEnding ending);

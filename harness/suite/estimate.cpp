@@ -105,7 +105,7 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
   // later pilots are shorter: hundreds of them then take a minute or two in total
   const double shorter = budget_.usual_s / (budget_.usual_s + spent_s_);
   const double most_s = std::max(budget_.least_s, budget_.most_s * shorter * shorter);
-  const auto pilot = [&](std::size_t) {
+  const auto pilot = [&] {
     Rate rate = {.running_s = 0.0, .reached = 0.0};
     double worked = 0.0;
     for (double fraction = kFirst;; fraction = std::min(1.0, kGrowth * fraction)) {
@@ -122,22 +122,19 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
   };
   Rate& rate = rates_[key];
   const double before = ThreadCpuSeconds();
-  RunInProcesses(
-      1, 1, pilot, [&](std::size_t) { return limits; },
-      [&](std::size_t, const ProcessResult& result) {
-        spent_s_ += result.wall_s;
-        double worked = 0.0;
-        if (result.ending == ProcessEnding::kAnswered &&
-            std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
-                        &rate.member, &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at,
-                        &rate.most_s, &worked) == 8) {
-          // starting a process costs CPU time of its parent and of itself
-          rate.process_s = std::max(0.0, result.cpu_s - worked) + ThreadCpuSeconds() - before;
-          return;
-        }
-        rate = {.fixed_s = result.cpu_s};
-        cut_off_.push_back(fmt::format("{}: {}, {}", name, OutcomeOf(result.ending), result.text));
-      });
+  const ProcessResult result = RunInProcess(limits, pilot);
+  spent_s_ += result.wall_s;
+  double worked = 0.0;
+  if (result.ending == ProcessEnding::kAnswered &&
+      std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
+                  &rate.member, &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at,
+                  &rate.most_s, &worked) == 8) {
+    // starting a process costs CPU time of its parent and of itself
+    rate.process_s = std::max(0.0, result.cpu_s - worked) + ThreadCpuSeconds() - before;
+  } else {
+    rate = {.fixed_s = result.cpu_s};
+    cut_off_.push_back(fmt::format("{}: {}, {}", name, OutcomeOf(result.ending), result.text));
+  }
   return &rate;
 }
 
@@ -353,22 +350,19 @@ std::string AnswerOfProblem(const Experiment& experiment, const MechanismFile& f
 
 StartReport ReportOf(const ProcessLimits& limits, const std::function<std::string()>& answer) {
   StartReport report;
-  RunInProcesses(
-      1, 1, [&](std::size_t) { return answer(); }, [&](std::size_t) { return limits; },
-      [&](std::size_t, const ProcessResult& result) {
-        if (result.ending != ProcessEnding::kAnswered) {
-          report.faults = {fmt::format("its start was not assembled ({}): {}",
-                                       OutcomeOf(result.ending), result.text)};
-        } else if (result.text.starts_with(kFault)) {
-          report.faults = {
-              fmt::format("found a start that cannot be assembled ({}), expected one from which "
-                          "every loop closes",
-                          result.text.substr(1))};
-        } else {
-          std::istringstream lines(result.text);
-          for (std::string line; std::getline(lines, line);) report.warnings.push_back(line);
-        }
-      });
+  const ProcessResult result = RunInProcess(limits, answer);
+  if (result.ending != ProcessEnding::kAnswered) {
+    report.faults = {
+        fmt::format("its start was not assembled ({}): {}", OutcomeOf(result.ending), result.text)};
+  } else if (result.text.starts_with(kFault)) {
+    report.faults = {
+        fmt::format("found a start that cannot be assembled ({}), expected one from which every "
+                    "loop closes",
+                    result.text.substr(1))};
+  } else {
+    std::istringstream lines(result.text);
+    for (std::string line; std::getline(lines, line);) report.warnings.push_back(line);
+  }
   return report;
 }
 
@@ -407,19 +401,15 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
 
 void RequireFreedom(const MechanismFile& file, const ProcessLimits& limits) {
   if (!file.observe.expected) return;
-  const auto fault = [&](std::size_t) {
+  const ProcessResult result = RunInProcess(limits, [&] {
     return FreedomFault(file.description, file.observe, AnalyseStructure(file.description));
-  };
-  RunInProcesses(
-      1, 1, fault, [&](std::size_t) { return limits; },
-      [&](std::size_t, const ProcessResult& result) {
-        if (result.ending != ProcessEnding::kAnswered) {
-          throw ConfigError(fmt::format("{}: degrees of freedom were not counted ({}): {}",
-                                        file.observe.expected->place, OutcomeOf(result.ending),
-                                        result.text));
-        }
-        if (!result.text.empty()) throw ConfigError(result.text);
-      });
+  });
+  if (result.ending != ProcessEnding::kAnswered) {
+    throw ConfigError(fmt::format("{}: degrees of freedom were not counted ({}): {}",
+                                  file.observe.expected->place, OutcomeOf(result.ending),
+                                  result.text));
+  }
+  if (!result.text.empty()) throw ConfigError(result.text);
 }
 
 void RequireFreedom(const std::vector<Experiment>& experiments) {

@@ -131,7 +131,7 @@ void CheckLadders(const Experiment& experiment) {
   const std::vector<Case> cases = ExpandLadders(experiment);
   if (cases.empty()) return;
   for (const Case& one : cases) RequireScalars(experiment, one.method);
-  const auto compile = [&](std::size_t) {
+  const auto compile = [&] {
     std::set<std::size_t> problems;
     for (const Case& one : cases) {
       if (problems.insert(one.problem).second)
@@ -139,11 +139,8 @@ void CheckLadders(const Experiment& experiment) {
     }
     return std::string();
   };
-  RunInProcesses(
-      1, 1, compile, [&](std::size_t) { return LimitsOfRuns(experiment.limits, 1); },
-      [&](std::size_t, const ProcessResult& result) {
-        if (result.ending == ProcessEnding::kThrew) throw ConfigError(result.text);
-      });
+  const ProcessResult result = RunInProcess(LimitsOfRuns(experiment.limits, 1), compile);
+  if (result.ending == ProcessEnding::kThrew) throw ConfigError(result.text);
 }
 
 #ifdef LOOPBENCH_PRECISIONS

@@ -180,15 +180,12 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
 }
 
 Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
-  Piece piece;
-  const Limits& limits = experiment.limits;
-  piece.owed = group.keys;
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
-  piece.limits = LimitsOfRuns(limits, runs);
-  piece.work = [&experiment, &group](int) { return ClimbTogether(experiment, group); };
-  piece.label =
-      fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.method));
-  return piece;
+  return {.owed = group.keys,
+          .work = [&experiment, &group](int) { return ClimbTogether(experiment, group); },
+          .limits = LimitsOfRuns(experiment.limits, runs),
+          .label = fmt::format("{} {}", group.keys.front().Text("mechanism"),
+                               ToString(group.task.method))};
 }
 
 std::string AnswerOf(const Piece& piece) {

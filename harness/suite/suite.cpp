@@ -95,31 +95,11 @@ class Group {
   }
 
   std::size_t Ladders() {
-    std::vector<std::vector<LadderGroup>> ladders;  // pieces refer to them
-    for (const Experiment& experiment : experiments_) {
-      ladders.push_back(LadderGroups(experiment, options_.filter));
-    }
-    for (std::size_t e = 0; e < experiments_.size(); ++e) {
-      for (const LadderGroup& ladder : ladders[e]) {
-        Add(e, LadderPiece(experiments_[e], ladder),
-            [e, &ladder](Estimate& estimate) { return estimate.OfLadder(e, ladder); });
-      }
-    }
-    return Run("precision", options_.jobs, false);
+    return RunGroups("precision", options_.jobs, LadderGroups, LadderPiece, &Estimate::OfLadder);
   }
 
   std::size_t Timings() {
-    std::vector<std::vector<TimingGroup>> groups;  // pieces refer to them
-    for (const Experiment& experiment : experiments_) {
-      groups.push_back(TimingGroups(experiment, options_.filter));
-    }
-    for (std::size_t e = 0; e < experiments_.size(); ++e) {
-      for (const TimingGroup& group : groups[e]) {
-        Add(e, TimingPiece(experiments_[e], group),
-            [e, &group](Estimate& estimate) { return estimate.OfTiming(e, group); });
-      }
-    }
-    return Run("timing", 1, false);
+    return RunGroups("timing", 1, TimingGroups, TimingPiece, &Estimate::OfTiming);
   }
 
  private:
@@ -135,6 +115,25 @@ class Group {
     piece.seconds = seconds;
     pieces_.push_back(std::move(piece));
     return true;
+  }
+
+  /// Runs the groups of all experiments, each as one piece.
+  template <class Kind>
+  std::size_t RunGroups(const char* what, int jobs,
+                        std::vector<Kind> (*groups_of)(const Experiment&, const Selection&),
+                        Piece (*piece_of)(const Experiment&, const Kind&),
+                        double (Estimate::*seconds)(std::size_t, const Kind&)) {
+    std::vector<std::vector<Kind>> groups;  // pieces refer to them
+    for (const Experiment& experiment : experiments_) {
+      groups.push_back(groups_of(experiment, options_.filter));
+    }
+    for (std::size_t e = 0; e < experiments_.size(); ++e) {
+      for (const Kind& group : groups[e]) {
+        Add(e, piece_of(experiments_[e], group),
+            [e, &group, seconds](Estimate& estimate) { return (estimate.*seconds)(e, group); });
+      }
+    }
+    return Run(what, jobs, false);
   }
 
   std::size_t Run(const char* what, int jobs, bool shared) {
@@ -157,6 +156,77 @@ class Group {
   std::unordered_set<std::string> dealt_;  ///< ids of the pieces of all shards
 };
 
+// Marks of completed groups of a long sweep, next to the store: a resumed run need not read a
+// million combinations that are done.
+//
+// A mark is a line of results.groups with content (Workload::content()), kind, group, number of
+// records, number of unfinished runs, and state of the store. The state is its length and a hash of
+// its last bytes. A mark is valid only while the store up to that length is unchanged. The marks
+// are a cache; deleting them is safe.
+
+constexpr std::uintmax_t kLast = 512;  ///< bytes, within a record with its checksum
+
+/// Returns the hash of the bytes before `end`, "" if they cannot be read.
+std::string HashBefore(std::ifstream& store, std::uintmax_t end) {
+  const std::uintmax_t begin = end - std::min(end, kLast);
+  std::string bytes(static_cast<std::size_t>(end - begin), '\0');
+  store.clear();
+  store.seekg(static_cast<std::streamoff>(begin));
+  store.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  return store.gcount() == static_cast<std::streamsize>(bytes.size()) ? Fnv1a(bytes) : "";
+}
+
+struct GroupMark {
+  std::size_t records = 0, failed = 0;
+};
+
+class GroupMarks {
+ public:
+  /// Reads the marks of this content that are valid for the store.
+  /// @param store  the store file
+  GroupMarks(const std::filesystem::path& store, std::string content)
+      : store_(store),
+        file_(std::filesystem::path(store).replace_extension(".groups")),
+        content_(std::move(content)) {
+    std::ifstream lines(file_), bytes(store_, std::ios::binary);
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(store_, error);
+    if (error) return;
+    for (std::string line; std::getline(lines, line);) {
+      std::istringstream words(line);
+      std::string of, kind, hash, end;
+      std::size_t group = 0;
+      std::uintmax_t length = 0;
+      GroupMark mark;
+      words >> of >> kind >> group >> mark.records >> mark.failed >> length >> hash >> end;
+      // an incomplete line has no end mark
+      if (of != content_ || end != "." || length > size) continue;
+      if (HashBefore(bytes, length) == hash) marks_[{kind, group}] = mark;
+    }
+  }
+
+  std::optional<GroupMark> Find(const std::string& kind, std::size_t group) const {
+    const auto mark = marks_.find({kind, group});
+    return mark == marks_.end() ? std::nullopt : std::optional(mark->second);
+  }
+
+  /// Marks a group whose records are all in the store. Ignores write errors.
+  void Add(const std::string& kind, std::size_t group, const GroupMark& mark) {
+    std::error_code error;
+    const std::uintmax_t size = std::filesystem::file_size(store_, error);
+    std::ifstream bytes(store_, std::ios::binary);
+    if (error || size == 0) return;
+    marks_[{kind, group}] = mark;
+    std::ofstream(file_, std::ios::app)
+        << fmt::format("{} {} {} {} {} {} {} .\n", content_, kind, group, mark.records, mark.failed,
+                       size, HashBefore(bytes, size));
+  }
+
+ private:
+  std::filesystem::path store_, file_;
+  std::string content_;
+  std::map<std::pair<std::string, std::size_t>, GroupMark> marks_;
+};
 }  // namespace
 
 std::vector<Case> SelectCases(const Experiment& experiment, const Selection& filter) {
@@ -208,58 +278,6 @@ SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRun
     }
   }
   return runner.count;
-}
-namespace {
-
-constexpr std::uintmax_t kLast = 512;  ///< bytes, within a record with its checksum
-
-/// Returns the hash of the bytes before `end`, "" if they cannot be read.
-std::string HashBefore(std::ifstream& store, std::uintmax_t end) {
-  const std::uintmax_t begin = end - std::min(end, kLast);
-  std::string bytes(static_cast<std::size_t>(end - begin), '\0');
-  store.clear();
-  store.seekg(static_cast<std::streamoff>(begin));
-  store.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  return store.gcount() == static_cast<std::streamsize>(bytes.size()) ? Fnv1a(bytes) : "";
-}
-
-}  // namespace
-
-GroupMarks::GroupMarks(const std::filesystem::path& store, std::string content)
-    : store_(store),
-      file_(std::filesystem::path(store).replace_extension(".groups")),
-      content_(std::move(content)) {
-  std::ifstream lines(file_), bytes(store_, std::ios::binary);
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(store_, error);
-  if (error) return;
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream words(line);
-    std::string of, kind, hash, end;
-    std::size_t group = 0;
-    std::uintmax_t length = 0;
-    GroupMark mark;
-    words >> of >> kind >> group >> mark.records >> mark.failed >> length >> hash >> end;
-    // an incomplete line has no end mark
-    if (of != content_ || end != "." || length > size) continue;
-    if (HashBefore(bytes, length) == hash) marks_[{kind, group}] = mark;
-  }
-}
-
-std::optional<GroupMark> GroupMarks::Find(const std::string& kind, std::size_t group) const {
-  const auto mark = marks_.find({kind, group});
-  return mark == marks_.end() ? std::nullopt : std::optional(mark->second);
-}
-
-void GroupMarks::Add(const std::string& kind, std::size_t group, const GroupMark& mark) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(store_, error);
-  std::ifstream bytes(store_, std::ios::binary);
-  if (error || size == 0) return;
-  marks_[{kind, group}] = mark;
-  std::ofstream(file_, std::ios::app)
-      << fmt::format("{} {} {} {} {} {} {} .\n", content_, kind, group, mark.records, mark.failed,
-                     size, HashBefore(bytes, size));
 }
 namespace {
 

@@ -58,7 +58,7 @@ struct SuiteCount {
 ///
 /// A case is done if the store has a record with its id. The id represents all settings of the run
 /// and this very program. `finished` contains the records in the store at the call. Completed
-/// groups of long sweeps are marked next to the store (suite.h) and not read again.
+/// groups of long sweeps are marked next to the store and not read again.
 ///
 /// Throws Interrupted (harness/isolation/processes.h) on Ctrl-C; complete records are then in the
 /// store.
@@ -68,35 +68,6 @@ struct SuiteCount {
 /// (harness/isolation/processes.h).
 SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRuns& finished,
                     ResultStore& store);
-
-// Marks of completed groups of a long sweep, next to the store: a resumed run need not read a
-// million combinations that are done.
-//
-// A mark is a line of results.groups with content (Workload::content()), kind, group, number of
-// records, number of unfinished runs, and state of the store. The state is its length and a hash of
-// its last bytes. A mark is valid only while the store up to that length is unchanged. The marks
-// are a cache; deleting them is safe.
-
-struct GroupMark {
-  std::size_t records = 0, failed = 0;
-};
-
-class GroupMarks {
- public:
-  /// Reads the marks of this content that are valid for the store.
-  /// @param store  the store file
-  GroupMarks(const std::filesystem::path& store, std::string content);
-
-  std::optional<GroupMark> Find(const std::string& kind, std::size_t group) const;
-
-  /// Marks a group whose records are all in the store. Ignores write errors.
-  void Add(const std::string& kind, std::size_t group, const GroupMark& mark);
-
- private:
-  std::filesystem::path store_, file_;
-  std::string content_;
-  std::map<std::pair<std::string, std::size_t>, GroupMark> marks_;
-};
 
 // Files next to a store for later display of motions: the mechanisms of its problems, as files that
 // every command reads, and their references.

@@ -52,8 +52,7 @@ Figure FigureOfDrift(std::span<const Record> records, std::string_view what, boo
                 .x_label = "time [s]",
                 .y_label = "position drift, running maximum [m]",
                 .log_x = with_fit,
-                .log_y = true,
-                .curves = {}};
+                .log_y = true};
   if (!records.empty()) figure.legend = ChannelLegend(records);
   for (const Record& record : records) {
     Curve curve = CurveOverTime(record, "series.drift_t", "series.drift",
@@ -145,7 +144,7 @@ std::map<std::vector<std::string>, std::vector<Record>> ByOtherKeys(
 Figure PanelOf(const Record& record, const CoordinateKind& kind, const std::vector<double>& t,
                bool opening) {
   const std::string_view prefix = opening ? kind.opening_prefix : kind.prefix;
-  Figure panel{.title = "", .x_label = "time [s]", .y_label = kind.axis, .curves = {}};
+  Figure panel{.title = "", .x_label = "time [s]", .y_label = kind.axis};
   for (const auto& [key, value] : record.items()) {
     if (!key.starts_with(prefix)) continue;
     Curve curve{.label = key.substr(prefix.size()),
@@ -251,12 +250,7 @@ Curve CurveOf(std::span<const Record> rungs, Scalar scalar, const char* key) {
 
 /// Makes a curve for each scalar that has runs.
 Figure PanelOf(std::span<const Record> rungs, const char* key, const char* axis) {
-  Figure panel{.title = "",
-               .x_label = "tolerance",
-               .y_label = axis,
-               .log_x = true,
-               .log_y = true,
-               .curves = {}};
+  Figure panel{.title = "", .x_label = "tolerance", .y_label = axis, .log_x = true, .log_y = true};
   for (std::size_t i = 0; i < kNames<Scalar>.size(); ++i) {
     Curve curve = CurveOf(rungs, static_cast<Scalar>(i), key);
     if (!curve.x.empty() || !curve.crosses.empty()) panel.curves.push_back(std::move(curve));
@@ -327,12 +321,9 @@ std::string WithoutUnit(const std::string& label) { return label.substr(0, label
 Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
                         std::span<const SharedColumn> columns, const std::string& title) {
   const std::string unit = columns.empty() ? "" : columns.front().unit;
-  Figure both{
-      .title = title, .x_label = "time [s]", .y_label = fmt::format("[{}]", unit), .curves = {}};
-  Figure apart{.title = "",
-               .x_label = "time [s]",
-               .y_label = fmt::format("theirs - ours [{}]", unit),
-               .curves = {}};
+  Figure both{.title = title, .x_label = "time [s]", .y_label = fmt::format("[{}]", unit)};
+  Figure apart{
+      .title = "", .x_label = "time [s]", .y_label = fmt::format("theirs - ours [{}]", unit)};
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const SharedColumn& column = columns[i];
     const std::string name = WithoutUnit(column.label);

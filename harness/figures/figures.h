@@ -74,7 +74,7 @@ struct Figure {
   std::string y_label;
   bool log_x = false;
   bool log_y = false;
-  std::vector<Curve> curves;  ///< later ones lie on top
+  std::vector<Curve> curves = {};  ///< later ones lie on top
   std::string legend_title = "";
   std::vector<std::string> x_ticks = {};  ///< names of x = 1, 2, ...; empty for a numeric scale
   /// Meaning of colours, dashes and marks, one entry per row. Without them curves are named: up to

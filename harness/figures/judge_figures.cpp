@@ -57,7 +57,7 @@ const Glyph& GlyphOf(CellState state) {
 class MapPainter {
  public:
   MapPainter(const RobustnessMap& map, FigureSize size) : map_(map), groups_(Folded(map)) {
-    page_.width = std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
+    page_.width = WidthOfPage(size);
     const auto columns = static_cast<double>(map.rules.columns.size());
     label_width_ = 0.34 * page_.width;
     const double room = page_.width - 2 * kMargin - label_width_ - kShareWidth;
@@ -302,11 +302,6 @@ bool IsFlagged(const WorkPrecisionRow& row) {
   return !HasFailed(row.record) && !row.record.Text("warnings").empty();
 }
 
-std::string LabelOfAxis(const std::string& key) {
-  const std::string unit = UnitOf(ColumnOf(key, {}));
-  return unit.empty() ? key : fmt::format("{} [{}]", key, unit);
-}
-
 /// Draws runs as marks of `sound`: error over `x`, hollow with warnings. Failed runs are crosses
 /// there, or at the cost reached. A line joins sound runs only if no two of them share an x.
 template <class X>
@@ -427,11 +422,10 @@ std::string Slug(const std::string& text) {
 Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
                            const WorkPrecisionProblem& problem) {
   Figure figure{.title = problem.name + ": what accuracy costs",
-                .x_label = LabelOfAxis(work_precision.cost),
-                .y_label = LabelOfAxis(work_precision.error),
+                .x_label = WithUnit(work_precision.cost, work_precision.cost),
+                .y_label = WithUnit(work_precision.error, work_precision.error),
                 .log_x = true,
-                .log_y = true,
-                .curves = {}};
+                .log_y = true};
   const Rows rows = RowsWith(problem, "");
   const std::vector<Record> records = RecordsOf(rows);
   figure.legend = ChannelLegend(records);
@@ -452,10 +446,9 @@ Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionP
   Figure figure{
       .title = fmt::format("{}, {}: is the tolerance honoured?", problem.name, integrator),
       .x_label = "tolerance",
-      .y_label = LabelOfAxis(work_precision.error),
+      .y_label = WithUnit(work_precision.error, work_precision.error),
       .log_x = true,
-      .log_y = true,
-      .curves = {}};
+      .log_y = true};
   Rows rows = RowsWith(problem, integrator);
   std::erase_if(rows,
                 [](const WorkPrecisionRow* row) { return std::isnan(row->record.Number("rtol")); });
@@ -500,8 +493,7 @@ Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::strin
                 .x_label = "time [s]",
                 .y_label = "error of positions [m]",
                 .log_x = false,
-                .log_y = true,
-                .curves = {}};
+                .log_y = true};
   const std::vector<Record> records = RecordsOf(rows);
   if (!records.empty()) figure.legend = ChannelLegend(records);
   for (const Record& record : records) {
@@ -533,12 +525,12 @@ double Slope(const Curve& curve) {
 /// observed orders, or over the cost.
 Figure IntegratorsFigure(const WorkPrecision& work_precision, const std::string& title,
                          const Rows& rows, bool over_step) {
-  Figure figure{.title = title,
-                .x_label = over_step ? "step [s]" : LabelOfAxis(work_precision.cost),
-                .y_label = LabelOfAxis(work_precision.error),
-                .log_x = true,
-                .log_y = true,
-                .curves = {}};
+  Figure figure{
+      .title = title,
+      .x_label = over_step ? "step [s]" : WithUnit(work_precision.cost, work_precision.cost),
+      .y_label = WithUnit(work_precision.error, work_precision.error),
+      .log_x = true,
+      .log_y = true};
   constexpr const char* kIntegrator[] = {"integrator"};
   for (auto& [name, own] : RowsBy(kIntegrator, rows)) {
     const std::string label = own.front()->record.Text("integrator");

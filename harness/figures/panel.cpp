@@ -93,12 +93,6 @@ namespace {
 
 constexpr double kSample = 17.0, kSampleGap = 4.0, kItemGap = 10.0;  // [pt]
 
-// Returns "A", ..., "Z", "A1", ...
-std::string Letter(std::size_t index) {
-  const std::string letter(1, static_cast<char>('A' + index % 26));
-  return index < 26 ? letter : letter + std::to_string(index / 26);
-}
-
 double SampleOf(const LegendItem& item) {
   if (item.line) return kSample + kSampleGap;
   return item.style.shape == Shape::kNone ? 0.0 : 6.0 + kSampleGap;
@@ -183,7 +177,7 @@ std::vector<std::string> EndTexts(const Figure& figure, const std::vector<Curve>
   std::size_t next = 0;
   for (const Curve& curve : merged) {
     std::string text = names && curve.merges ? curve.label : "";
-    if (!figure.legend.empty() && curve.several && next++ < letters) text = Letter(next - 1);
+    if (!figure.legend.empty() && curve.several && next++ < letters) text = LetterOf(next - 1);
     if (!curve.remark.empty()) text += (text.empty() ? "" : " ") + curve.remark;
     texts.push_back(text);
   }
@@ -208,7 +202,7 @@ Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSi
     if (curve.label.empty()) continue;
     if (!figure.legend.empty()) {
       if (curve.several) {
-        several.push_back(Letter(several.size()) + ": " + curve.label);
+        several.push_back(LetterOf(several.size()) + ": " + curve.label);
       }
     } else if (!at_ends || !curve.merges) {
       named.push_back({curve.label, curve.style, curve.line || !curve.points});

@@ -15,6 +15,7 @@
 #include "harness/tables/columns.h"
 #include "harness/text/escape.h"
 #include "harness/text/files.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 namespace {
@@ -53,15 +54,10 @@ using Place = std::vector<std::string>;  // group, row, column
 
 std::map<Place, MapCell*> PlacesOf(RobustnessMap& map) {
   std::map<Place, MapCell*> places;
-  for (std::size_t g = 0; g < map.cells.size(); ++g) {
-    const MapGroup& group = map.rules.groups[g];
-    for (std::size_t r = 0; r < map.cells[g].size(); ++r) {
-      for (std::size_t c = 0; c < map.cells[g][r].size(); ++c) {
-        places[{Written(group.label), Written(group.rows[r].label),
-                Written(map.rules.columns[c].label)}] = &map.cells[g][r][c];
-      }
-    }
-  }
+  EachCell(map,
+           [&](const MapGroup& group, const MapRow& row, const MapMethod& column, MapCell& cell) {
+             places[{Written(group.label), Written(row.label), Written(column.label)}] = &cell;
+           });
   return places;
 }
 
@@ -142,12 +138,6 @@ std::string TerminalCell(const MapCell& cell) {
   return MapCellText(plain, ClassText(cell) == "holds" ? "ok" : "ok: " + cell.outcome);
 }
 
-std::string MethodLetter(std::size_t column) {
-  constexpr std::size_t kLetters = 26;
-  const std::string letter(1, static_cast<char>('A' + column % kLetters));
-  return column < kLetters ? letter : fmt::format("{}{}", letter, column / kLetters);
-}
-
 // Returns the colour of a cell, whose text begins with its class.
 std::string MapColour(const Record& row, const TableColumn& column) {
   const std::string text = row.Text(column.key);
@@ -179,7 +169,7 @@ void AddMapRows(const RobustnessMap& map, std::size_t group,
 std::vector<TableColumn> MatrixColumns(const RobustnessMap& map, bool letters) {
   std::vector<TableColumn> columns = {{"row", "stress test"}};
   for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
-    columns.push_back({ColumnKey(c), letters ? MethodLetter(c) : map.rules.columns[c].label});
+    columns.push_back({ColumnKey(c), letters ? LetterOf(c) : map.rules.columns[c].label});
   }
   return columns;
 }
@@ -274,7 +264,7 @@ Table MapTable(const RobustnessMap& map) {
   table.colour = &MapColour;
   for (std::size_t g = 0; g < map.cells.size(); ++g) AddMapRows(map, g, TerminalCell, &table);
   for (std::size_t c = 0; c < map.rules.columns.size(); ++c) {
-    table.notes.push_back(fmt::format("{}  {}", MethodLetter(c), map.rules.columns[c].label));
+    table.notes.push_back(fmt::format("{}  {}", LetterOf(c), map.rules.columns[c].label));
   }
   table.notes.push_back("");
   table.notes.push_back(CountCells(map));
@@ -380,13 +370,6 @@ Record ShownRow(const WorkPrecisionProblem& problem, const WorkPrecisionRow& row
   shown.Set("cost", std::isfinite(row.cost) ? Value(row.cost) : Value());
   shown.Set("reason", row.reason);
   return shown;
-}
-
-std::string UnitOfKey(const std::string& key) { return UnitOf(ColumnOf(key, {})); }
-
-std::string WithUnit(const std::string& words, const std::string& key) {
-  const std::string unit = UnitOfKey(key);
-  return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
 }
 
 Format FormatOfCost(const WorkPrecision& work_precision) {

@@ -139,8 +139,8 @@ struct RobustnessMap {
 RobustnessMap MakeRobustnessMap(const MapRules& rules, std::span<const Record> records);
 
 /// Calls `visit` with group, row, column and cell of every cell, in the order of the rules.
-template <class Visit>
-void EachCell(const RobustnessMap& map, const Visit& visit) {
+template <class Map, class Visit>
+void EachCell(Map& map, const Visit& visit) {
   for (std::size_t g = 0; g < map.cells.size(); ++g) {
     const MapGroup& group = map.rules.groups[g];
     for (std::size_t r = 0; r < map.cells[g].size(); ++r) {

@@ -226,6 +226,11 @@ std::string UnitOf(const TableColumn& column) {
   return column.header.substr(open + 1, column.header.size() - open - 2);
 }
 
+std::string WithUnit(const std::string& words, const std::string& key) {
+  const std::string unit = UnitOf(ColumnOf(key, {}));
+  return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
+}
+
 std::vector<std::string> KeysOf(std::span<const Record> rows) {
   std::vector<std::string> keys;
   for (const Record& row : rows) {

@@ -42,6 +42,9 @@ TableColumn ColumnOf(const std::string& key, std::span<const Record> rows);
 /// Returns the unit in the brackets that end the header, "" without brackets.
 std::string UnitOf(const TableColumn& column);
 
+/// Returns the words with the unit of a key in brackets, if it has one: "error [m]".
+std::string WithUnit(const std::string& words, const std::string& key);
+
 /// Returns the keys that identify cases: those before "case_id" or "outcome", each once.
 std::vector<std::string> CaseKeysOf(std::span<const Record> rows);
 

@@ -35,6 +35,12 @@ std::string ListInWords(const std::vector<std::string>& words, std::string_view 
   return text;
 }
 
+std::string LetterOf(std::size_t index) {
+  constexpr std::size_t kLetters = 26;
+  const std::string letter(1, static_cast<char>('A' + index % kLetters));
+  return index < kLetters ? letter : letter + std::to_string(index / kLetters);
+}
+
 std::string WithCount(std::size_t count, const std::string& word) {
   return std::to_string(count) + " " + word + (count == 1 ? "" : "s");
 }

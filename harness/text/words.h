@@ -21,6 +21,9 @@ std::string Abbreviated(const std::string& text, std::size_t most = 60);
 /// Returns "a, b and c", or a list with another last word.
 std::string ListInWords(const std::vector<std::string>& words, std::string_view last = "and");
 
+/// Returns "A", "B", ..., "Z", "A1", ...: a short name of the index-th of many things.
+std::string LetterOf(std::size_t index);
+
 /// Returns "1 run", "2 runs".
 std::string WithCount(std::size_t count, const std::string& word);
 

@@ -50,13 +50,6 @@ std::vector<Enum> ParseAll(const std::vector<std::string>& names, std::vector<En
   return all;
 }
 
-std::string Text(const Record& row, const char* key) {
-  return std::get<std::string>(*row.Find(key));
-}
-std::int64_t Number(const Record& row, const char* key) {
-  return std::get<std::int64_t>(*row.Find(key));
-}
-
 /// Sets the counts of one right-hand side. They are exact unless a change at round-off level, as by
 /// another library or processor, leads to other branches.
 void SetCounts(const generate::RecordingSubject& subject, const generate::RecordingStart& start,
@@ -171,7 +164,7 @@ void RequireSizes(const SizedFamily& family, const std::vector<int>& sizes) {
 bool HasCounts(const Record& row) { return row.Find("flops") != nullptr; }
 
 std::string MethodOf(const Record& row) {
-  return Text(row, "formulation") + ", " + Text(row, "coordinates");
+  return row.Text("formulation") + ", " + row.Text("coordinates");
 }
 
 /// Sets flops / bodies and, except in the first row of a method, d log(flops) / d log(bodies) from
@@ -180,28 +173,26 @@ void AddGrowth(std::span<Record> rows) {
   std::map<std::string, const Record*> last;
   for (Record& row : rows) {
     if (!HasCounts(row)) continue;
-    const Record*& before = last[MethodOf(row) + Text(row, "enforcement") + Text(row, "solver")];
-    if (before != nullptr && Number(row, "bodies") > Number(*before, "bodies")) {
+    const Record*& before = last[MethodOf(row) + row.Text("enforcement") + row.Text("solver")];
+    if (before != nullptr && row.Number("bodies") > before->Number("bodies")) {
       const auto ratio = [&](const char* key) {
-        return std::log(static_cast<double>(Number(row, key)) /
-                        static_cast<double>(Number(*before, key)));
+        return std::log(row.Number(key) / before->Number(key));
       };
       row.Set("exponent", ratio("flops") / ratio("bodies"));
     }
-    row.Set("flops_per_body",
-            static_cast<double>(Number(row, "flops")) / static_cast<double>(Number(row, "bodies")));
+    row.Set("flops_per_body", row.Number("flops") / row.Number("bodies"));
     before = &row;
   }
 }
 
 /// Returns a sentence per level and solver: the method with the fewest operations at each size.
 std::vector<std::string> Crossovers(std::span<const Record> rows) {
-  std::map<std::string, std::map<std::int64_t, const Record*>> cheapest;
+  std::map<std::string, std::map<double, const Record*>> cheapest;
   for (const Record& row : rows) {
     if (!HasCounts(row)) continue;
     const Record*& best =
-        cheapest[Text(row, "enforcement") + ", " + Text(row, "solver")][Number(row, "bodies")];
-    if (best == nullptr || Number(row, "flops") < Number(*best, "flops")) best = &row;
+        cheapest[row.Text("enforcement") + ", " + row.Text("solver")][row.Number("bodies")];
+    if (best == nullptr || row.Number("flops") < best->Number("flops")) best = &row;
   }
   std::vector<std::string> sentences;
   for (const auto& [level, sizes] : cheapest) {

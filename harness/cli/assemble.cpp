@@ -31,10 +31,7 @@ void PrintBranches(const MechanismDescription& description, const Branches& bran
                    {"distance", "distance", Format::kShortest}};
   for (std::size_t k = 0; k < branches.found.size(); ++k) {
     const Branch& branch = branches.found[k];
-    Record& row = table.rows.emplace_back();
-    row.Set("branch", static_cast<std::int64_t>(k + 1));
-    row.Set("times", static_cast<std::int64_t>(branch.times));
-    row.Set("distance", branch.distance);
+    Record& row = AddRow({k + 1, branch.times, branch.distance}, &table);
     for (const JointValues& values : branch.description.initial.coordinates) {
       const JointDescription& joint = description.joints[values.joint];
       const std::vector<ValueWord> words = ValueWords(joint.type, description.space, false);

@@ -6,7 +6,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -46,20 +45,6 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
 /// Returns 1 and prints the number if an accuracy run in `rows` failed or has warnings; else 0.
 /// @throws ConfigError if there is no accuracy run: the gate could not fail.
 int WarningGate(const std::vector<Record>& rows);
-
-struct RunCommand {
-  std::vector<std::filesystem::path> experiments;
-  std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
-  std::vector<Setting> settings;
-  SuiteOptions suite;
-  int threads = 0;    ///< as in ExperimentFiles
-  std::string gate;   ///< "warnings" or ""
-  bool wait = false;  ///< wait while another process writes to the store
-  std::string again;  ///< the command in shell syntax, printed as the command to resume
-};
-/// Runs the cases that the store lacks, then writes its tables. If interrupted, prints the number
-/// of kept results and returns 128 + the signal number: 130 for Ctrl-C.
-int RunExperiments(const RunCommand& command, const std::string& typed);
 
 struct MergeCommand {
   std::vector<std::filesystem::path> stores;
@@ -119,20 +104,6 @@ Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 /// Returns the memory that this process may still allocate [bytes], by the machine and
 /// the process limit. `with_own` adds the memory in use. 0 if unknown.
 double FreeMemory(bool with_own = false);
-
-/// Memory budget for the records of a store.
-class MemoryBudget {
- public:
-  /// Takes the memory that is free now as budget.
-  explicit MemoryBudget(std::filesystem::path store);
-  bool Has(std::uint64_t bytes) const;  ///< true if records with `bytes` bytes of lines fit
-  /// Throws ConfigError if they do not fit; `found` describes the records.
-  void Require(const std::string& found, std::uint64_t bytes) const;
-
- private:
-  std::filesystem::path store_;
-  double free_ = 0.0;  ///< 0 if unknown
-};
 
 struct CompareCommand {
   std::filesystem::path base, fresh;
@@ -212,10 +183,6 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
 
 /// Prints the contents of a file: gravity, bodies, joints, their frames, forces.
 void PrintModel(const MechanismDescription& description, const Structure& structure,
-                const ExplainView& view);
-
-/// Prints the assembled start: coordinates and speeds of all joints, energy.
-void PrintStart(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view);
 
 }  // namespace loopbench::harness

@@ -263,11 +263,13 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   const ComparisonReport comparison = Compare(base, fresh, options);
   const int code = comparison.ExitCode(options);
 
+  std::vector<std::string> origins;
+  NoteCommonShift(comparison, origins);
+  NoteOrigins("BASE", base, origins);
+  NoteOrigins("NEW", fresh, origins);
   std::vector<std::string> notes;
   if (!base_name.empty()) notes.push_back(base_name);
-  NoteCommonShift(comparison, notes);
-  NoteOrigins("BASE", base, notes);
-  NoteOrigins("NEW", fresh, notes);
+  notes.insert(notes.end(), origins.begin(), origins.end());
   if (!command.markdown.empty()) {
     WriteFileAtomically(command.markdown,
                         ComparisonMarkdown(comparison, Conclusion(comparison, options), notes));
@@ -288,9 +290,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
             comparison.other_content, notes);
   NoteCases("cases compared although they ran with other settings", comparison.other_settings,
             notes);
-  NoteCommonShift(comparison, notes);
-  NoteOrigins("BASE", base, notes);
-  NoteOrigins("NEW", fresh, notes);
+  notes.insert(notes.end(), origins.begin(), origins.end());
   Table findings = FindingTable(comparison, command.format == "csv");
   if (command.format == "csv") {
     AddCases("only in BASE", comparison.only_base, findings);
@@ -332,8 +332,8 @@ int PrintFits(const FitCommand& command, const std::string& typed) {
                    {"failed", "failed", Format::kInteger}};
   table.rows = FitFamilies(benchmarks, command.from);
   if (table.rows.empty()) {
-    PrintError("{}: no family of right-hand sides with two sizes or more\n", command.file.string());
-    return 2;
+    throw ConfigError(fmt::format("{}: no family of right-hand sides with two sizes or more",
+                                  command.file.string()));
   }
   if (command.format != "text" || !command.out.empty()) {
     NoteOrigins("measured", benchmarks, table.notes);

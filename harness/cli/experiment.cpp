@@ -100,7 +100,7 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
   table.title = experiments.front().name;
   if (!experiments.front().comment.empty()) table.title += ": " + experiments.front().comment;
   for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver"}) {
-    table.columns.push_back({key, key, Format::kText, {}});
+    table.columns.push_back({key, key});
   }
   for (const auto& [name, value] : experiments.front().parameters.items()) {
     Format format = Format::kText;
@@ -112,23 +112,23 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
     return std::ranges::any_of(experiment.methods,
                                [](const Method& method) { return method.threads > 1; });
   });
-  if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger, {}});
+  if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger});
   const bool has_executions = std::ranges::any_of(experiments, [](const Experiment& experiment) {
     return std::ranges::any_of(experiment.methods, [](const Method& method) {
       return method.execution != Execution::kLibrary;
     });
   });
-  if (has_executions) table.columns.push_back({"execution", "execution", Format::kText, {}});
+  if (has_executions) table.columns.push_back({"execution", "execution"});
   const auto any = [&experiments](auto has) { return std::ranges::any_of(experiments, has); };
   const bool has_integrators =
       any([](const Experiment& experiment) { return experiment.integrators.size() > 1; });
   const bool has_steps =
       any([](const Experiment& experiment) { return !experiment.fixed_steps.empty(); });
-  if (has_integrators) table.columns.push_back({"integrator", "integrator", Format::kText, {}});
-  table.columns.push_back({"rtol", "rtol", Format::kShortest, {}});
-  if (has_steps) table.columns.push_back({"step", "step [s]", Format::kShortest, {}});
-  table.columns.push_back({"horizon", "horizon [s]", Format::kShortest, {}});
-  table.columns.push_back({"runs", "runs", Format::kInteger, {}});
+  if (has_integrators) table.columns.push_back({"integrator", "integrator"});
+  table.columns.push_back({"rtol", "rtol", Format::kShortest});
+  if (has_steps) table.columns.push_back({"step", "step [s]", Format::kShortest});
+  table.columns.push_back({"horizon", "horizon [s]", Format::kShortest});
+  table.columns.push_back({"runs", "runs", Format::kInteger});
   table.rows = CaseRows(experiments, filter);
   const OtherRuns others(overview, filter);
   table.notes = {fmt::format("{} cases and {} timings", overview.cases(), others.timings)};

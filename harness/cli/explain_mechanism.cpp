@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 
-#include "harness/analysis/coordinate_range.h"
 #include "harness/analysis/model_warnings.h"
 #include "harness/analysis/structure_hints.h"
 #include "harness/cli/commands.h"
@@ -31,18 +30,25 @@ std::string Names(const std::vector<std::string>& names, const ExplainView& view
                      names.back());
 }
 
+/// Returns the names of the joints and of the bodies of a loop.
+std::pair<std::vector<std::string>, std::vector<std::string>> NamesIn(
+    const LoopPath& loop, const MechanismDescription& description) {
+  std::pair<std::vector<std::string>, std::vector<std::string>> names;
+  for (const int j : loop.joints) names.first.push_back(description.joints[j].name);
+  for (const int b : loop.bodies) names.second.push_back(description.bodies[b].name);
+  return names;
+}
+
 Table LoopTable(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
   Table table;
-  table.columns = {{"cut", "cut joint", Format::kText, {}},
-                   {"shift", "gap [m]", Format::kScientific, {}},
-                   {"turn", "gap [rad]", Format::kScientific, {}},
-                   {"what", "of", Format::kText, {}},
-                   {"through", "through", Format::kText, {}}};
+  table.columns = {{"cut", "cut joint"},
+                   {"shift", "gap [m]", Format::kScientific},
+                   {"turn", "gap [rad]", Format::kScientific},
+                   {"what", "of"},
+                   {"through", "through"}};
   for (const LoopPath& loop : structure.loops) {
-    std::vector<std::string> joints, bodies;
-    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
-    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
+    const auto [joints, bodies] = NamesIn(loop, description);
     AddRow({description.joints[loop.cut_joint].name, loop.open_shift, loop.open_rotation, "joints",
             Names(joints, view)},
            &table);
@@ -109,10 +115,10 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
 void PrintIslands(const MechanismDescription& description, const Structure& structure,
                   const ExplainView& view) {
   Table table;
-  table.columns = {{"subsystem", "subsystem", Format::kInteger, {}},
-                   {"bodies", "bodies", Format::kInteger, {}},
-                   {"first", "first body", Format::kText, {}},
-                   {"held", "connected to", Format::kText, {}}};
+  table.columns = {{"subsystem", "subsystem", Format::kInteger},
+                   {"bodies", "bodies", Format::kInteger},
+                   {"first", "first body"},
+                   {"held", "connected to"}};
   for (std::size_t i = 0; i < structure.islands.size(); ++i) {
     const Island& island = structure.islands[i];
     AddRow({i + 1, island.bodies.size(), description.bodies[island.bodies.front()].name,
@@ -124,12 +130,12 @@ void PrintIslands(const MechanismDescription& description, const Structure& stru
 
 void PrintCoordinates(const Structure& structure, const ExplainView& view) {
   Table table;
-  table.columns = {{"set", "coordinates", Format::kText, {}},
-                   {"q", "positions", Format::kInteger, {}},
-                   {"u", "speeds", Format::kInteger, {}},
-                   {"rows", "constraints", Format::kInteger, {}},
-                   {"rank", "rank", Format::kInteger, {}},
-                   {"free", "independent speeds", Format::kInteger, {}}};
+  table.columns = {{"set", "coordinates"},
+                   {"q", "positions", Format::kInteger},
+                   {"u", "speeds", Format::kInteger},
+                   {"rows", "constraints", Format::kInteger},
+                   {"rank", "rank", Format::kInteger},
+                   {"free", "independent speeds", Format::kInteger}};
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     const bool joint = set == Coordinates::kJoint;
     const int speeds = joint ? structure.joint_u : structure.absolute_u;
@@ -151,11 +157,11 @@ odca::Plan PlanFor(const MechanismDescription& description, SolverKind solver) {
 
 void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView& view) {
   Table table;
-  table.columns = {{"solver", "solver", Format::kText, {}},
-                   {"depth", "depth", Format::kInteger, {}},
-                   {"handles", "most handles", Format::kInteger, {}},
-                   {"largest", "largest join", Format::kInteger, {}},
-                   {"loops", "joins that close loops", Format::kInteger, {}}};
+  table.columns = {{"solver", "solver"},
+                   {"depth", "depth", Format::kInteger},
+                   {"handles", "most handles", Format::kInteger},
+                   {"largest", "largest join", Format::kInteger},
+                   {"loops", "joins that close loops", Format::kInteger}};
   for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
     const odca::Plan plan = description.space == SpaceKind::kPlanar
                                 ? PlanFor<Planar>(description, solver)
@@ -186,12 +192,12 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
     return Value(ShortNumber(std::abs(value) > kRoundOff * largest ? value : 0.0));
   };
   Table efforts, reactions;
-  efforts.columns = {{"joint", "joint", Format::kText, {}},
-                     {"coordinate", "coordinate", Format::kText, {}},
-                     {"effort", "effort", Format::kText, {}},
-                     {"unit", "unit", Format::kText, {}},
-                     {"held", "held by", Format::kText, {}}};
-  reactions.columns = {{"joint", "joint", Format::kText, {}}, {"on", "on", Format::kText, {}}};
+  efforts.columns = {{"joint", "joint"},
+                     {"coordinate", "coordinate"},
+                     {"effort", "effort"},
+                     {"unit", "unit"},
+                     {"held", "held by"}};
+  reactions.columns = {{"joint", "joint"}, {"on", "on"}};
   std::map<std::string, const JointDescription*> joints;
   std::map<std::string, std::string> holder_of;  // of columns
   for (const JointDescription& joint : description.joints) joints[LabelName(joint.name)] = &joint;
@@ -224,8 +230,7 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
     }
     reactions.rows.back().Set(component, shown(statics.values[i]));
     if (reactions.rows.size() == 1) {
-      reactions.columns.push_back(
-          {component, fmt::format("{} [{}]", component, unit), Format::kText, {}});
+      reactions.columns.push_back({component, fmt::format("{} [{}]", component, unit)});
     }
   }
   PrintSection("Efforts that hold the start at rest", efforts, view, "efforts_at_rest");
@@ -263,11 +268,11 @@ int PrintRange(const MechanismDescription& description, const ExplainView& view)
   const ValueWord word =
       ValueWords(description.joints[joint].type, description.space, false).front();
   Table table;
-  table.columns = {{"end", "end", Format::kText, {}},
-                   {"value", fmt::format("{} [{}]", word.name, word.unit), Format::kText, {}},
-                   {"limit", "limit", Format::kText, {}},
-                   {"in_line", "in line", Format::kText, {}},
-                   {"position", "coordinates there", Format::kText, {}}};
+  table.columns = {{"end", "end"},
+                   {"value", fmt::format("{} [{}]", word.name, word.unit)},
+                   {"limit", "limit"},
+                   {"in_line", "in line"},
+                   {"position", "coordinates there"}};
   for (const bool is_low : {true, false}) {
     const RangeEnd& end = is_low ? range.low : range.high;
     std::vector<std::string> position;
@@ -295,9 +300,7 @@ std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
                                       const Structure& structure) {
   std::vector<JsonObject> loops;
   for (const LoopPath& loop : structure.loops) {
-    std::vector<std::string> joints, bodies;
-    for (const int j : loop.joints) joints.push_back(description.joints[j].name);
-    for (const int b : loop.bodies) bodies.push_back(description.bodies[b].name);
+    const auto [joints, bodies] = NamesIn(loop, description);
     loops.push_back(JsonObject()
                         .Add("cut", description.joints[loop.cut_joint].name)
                         .Add("open_shift", loop.open_shift)
@@ -335,69 +338,7 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
       .Add("redundant", redundant);
 }
 
-}  // namespace
-
-int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
-  const MechanismFile file = ReadMechanism(path);
-  const MechanismDescription& description = file.description;
-  const Structure structure = AnalyseStructure(description);
-  const std::vector<Warning> warnings = FindWarnings(description, structure);
-  const std::vector<std::string> idle =
-                                     NamesOf(description, FindIdleFreedoms(description, structure)),
-                                 hints = FindHints(description, structure);
-  if (view.document != nullptr) {
-    const bool planar = description.space == SpaceKind::kPlanar;
-    view.document->Add("name", description.name)
-        .Add("space", std::string(planar ? "planar" : "spatial"))
-        .Add("gravity",
-             std::vector<double>(description.gravity.begin(), description.gravity.end()));
-    DescribeStructure(description, structure, idle, view.document);
-  }
-  Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
-      path.string(), description.space == SpaceKind::kPlanar ? "planar" : "spatial");
-  PrintModel(description, structure, view);
-  PrintStart(description, structure, view);
-  PrintFreedom(structure, idle, view);
-  PrintSection("Loops", LoopTable(description, structure, view), view);
-  PrintRedundant(description, structure, view);
-  PrintIslands(description, structure, view);
-  PrintCoordinates(structure, view);
-  PrintPlanOfJoins(description, view);
-  Say(view, "\nPossible simplifications\n");
-  const Compiled compiled = Compile(description, CompileOptions::All());
-  if (compiled.report.empty()) Say(view, "  none\n");
-  for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
-  if (compiled.done != CompileOptions::None()) {
-    Say(view, "  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
-        ToString(compiled.done), ToString(CompileOptions()));
-  }
-  if (view.document != nullptr) {
-    std::vector<std::string> texts;
-    for (const Warning& warning : warnings) texts.push_back(warning.text);
-    view.document->Add("simplifications", compiled.report)
-        .Add("warnings", texts)
-        .Add("hints", hints);
-  }
-  Say(view, "\nWarnings\n");
-  if (warnings.empty()) Say(view, "  none\n");
-  for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
-  if (!hints.empty()) Say(view, "\nHints\n");
-  for (const std::string& hint : hints) Say(view, "  {}\n", hint);
-  int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
-  const bool is_assembled = code == 0;
-  if (view.statics && is_assembled) code = PrintStatics(description, structure, view);
-  if (!view.range.empty() && is_assembled) code = std::max(code, PrintRange(description, view));
-  const std::string fault = FreedomFault(description, file.observe, structure);
-  if (fault.empty()) return code;
-  if (view.document == nullptr) throw ConfigError(fault);
-  view.document->Add("error", fault);
-  PrintError("{}\n", fault);
-  return 2;
-}
-
-// explain: the assembled start of a mechanism, joint by joint, and its energy.
-
-namespace {
+// The assembled start of a mechanism, joint by joint, and its energy.
 
 template <class Space>
 class StartText {
@@ -413,10 +354,9 @@ class StartText {
 
   Table JointValuesTable() const {
     Table table;
-    table.columns = {
-        {"name", "joint", Format::kText, {}}, {"coordinate", "coordinate", Format::kText, {}},
-        {"q", "value", Format::kText, {}},    {"speed", "speed", Format::kText, {}},
-        {"u", "value", Format::kText, {}},    {"given", "given", Format::kText, {}}};
+    table.columns = {{"name", "joint"}, {"coordinate", "coordinate"},
+                     {"q", "value"},    {"speed", "speed"},
+                     {"u", "value"},    {"given", "given"}};
     for (std::size_t j = 0; j < description_.joints.size(); ++j) AddJoint(j, &table);
     return table;
   }
@@ -523,8 +463,7 @@ void PrintOf(const MechanismDescription& description, const Start<double>& start
       "rest,\n  joint torques at coordinate 0.\n");
 }
 
-}  // namespace
-
+/// Prints the assembled start: coordinates and speeds of all joints, energy.
 void PrintStart(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
   if (description.space == SpaceKind::kPlanar) {
@@ -532,6 +471,66 @@ void PrintStart(const MechanismDescription& description, const Structure& struct
   } else {
     PrintOf<Spatial>(description, structure.start, view);
   }
+}
+
+}  // namespace
+
+int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view) {
+  const MechanismFile file = ReadMechanism(path);
+  const MechanismDescription& description = file.description;
+  const Structure structure = AnalyseStructure(description);
+  const std::vector<Warning> warnings = FindWarnings(description, structure);
+  const std::vector<std::string> idle =
+                                     NamesOf(description, FindIdleFreedoms(description, structure)),
+                                 hints = FindHints(description, structure);
+  if (view.document != nullptr) {
+    const bool planar = description.space == SpaceKind::kPlanar;
+    view.document->Add("name", description.name)
+        .Add("space", std::string(planar ? "planar" : "spatial"))
+        .Add("gravity",
+             std::vector<double>(description.gravity.begin(), description.gravity.end()));
+    DescribeStructure(description, structure, idle, view.document);
+  }
+  Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
+      path.string(), description.space == SpaceKind::kPlanar ? "planar" : "spatial");
+  PrintModel(description, structure, view);
+  PrintStart(description, structure, view);
+  PrintFreedom(structure, idle, view);
+  PrintSection("Loops", LoopTable(description, structure, view), view);
+  PrintRedundant(description, structure, view);
+  PrintIslands(description, structure, view);
+  PrintCoordinates(structure, view);
+  PrintPlanOfJoins(description, view);
+  Say(view, "\nPossible simplifications\n");
+  const Compiled compiled = Compile(description, CompileOptions::All());
+  if (compiled.report.empty()) Say(view, "  none\n");
+  for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
+  if (compiled.done != CompileOptions::None()) {
+    Say(view, "  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
+        ToString(compiled.done), ToString(CompileOptions()));
+  }
+  if (view.document != nullptr) {
+    std::vector<std::string> texts;
+    for (const Warning& warning : warnings) texts.push_back(warning.text);
+    view.document->Add("simplifications", compiled.report)
+        .Add("warnings", texts)
+        .Add("hints", hints);
+  }
+  Say(view, "\nWarnings\n");
+  if (warnings.empty()) Say(view, "  none\n");
+  for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
+  if (!hints.empty()) Say(view, "\nHints\n");
+  for (const std::string& hint : hints) Say(view, "  {}\n", hint);
+  int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
+  const bool is_assembled = code == 0;
+  if (view.statics && is_assembled) code = PrintStatics(description, structure, view);
+  if (!view.range.empty() && is_assembled) code = std::max(code, PrintRange(description, view));
+  const std::string fault = FreedomFault(description, file.observe, structure);
+  if (fault.empty()) return code;
+  if (view.document == nullptr) throw ConfigError(fault);
+  view.document->Add("error", fault);
+  PrintError("{}\n", fault);
+  return 2;
 }
 
 }  // namespace loopbench::harness

@@ -35,12 +35,12 @@ std::string InertiaText(const Eigen::Matrix3d& I, SpaceKind space) {
 
 Table BodyTable(const MechanismDescription& description, const Structure& structure) {
   Table table;
-  table.columns = {{"name", "body", Format::kText, {}},
-                   {"part", "subsystem", Format::kInteger, {}},
-                   {"mass", "mass [kg]", Format::kShortest, {}},
-                   {"inertia", "inertia [kg m^2]", Format::kText, {}},
-                   {"com", "com [m]", Format::kText, {}},
-                   {"points", "points [m]", Format::kText, {}}};
+  table.columns = {{"name", "body"},
+                   {"part", "subsystem", Format::kInteger},
+                   {"mass", "mass [kg]", Format::kShortest},
+                   {"inertia", "inertia [kg m^2]"},
+                   {"com", "com [m]"},
+                   {"points", "points [m]"}};
   const auto add = [&](const BodyDescription& body) -> Record& {
     Record& row = table.rows.emplace_back();
     row.Set("name", body.name);
@@ -116,11 +116,14 @@ std::string Given(SpaceKind space, const JointDescription& joint) {
 
 Table JointTable(const MechanismDescription& description, const Structure& structure) {
   Table table;
-  table.columns = {
-      {"name", "joint", Format::kText, {}},   {"type", "type", Format::kText, {}},
-      {"from", "from", Format::kText, {}},    {"to", "to", Format::kText, {}},
-      {"free", "free", Format::kInteger, {}}, {"rows", "constrains", Format::kInteger, {}},
-      {"place", "place", Format::kText, {}},  {"given", "given", Format::kText, {}}};
+  table.columns = {{"name", "joint"},
+                   {"type", "type"},
+                   {"from", "from"},
+                   {"to", "to"},
+                   {"free", "free", Format::kInteger},
+                   {"rows", "constrains", Format::kInteger},
+                   {"place", "place"},
+                   {"given", "given"}};
   const int dim = description.space == SpaceKind::kPlanar ? 3 : 6;
   std::vector<bool> cut(description.joints.size());
   for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
@@ -155,10 +158,8 @@ std::string AxesText(const Rotation<Space, double>& R, std::string_view axes) {
 template <class Space>
 Table FrameTable(const MechanismDescription& description) {
   Table table;
-  table.columns = {
-      {"name", "joint", Format::kText, {}},   {"side", "frame", Format::kText, {}},
-      {"body", "on body", Format::kText, {}}, {"at", "origin [m]", Format::kText, {}},
-      {"axes", "axis", Format::kText, {}},    {"turn", "rotation vector [rad]", Format::kText, {}}};
+  table.columns = {{"name", "joint"},    {"side", "frame"}, {"body", "on body"},
+                   {"at", "origin [m]"}, {"axes", "axis"},  {"turn", "rotation vector [rad]"}};
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
@@ -217,17 +218,14 @@ void AddForce(const MechanismDescription& description, ForceDescription force, T
 
 Table ForceTable(const MechanismDescription& description) {
   Table table;
-  table.columns = {{"type", "force", Format::kText, {}},
-                   {"on", "acts on", Format::kText, {}},
-                   {"with", "with", Format::kText, {}}};
+  table.columns = {{"type", "force"}, {"on", "acts on"}, {"with", "with"}};
   for (const ForceDescription& force : description.forces) AddForce(description, force, &table);
   return table;
 }
 
 Table CouplingTable(const MechanismDescription& description) {
   Table table;
-  table.columns = {{"name", "coupling", Format::kText, {}},
-                   {"relation", "relation", Format::kText, {}}};
+  table.columns = {{"name", "coupling"}, {"relation", "relation"}};
   for (const CouplingDescription& coupling : description.couplings) {
     std::string text;
     for (const auto& [joint, ratio] : coupling.parts) {

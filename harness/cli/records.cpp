@@ -100,6 +100,34 @@ class ProblemRows {
   std::size_t rows_ = 0;
 };
 
+constexpr double kGrows = 4.0;  // memory of a record relative to its line, measured
+
+/// Memory budget for the records of a store.
+class MemoryBudget {
+ public:
+  /// Takes the memory that is free now as budget.
+  explicit MemoryBudget(std::filesystem::path store)
+      : store_(std::move(store)), free_(FreeMemory()) {}
+
+  /// True if records with `bytes` bytes of lines fit.
+  bool Has(std::uint64_t bytes) const {
+    return free_ == 0.0 || kGrows * static_cast<double>(bytes) < 0.9 * free_;
+  }
+
+  /// Throws ConfigError if they do not fit; `found` describes the records.
+  void Require(const std::string& found, std::uint64_t bytes) const {
+    if (Has(bytes)) return;
+    throw ConfigError(fmt::format(
+        "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
+        "fewer: choose some with --where PARAMETER=..., or write all with table --format csv",
+        store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9));
+  }
+
+ private:
+  std::filesystem::path store_;
+  double free_ = 0.0;  ///< 0 if unknown
+};
+
 }  // namespace
 
 int WriteLongTable(const TableCommand& command, const ProblemReader& reader,
@@ -168,25 +196,6 @@ double FreeMemory(bool with_own) {
   const double own = with_own ? 0.0 : pages * static_cast<double>(::getpagesize());
   const double left = std::max(1.0, static_cast<double>(allowed.rlim_cur) - own);
   return free == 0.0 ? left : std::min(free, left);
-}
-
-MemoryBudget::MemoryBudget(std::filesystem::path store)
-    : store_(std::move(store)), free_(FreeMemory()) {}
-
-namespace {
-constexpr double kGrows = 4.0;  // memory of a record relative to its line, measured
-}  // namespace
-
-bool MemoryBudget::Has(std::uint64_t bytes) const {
-  return free_ == 0.0 || kGrows * static_cast<double>(bytes) < 0.9 * free_;
-}
-
-void MemoryBudget::Require(const std::string& found, std::uint64_t bytes) const {
-  if (Has(bytes)) return;
-  throw ConfigError(fmt::format(
-      "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
-      "fewer: choose some with --where PARAMETER=..., or write all with table --format csv",
-      store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9));
 }
 
 std::vector<Record> LatestWithWarnings(std::vector<Record> records) {

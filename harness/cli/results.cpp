@@ -62,6 +62,19 @@ std::filesystem::path FileOf(const PlotCommand& command) {
                   out.string(), ending, command.format));
 }
 
+/// Loads records, of which there must be some.
+std::vector<Record> LoadSome(const std::filesystem::path& store, const Selection& where = {}) {
+  std::vector<Record> records = LoadRecords(store, where);
+  if (records.empty()) throw ConfigError(fmt::format("{}: no records", store.string()));
+  return records;
+}
+
+/// Throws if a figure could not be written.
+void RequireWritten(const std::optional<std::string>& fault, const std::string& path) {
+  if (fault) throw std::runtime_error(*fault);
+  Print("wrote {}\n", path);
+}
+
 bool IsFree(const PlotCommand& command) {
   const FreeFigure& free = command.free;
   if ((free.x + free.y + free.group + free.log).empty() && !free.title && free.labels.empty()) {
@@ -83,11 +96,7 @@ int DrawFree(const std::vector<Record>& records, const PlotCommand& command) {
   const std::filesystem::path path = FileOf(command);
   const FreeFigureResult result = MakeFreeFigure(records, command.free);
   for (const std::string& remark : result.remarks) PrintError("note: {}\n", remark);
-  if (const auto error = WriteFigure(path, result.figure, FigureSizes().at(command.size))) {
-    PrintError("{}\n", Lines{*error});
-    return 2;
-  }
-  Print("wrote {}\n", path.string());
+  RequireWritten(WriteFigure(path, result.figure, FigureSizes().at(command.size)), path.string());
   return 0;
 }
 
@@ -139,11 +148,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
   }
   const RobustnessMap map = MapFromCsv(rules, ReadTextFile(command.store), command.store.string());
   const std::string picture = (command.out / ("robustness-map." + command.format)).string();
-  if (const auto error = WriteMapFigure(picture, map, FigureSizes().at(command.size))) {
-    PrintError("{}\n", Lines{*error});
-    return 2;
-  }
-  Print("wrote {}\n", picture);
+  RequireWritten(WriteMapFigure(picture, map, FigureSizes().at(command.size)), picture);
   return 0;
 }
 
@@ -211,11 +216,7 @@ int Plot(const PlotCommand& command) {
 int PrintMap(const MapCommand& command, const std::string& typed) {
   const MapRules rules = ReadMapRules(command.rules);
   if (command.store.extension() == ".csv") return RedrawMap(rules, command);
-  const std::vector<Record> records = LoadRecords(command.store);
-  if (records.empty()) {
-    PrintError("{}: no records\n", command.store.string());
-    return 2;
-  }
+  const std::vector<Record> records = LoadSome(command.store);
   RequireOneContent(records, command.store, "robustness");
   const RobustnessMap map = MakeRobustnessMap(rules, records);
   if (!command.gate.empty()) RequireDemands(map, command.rules);
@@ -263,11 +264,7 @@ int WriteReport(const ReportCommand& command, const std::string& typed) {
       .store = command.store, .rules_file = command.rules, .claims_file = command.claims};
   if (!command.rules.empty()) options.rules = ReadMapRules(command.rules);
   if (!command.claims.empty()) options.claims = ReadClaims(command.claims);
-  const std::vector<Record> records = LoadRecords(command.store);
-  if (records.empty()) {
-    PrintError("{}: no records\n", command.store.string());
-    return 2;
-  }
+  const std::vector<Record> records = LoadSome(command.store);
   if (options.rules) RequireOneContent(records, command.store, "robustness");
   if (!options.claims.empty()) RequireOneContent(records, command.store, "check-claims");
   ReportData data = MakeReport(records, options);
@@ -398,11 +395,7 @@ void PrintForPeople(const WorkPrecision& work_precision, const WorkPrecisionComm
 /// Prints fronts, overview and fairness statement; writes work-precision.csv,
 /// work-precision-overview.csv, work-precision.md and the figures.
 int PrintWorkPrecision(const WorkPrecisionCommand& command, const std::string& typed) {
-  const std::vector<Record> records = LoadRecords(command.store, command.options.where);
-  if (records.empty()) {
-    PrintError("{}: no records\n", command.store.string());
-    return 2;
-  }
+  const std::vector<Record> records = LoadSome(command.store, command.options.where);
   RequireOneContent(records, command.store, "work-precision");
   const WorkPrecision work_precision = MakeWorkPrecision(records, command.options);
   const std::filesystem::path folder = FolderOf(command);

@@ -32,11 +32,23 @@
 #include "harness/tables/fit.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
+#include "harness/text/words.h"
 #include "harness/timing/time_cases.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 namespace {
+
+struct RunCommand {
+  std::vector<std::filesystem::path> experiments;
+  std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
+  std::vector<Setting> settings;
+  SuiteOptions suite;
+  int threads = 0;    ///< as in ExperimentFiles
+  std::string gate;   ///< "warnings" or ""
+  bool wait = false;  ///< wait while another process writes to the store
+  std::string again;  ///< the command in shell syntax, printed as the command to resume
+};
 
 std::size_t CountLines(const std::filesystem::path& file) {
   std::ifstream lines(file, std::ios::binary);
@@ -67,8 +79,8 @@ void PrintInterrupted(const RunCommand& command, const ResultStore& store) {
   }
 }
 
-}  // namespace
-
+/// Runs the cases that the store lacks, then writes its tables. If interrupted, prints the number
+/// of kept results and returns 128 + the signal number: 130 for Ctrl-C.
 int RunExperiments(const RunCommand& command, const std::string& typed) {
   // read everything first: a mistake in the last file must not cost the runs of the first
   Workload workload({command.experiments, command.settings, command.suite.filter, command.threads},
@@ -119,6 +131,8 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
   Print("results in {}\n", out.string());
   return command.gate.empty() ? 0 : WarningGate(records);
 }
+
+}  // namespace
 
 int Merge(const MergeCommand& command) {
   NewStore target(command.out);
@@ -394,11 +408,11 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
   Print("\n\n");
   Table table;
-  table.columns = {{"mechanism", "mechanism", Format::kText, {}},
-                   {"method", "method", Format::kText, {}},
-                   {"cases", "cases", Format::kInteger, {}},
-                   {"runs", "runs", Format::kInteger, {}},
-                   {"seconds", "estimate [s]", Format::kShortest, {}}};
+  table.columns = {{"mechanism", "mechanism"},
+                   {"method", "method"},
+                   {"cases", "cases", Format::kInteger},
+                   {"runs", "runs", Format::kInteger},
+                   {"seconds", "estimate [s]", Format::kShortest}};
   for (const Line& line : plan.lines) {
     AddRow({line.mechanism, line.method, line.cases, line.runs,
             std::round(line.seconds * 100.0) / 100.0},

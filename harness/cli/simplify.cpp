@@ -96,10 +96,8 @@ SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
 
 Table CandidateTable(const SimplificationRule& idea, const Simplified& simplified) {
   Table table;
-  table.columns = {{"what", "candidate", Format::kText, {}},
-                   {"number", "number", Format::kText, {}},
-                   {"taken", "taken", Format::kText, {}},
-                   {"why", "because", Format::kText, {}}};
+  table.columns = {
+      {"what", "candidate"}, {"number", "number"}, {"taken", "taken"}, {"why", "because"}};
   for (const Candidate& candidate : simplified.candidates) {
     AddRow({candidate.what,
             std::isnan(candidate.number) ? "" : fmt::format("{:.3g}", candidate.number),
@@ -140,16 +138,16 @@ int SpeedsOf(const MechanismDescription& description) {
 
 void PrintModels(const ProblemModels& ladder, const ExplainView& view) {
   Table table;
-  table.columns = {{"name", "model", Format::kText, {}},
-                   {"motion", "motion", Format::kText, {}},
-                   {"space", "space", Format::kText, {}},
-                   {"bodies", "bodies", Format::kInteger, {}},
-                   {"joints", "joints", Format::kInteger, {}},
-                   {"speeds", "speeds", Format::kInteger, {}},
-                   {"error", "model error [m]", Format::kText, {}},
-                   {"worst", "at", Format::kText, {}},
-                   {"evaluations", "evaluations", Format::kInteger, {}},
-                   {"removed", "removed", Format::kText, {}}};
+  table.columns = {{"name", "model"},
+                   {"motion", "motion"},
+                   {"space", "space"},
+                   {"bodies", "bodies", Format::kInteger},
+                   {"joints", "joints", Format::kInteger},
+                   {"speeds", "speeds", Format::kInteger},
+                   {"error", "model error [m]"},
+                   {"worst", "at"},
+                   {"evaluations", "evaluations", Format::kInteger},
+                   {"removed", "removed"}};
   const MechanismDescription& whole = ladder.models.front().description;
   for (const ProblemModel& model : ladder.models) {
     const auto& bodies = model.description.bodies;

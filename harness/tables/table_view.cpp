@@ -178,16 +178,16 @@ Table FactorialTable(std::span<const Record> records, const FactorialOptions& op
   Table table;
   table.title = fmt::format("Drift by factor, rtol {}, {} s", options.rtol, options.horizon);
   table.columns = {
-      {"factor", "factor", Format::kText, {}},
-      {"from", "from", Format::kText, {}},
-      {"to", "to", Format::kText, {}},
-      {"within", "within", Format::kText, {}},
-      {"pairs", "pairs", Format::kInteger, {}},
-      {"ratio_mean", "drift ratio", Format::kScientific, {}},
-      {"ratio_min", "least", Format::kScientific, {}},
-      {"ratio_max", "largest", Format::kScientific, {}},
-      {"exponent_difference", "exponent diff.", Format::kExponent, {}},
-      {"left_out", "left out", Format::kInteger, {}},
+      {"factor", "factor"},
+      {"from", "from"},
+      {"to", "to"},
+      {"within", "within"},
+      {"pairs", "pairs", Format::kInteger},
+      {"ratio_mean", "drift ratio", Format::kScientific},
+      {"ratio_min", "least", Format::kScientific},
+      {"ratio_max", "largest", Format::kScientific},
+      {"exponent_difference", "exponent diff.", Format::kExponent},
+      {"left_out", "left out", Format::kInteger},
   };
   const std::vector<Run> runs = Collect(records, options);
   for (const Change& change : Changes()) {

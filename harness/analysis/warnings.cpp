@@ -20,6 +20,10 @@
 namespace loopbench::harness {
 namespace {
 
+/// Final poses nearer than this, over links and in rad, are alike for rounding's sake: below 1e-11
+/// comparisons hold all errors for round-off (harness/judge/demand.h).
+constexpr double kRoundOffShare = 1e-11;
+
 constexpr std::string_view kPrefix = "series.final.";
 
 /// Runs of one problem, horizon and tolerance with equal final poses, by index, largest set first.
@@ -484,34 +488,9 @@ std::string OwnWarnings(const Record& record) {
   return codes;
 }
 
-void SetWarnings(std::vector<Record>* records) {
-  std::vector<std::string> own;
-  std::vector<bool> testifies;
-  for (const Record& record : *records) {
-    own.push_back(OwnWarnings(record));
-    testifies.push_back(TrajectoryIsTrusted(own.back()));
-  }
-  const std::vector<Agreement> agreements = CompareFinalPoses(*records, testifies);
-  const std::vector<Refinement> refinements = CompareTolerances(*records);
-  for (std::size_t i = 0; i < records->size(); ++i) {
-    Record& record = (*records)[i];
-    if (record.Text("kind") != "accuracy" || !HasFinished(record)) continue;
-    // the others need not be right; a reference is
-    const bool certified = IsCertified(record);
-    // who ends as those do that can keep a branch has kept it
-    std::string codes = agreements[i].is_backed ? Without(kSingularWarning, own[i]) : own[i];
-    Add(&codes, agreements[i].flagged && !certified, kDisagreementWarning);
-    const bool is_known = own[i].find(kRefinementWarning) != own[i].npos;
-    Add(&codes, refinements[i].flagged && !certified && !is_known, kRefinementWarning);
-    record.Set("warnings", codes);
-    if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
-  }
-}
+// Tests whether finer tolerances bring a method's runs nearer to one final pose. Convergence fails
+// for a wrong derivative, an ignored tolerance, or a motion without a limit.
 
-bool HasWarning(const Record& record, const std::string& code) {
-  const std::string codes = record.Text("warnings");
-  return code.empty() ? !codes.empty() : (" " + codes + " ").find(" " + code + " ") != codes.npos;
-}
 namespace {
 
 /// Returns all keys that name the case of a run, except its tolerance.
@@ -533,10 +512,12 @@ bool SameInEveryBit(const Record& a, const Record& b) {
          a.Text("state_hash") == b.Text("state_hash");
 }
 
-}  // namespace
-
-std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+/// Returns which records are flagged. Compares finished accuracy runs that differ only in the
+/// tolerance, for at least three tolerances: distances from the finest run must shrink. If a
+/// distance exceeds 1000 tolerances (kMaxTolerances) and has not shrunk by the fourth root of the
+/// tolerances' ratio, the finer runs are flagged. So are two runs of more than a dozen steps that
+/// are equal in every bit and step: the tolerance had no effect.
+std::vector<bool> FlaggedByTolerances(std::span<const Record> records) {
   std::map<std::string, std::vector<std::size_t>> columns;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const Record& record = records[i];
@@ -544,7 +525,7 @@ std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
                         !record.Text("problem_id").empty() && ToleranceOf(record) > 0.0;
     if (counts) columns[ColumnOf(record)].push_back(i);
   }
-  std::vector<Refinement> refinements(records.size(), {false, kNaN, kNaN});
+  std::vector<bool> flagged(records.size(), false);
   for (auto& [name, runs] : columns) {
     const auto tolerance = [&](std::size_t run) { return ToleranceOf(records[run]); };
     std::ranges::stable_sort(runs, std::greater<>(), tolerance);
@@ -553,20 +534,51 @@ std::vector<Refinement> CompareTolerances(std::span<const Record> records) {
     constexpr std::size_t kFewest = 3;
     if (runs.size() < kFewest) continue;
     const auto flag_from = [&](std::size_t first) {
-      for (std::size_t i = first; i < runs.size(); ++i) refinements[runs[i]].flagged = true;
+      for (std::size_t i = first; i < runs.size(); ++i) flagged[runs[i]] = true;
     };
+    double off_before = 0.0;  // at the next coarser tolerance
     for (std::size_t i = 0; i + 1 < runs.size(); ++i) {
-      Refinement& own = refinements[runs[i]];
-      own.off = DifferenceOf(records[runs[i]], records[runs.back()]).largest;
+      const double off = DifferenceOf(records[runs[i]], records[runs.back()]).largest;
+      const double before = std::exchange(off_before, off);
       if (SameInEveryBit(records[runs[i]], records[runs[i + 1]])) flag_from(i);
       if (i == 0) continue;
-      own.off_before = refinements[runs[i - 1]].off;
       const double shrunk = std::pow(tolerance(runs[i]) / tolerance(runs[i - 1]), 0.25);
-      const bool far = own.off > kMaxTolerances * tolerance(runs[i]) && own.off > kRoundOffShare;
-      if (far && own.off > shrunk * own.off_before) flag_from(i);
+      const bool far = off > kMaxTolerances * tolerance(runs[i]) && off > kRoundOffShare;
+      if (far && off > shrunk * before) flag_from(i);
     }
   }
-  return refinements;
+  return flagged;
+}
+
+}  // namespace
+
+void SetWarnings(std::vector<Record>* records) {
+  std::vector<std::string> own;
+  std::vector<bool> testifies;
+  for (const Record& record : *records) {
+    own.push_back(OwnWarnings(record));
+    testifies.push_back(TrajectoryIsTrusted(own.back()));
+  }
+  const std::vector<Agreement> agreements = CompareFinalPoses(*records, testifies);
+  const std::vector<bool> unconverged = FlaggedByTolerances(*records);
+  for (std::size_t i = 0; i < records->size(); ++i) {
+    Record& record = (*records)[i];
+    if (record.Text("kind") != "accuracy" || !HasFinished(record)) continue;
+    // the others need not be right; a reference is
+    const bool certified = IsCertified(record);
+    // who ends as those do that can keep a branch has kept it
+    std::string codes = agreements[i].is_backed ? Without(kSingularWarning, own[i]) : own[i];
+    Add(&codes, agreements[i].flagged && !certified, kDisagreementWarning);
+    const bool is_known = own[i].find(kRefinementWarning) != own[i].npos;
+    Add(&codes, unconverged[i] && !certified && !is_known, kRefinementWarning);
+    record.Set("warnings", codes);
+    if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
+  }
+}
+
+bool HasWarning(const Record& record, const std::string& code) {
+  const std::string codes = record.Text("warnings");
+  return code.empty() ? !codes.empty() : (" " + codes + " ").find(" " + code + " ") != codes.npos;
 }
 
 }  // namespace loopbench::harness

@@ -113,25 +113,4 @@ void SetWarnings(std::vector<Record>* records);
 /// Returns true if the record has warning `code`, or any warning if `code` is "".
 bool HasWarning(const Record& record, const std::string& code = "");
 
-// Tests whether finer tolerances bring a method's runs nearer to one final pose. Convergence fails
-// for a wrong derivative, an ignored tolerance, or a motion without a limit.
-
-/// Final poses nearer than this, over links and in rad, are alike for rounding's sake: below 1e-11
-/// comparisons hold all errors for round-off (harness/judge/demand.h).
-inline constexpr double kRoundOffShare = 1e-11;
-
-struct Refinement {
-  bool flagged = false;
-  /// Largest difference of final poses from those at the column's finest tolerance, and of the run
-  /// at the next coarser one; NaN where nothing was compared.
-  double off = 0.0, off_before = 0.0;
-};
-
-/// Returns one entry per record, in order. Compares finished accuracy runs that differ only in the
-/// tolerance, for at least three tolerances: distances from the finest run must shrink. If a
-/// distance exceeds 1000 tolerances (kMaxTolerances) and has not shrunk by the fourth root of the
-/// tolerances' ratio, the finer runs are flagged. So are two runs of more than a dozen steps that
-/// are equal in every bit and step: the tolerance had no effect.
-std::vector<Refinement> CompareTolerances(std::span<const Record> records);
-
 }  // namespace loopbench::harness

@@ -22,6 +22,10 @@
 #include "harness/text/files.h"
 #include "harness/text/hash.h"
 
+#ifdef LOOPBENCH_PRECISIONS
+#include "harness/precision/make_reference.h"
+#endif
+
 namespace loopbench::harness {
 namespace {
 
@@ -92,6 +96,34 @@ std::string List(const std::vector<std::string>& lines) {
 /// Returns the name of the experiment.
 std::string LadderName(const ProblemModels& ladder) {
   return ladder.models.front().description.name + "-models";
+}
+
+/// Returns the bodies and named points of the full model that the other lacks. Each line has one
+/// body, the new places of its points, and the points that no longer exist.
+std::vector<std::string> RemovedParts(const MechanismDescription& whole,
+                                      const MechanismDescription& simplified) {
+  std::vector<std::string> lines;
+  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
+    const BodyDescription& body = whole.bodies[b];
+    const auto same = std::ranges::find(simplified.bodies.begin() + 1, simplified.bodies.end(),
+                                        body.name, &BodyDescription::name);
+    if (same != simplified.bodies.end()) continue;
+    std::vector<std::string> found, lost;
+    for (const auto& [point, at] : body.points) {
+      const FoundPoint now = FindPoint(simplified, body.name, point);
+      if (now.body < 0) {
+        lost.push_back(point);
+      } else {
+        found.push_back(fmt::format(
+            "{} on {}", point, now.body == kGround ? "ground" : simplified.bodies[now.body].name));
+      }
+    }
+    std::string line = fmt::format("body {} is removed", body.name);
+    if (!found.empty()) line += fmt::format("; its points: {}", fmt::join(found, ", "));
+    if (!lost.empty()) line += fmt::format("; removed points: {}", fmt::join(lost, ", "));
+    lines.push_back(line);
+  }
+  return lines;
 }
 
 std::string PageOf(const ProblemModels& ladder, double horizon, const std::string& typed) {
@@ -192,32 +224,6 @@ void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder) {
 
 std::string LadderFileName(const ProblemModels& ladder) {
   return FileName(LadderName(ladder)) + ".json";
-}
-
-std::vector<std::string> RemovedParts(const MechanismDescription& whole,
-                                      const MechanismDescription& simplified) {
-  std::vector<std::string> lines;
-  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
-    const BodyDescription& body = whole.bodies[b];
-    const auto same = std::ranges::find(simplified.bodies.begin() + 1, simplified.bodies.end(),
-                                        body.name, &BodyDescription::name);
-    if (same != simplified.bodies.end()) continue;
-    std::vector<std::string> found, lost;
-    for (const auto& [point, at] : body.points) {
-      const FoundPoint now = FindPoint(simplified, body.name, point);
-      if (now.body < 0) {
-        lost.push_back(point);
-      } else {
-        found.push_back(fmt::format(
-            "{} on {}", point, now.body == kGround ? "ground" : simplified.bodies[now.body].name));
-      }
-    }
-    std::string line = fmt::format("body {} is removed", body.name);
-    if (!found.empty()) line += fmt::format("; its points: {}", fmt::join(found, ", "));
-    if (!lost.empty()) line += fmt::format("; removed points: {}", fmt::join(lost, ", "));
-    lines.push_back(line);
-  }
-  return lines;
 }
 
 void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
@@ -411,18 +417,10 @@ std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemMode
   return records;
 }
 
-}  // namespace loopbench::harness
-
+CertainMotion MakeCertainMotion([[maybe_unused]] const MechanismDescription& user,
+                                [[maybe_unused]] double horizon, [[maybe_unused]] double cpu_s,
+                                [[maybe_unused]] const std::string& what) {
 #ifdef LOOPBENCH_PRECISIONS
-#include "harness/precision/make_reference.h"
-#endif
-
-namespace loopbench::harness {
-
-#ifdef LOOPBENCH_PRECISIONS
-
-CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
-                                const std::string&) {
   CertainMotion certain{.options = {.scalar = "long-double", .cpu_s = cpu_s}, .horizon = horizon};
   const int all = certain.options.points;
   const auto make = [&] {
@@ -440,19 +438,13 @@ CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon
   }
   certain.horizon = end;
   return certain;
-}
-
 #else
-
-CertainMotion MakeCertainMotion(const MechanismDescription&, double, double,
-                                const std::string& what) {
   throw ConfigError(
       fmt::format("{} needs certified references: this program was built without wide scalars "
                   "(cmake -DLOOPBENCH_PRECISIONS=ON)",
                   what));
-}
-
 #endif
+}
 
 CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& whole_reference,
                          const ProblemModel& model, const Reference& reference,

@@ -47,11 +47,6 @@ ProblemModels MakeModels(const MechanismFile& file,
 /// their errors.
 void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder);
 
-/// Returns the bodies and named points of the full model that the other lacks. Each line has one
-/// body, the new places of its points, and the points that no longer exist.
-std::vector<std::string> RemovedParts(const MechanismDescription& whole,
-                                      const MechanismDescription& simplified);
-
 /// Name of the experiment file that runs all models: NAME-ladder.json.
 std::string LadderFileName(const ProblemModels& ladder);
 

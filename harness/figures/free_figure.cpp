@@ -21,6 +21,17 @@
 namespace loopbench::harness {
 namespace {
 
+/// Splits the keys in "a,b".
+std::vector<std::string> KeysIn(const std::string& list) {
+  std::vector<std::string> parts;
+  for (std::size_t from = 0; from < list.size();) {
+    const std::size_t comma = std::min(list.find(',', from), list.size());
+    if (comma > from) parts.push_back(list.substr(from, comma - from));
+    from = comma + 1;
+  }
+  return parts;
+}
+
 /// Formats numbers as in all figures.
 std::string ValueText(const Record& record, const std::string& key) {
   const Value* value = record.Find(key);
@@ -265,16 +276,6 @@ std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& f
 }
 
 }  // namespace
-
-std::vector<std::string> KeysIn(const std::string& list) {
-  std::vector<std::string> parts;
-  for (std::size_t from = 0; from < list.size();) {
-    const std::size_t comma = std::min(list.find(',', from), list.size());
-    if (comma > from) parts.push_back(list.substr(from, comma - from));
-    from = comma + 1;
-  }
-  return parts;
-}
 
 void RequireKeys(const FreeFigure& wanted, std::span<const Record> records) {
   RequireKey("--x", wanted.x, records);

@@ -30,9 +30,6 @@ struct FreeFigure {
   std::vector<std::string> labels = {};
 };
 
-/// Splits the keys in "a,b".
-std::vector<std::string> KeysIn(const std::string& list);
-
 /// Keys that identify a case, in the order of titles.
 inline constexpr std::array<const char*, 7> kCaseKeys = {
     "mechanism", "formulation", "enforcement", "coordinates", "solver", "rtol", "horizon"};

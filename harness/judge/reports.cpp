@@ -228,17 +228,7 @@ Table FlaggedTable(const RobustnessMap& map) {
   return table;
 }
 
-}  // namespace
-
-std::string CountFlagged(const RobustnessMap& map) {
-  std::size_t holding = 0, flagged = 0;
-  EachCell(map, [&](const MapGroup&, const MapRow&, const MapMethod&, const MapCell& cell) {
-    holding += cell.state == CellState::kHolds ? 1 : 0;
-    flagged += HoldsWithWarnings(cell) ? 1 : 0;
-  });
-  return fmt::format("{} of {} cells that hold have runs with warnings", flagged, holding);
-}
-
+/// Returns "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
 std::string CountCells(const RobustnessMap& map) {
   std::string text;
   std::size_t total = 0;
@@ -253,6 +243,17 @@ std::string CountCells(const RobustnessMap& map) {
     }
   }
   return fmt::format("{} cells:{}", total, text);
+}
+
+}  // namespace
+
+std::string CountFlagged(const RobustnessMap& map) {
+  std::size_t holding = 0, flagged = 0;
+  EachCell(map, [&](const MapGroup&, const MapRow&, const MapMethod&, const MapCell& cell) {
+    holding += cell.state == CellState::kHolds ? 1 : 0;
+    flagged += HoldsWithWarnings(cell) ? 1 : 0;
+  });
+  return fmt::format("{} of {} cells that hold have runs with warnings", flagged, holding);
 }
 
 Table MapTable(const RobustnessMap& map) {

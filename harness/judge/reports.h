@@ -24,8 +24,6 @@ RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std:
 
 // Robustness map as tables for a terminal and for programs, and as a page.
 
-/// Returns "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
-std::string CountCells(const RobustnessMap& map);
 /// Returns "3 of 877 cells that hold have runs with warnings".
 std::string CountFlagged(const RobustnessMap& map);
 

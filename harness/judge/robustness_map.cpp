@@ -82,14 +82,7 @@ void JudgeEnding(const MapRow& row, const Record& record, MapCell* cell) {
                   cell->reason.empty() ? "" : ": ", cell->reason);
 }
 
-}  // namespace
-
-std::string_view ToString(CellState state) {
-  constexpr std::string_view kWords[] = {"holds", "not applicable", "not measured", "stopped",
-                                         "limit", "inaccurate",     "broken"};
-  return kWords[static_cast<std::size_t>(state)];
-}
-
+/// Evaluates one run.
 MapCell JudgeRun(const MapRow& row, const Record& record) {
   MapCell cell;
   cell.outcome = record.Text("outcome");
@@ -123,6 +116,14 @@ MapCell JudgeRun(const MapRow& row, const Record& record) {
   cell.holding = cell.state == CellState::kHolds ? 1 : 0;
   cell.word = ToString(cell.state);
   return cell;
+}
+
+}  // namespace
+
+std::string_view ToString(CellState state) {
+  constexpr std::string_view kWords[] = {"holds", "not applicable", "not measured", "stopped",
+                                         "limit", "inaccurate",     "broken"};
+  return kWords[static_cast<std::size_t>(state)];
 }
 
 MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method,

@@ -115,9 +115,6 @@ struct MapCell {
   bool demanded = false;
 };
 
-/// Evaluates one run.
-MapCell JudgeRun(const MapRow& row, const Record& record);
-
 /// Evaluates one cell: its worst run. Only records of kind "accuracy" are used, unless a selection
 /// names the kind.
 MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method,

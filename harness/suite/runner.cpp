@@ -188,13 +188,6 @@ Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
                                ToString(group.task.method))};
 }
 
-std::string AnswerOf(const Piece& piece) {
-  if (const auto garbage = PlantedFault(piece.owed.front())) return *garbage;
-  std::string text;
-  for (const Record& record : piece.work(piece.threads)) text += ToJsonLine(record) + '\n';
-  return text;
-}
-
 std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
                               const std::string& set) {
   std::vector<Record> records;
@@ -244,6 +237,14 @@ std::vector<Progress::Piece> EstimatedTasks(const std::vector<Piece>& pieces, Es
                                          : std::numeric_limits<double>::quiet_NaN()});
   }
   return foreseen;
+}
+
+/// Returns all records, one per line (child process).
+std::string AnswerOf(const Piece& piece) {
+  if (const auto garbage = PlantedFault(piece.owed.front())) return *garbage;
+  std::string text;
+  for (const Record& record : piece.work(piece.threads)) text += ToJsonLine(record) + '\n';
+  return text;
 }
 
 }  // namespace

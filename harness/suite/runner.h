@@ -86,9 +86,6 @@ Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& referenc
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group);
 Piece LadderPiece(const Experiment& experiment, const LadderGroup& group);
 
-/// Returns all records, one per line (child process).
-std::string AnswerOf(const Piece& piece);
-
 /// Returns the expected records, filled from the answer or with the reason (parent process).
 /// @param set  changes by --set
 std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,

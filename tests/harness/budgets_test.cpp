@@ -51,7 +51,7 @@ constexpr Budget kBudgets[] = {
     {"harness/record",          { 1508,  10,   3},  1200},
     {"harness/store",           { 1656,   8,   3},  1300},
     {"harness/config",          { 6307,  24,  11},  4000},
-    {"harness/analysis",        { 2126,   8,   9},  1200},
+    {"harness/analysis",        { 2117,   8,   9},  1200},
     {"harness/generate",        { 2290,  12,   7},  1230},
     {"harness/integrator",      { 1388,   7,   4},   900},
     {"harness/reference",       {  913,   4,   4},   800},
@@ -61,19 +61,19 @@ constexpr Budget kBudgets[] = {
     {"harness/precision",       { 1561,  12,  10},  1400},
     {"harness/isolation",       {  795,   2,   4},   790},
     {"harness/timing",          { 1356,  10,   7},  1050},
-    {"harness/suite",           { 2324,  10,  15},  1500},
+    {"harness/suite",           { 2322,  10,  15},  1500},
     {"harness/cluster",         {  491,   2,   5},   420},
     {"harness/advise",          {  649,   2,   8},   650},
     {"harness/tables",          { 2017,  10,   5},  1500},
-    {"harness/judge",           { 3707,  18,   6},  2700},
-    {"harness/figures",         { 3047,  12,   7},  1900},
+    {"harness/judge",           { 3704,  18,   6},  2700},
+    {"harness/figures",         { 3045,  12,   7},  1900},
     {"harness/view",            { 2376,   7,   8},  2050},
     {"harness/exchange",        { 9102,  36,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2037,  10,   7},  1500},
-    {"harness/cli",             { 8400,  26,  29},  3600},
+    {"harness/cli",             { 8378,  26,  29},  3600},
     {"peers",                   {  718,  12,   5},   650},
-    {"",                        {91938, 507, 242}, 62000}
+    {"",                        {91900, 507, 242}, 62000}
 };
 // clang-format on
 

@@ -105,7 +105,7 @@ std::unique_ptr<harness::Peer> MakeProgramPeer(const std::string& name, const Pr
     throw harness::Inexpressible(fmt::format("{} does not have: {}", name, missing.what()));
   } catch (const std::exception& error) {
     throw harness::Inexpressible(
-        fmt::format("{} refuses the model: {}", name, OneLine(error.what())));
+        fmt::format("{} rejects the model: {}", name, OneLine(error.what())));
   }
 }
 

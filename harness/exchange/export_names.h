@@ -61,8 +61,8 @@ std::string ShownKind(const Joint& joint);
 
 /// Note on planar mechanisms.
 inline constexpr const char* kPlaneNote =
-    "The plane is z = 0 of space. Moments of inertia about x and y, of which the motion says "
-    "nothing, are those about z.";
+    "The plane is z = 0 of space. Moments of inertia about x and y do not affect the motion; they "
+    "are set to those about z.";
 
 // Inertia properties for other programs: principal moments and axes.
 

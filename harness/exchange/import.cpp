@@ -410,8 +410,8 @@ Imported ImportDraft::Finish(const std::string& format) {
     gravity_is_said = gravity_is_said || facts.has_gravity;
   }
   if (!gravity_is_said) {
-    Note(*assumed_gravity_, fmt::format("no gravity is said: {} m/s^2 along -z (--gravity x,y,z "
-                                        "says another)",
+    Note(*assumed_gravity_, fmt::format("found no gravity: {} m/s^2 along -z (--gravity x,y,z "
+                                        "sets another)",
                                         -description.gravity.z()));
   }
   if (options_.gravity) description.gravity = *options_.gravity;

@@ -19,8 +19,8 @@ constexpr double kNear = 0.1;
 /// If the drawn position closes within the accuracy of the input, exact closures within this
 /// distance [rad or lengths] are taken instead. Some redundant constraints that are rounded close
 /// exactly far away only, or nowhere: a loop that opens by the square of a small motion x closes
-/// again within x = sqrt(1e-5).
-constexpr double kDrawn = 0.01;
+/// again within some sqrt(2e-5).
+constexpr double kDrawn = 0.03;
 /// Least damping on the way to the least residual near a drawn position: motions that hardly close
 /// the loops stay small.
 constexpr double kStayDamping = 1e-3;
@@ -77,7 +77,10 @@ class Closure {
       if (is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > kDrawn) {
         q = guess_;
         e = Residual(q);
-        Close(kMaxIterations, kStayDamping, &q, &e);
+        closed = Close(kMaxIterations, kStayDamping, &q, &e);
+      }
+      if (is_drawn && !closed) {
+        Place(q);
         start->position_residual = InSi(e, units_.With(kinematics_, guesses_.held()));
         start->q = q;
         return;

@@ -38,12 +38,8 @@ std::vector<Real6> Oracle::Applied(const std::vector<JetPose>& poses) const {
     const JetPose X_WF = poses[joint.from.body] * frames_[index].X_PF;
     const JetPose X_WM = poses[joint.to.body] * frames_[index].X_QM;
     const Jet q = Coordinate(index, poses);
-    Real6 H = Real6::Zero();
+    Real6 H = Real6::Zero();  // of a screw: the moment about its axis
     for (int i = 0; i < 3; ++i) H[slides ? 3 + i : i] = X_WF.R(i, slides ? 0 : 2).f;
-    if (joint.type == JointType::kHelical) {  // the part of the wrench along the free motion
-      H.tail<3>() = Real(joint.parameter) * H.head<3>();
-      H /= 1 + Real(joint.parameter) * joint.parameter;
-    }
     const Real3 p = ValueOf(X_WM.p, &Jet::f);
     const Real6 wrench = H * tau_of(q.f, q.d);
     F[joint.to.body] += AtCom(wrench, p - ValueOf(poses[joint.to.body].p, &Jet::f));

@@ -175,6 +175,11 @@ void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
 void PlaceFollowers(ImportDraft* draft) {
   MechanismDescription& d = draft->description;
   std::vector<double> start(d.joints.size(), 0.0);
+  for (std::size_t j = 0; j < start.size(); ++j) {  // followers of a factor zero
+    for (const PrescribedMotion& motion : d.joints[j].motions) {
+      start[j] = std::get<Polynomial>(motion.value).coefficients[0];
+    }
+  }
   for (std::size_t pass = 0; pass < d.couplings.size(); ++pass) {  // followers of followers
     for (const CouplingDescription& mimic : d.couplings) {
       const CouplingDescription::Part &follower = mimic.parts[0], &leader = mimic.parts[1];
@@ -182,7 +187,8 @@ void PlaceFollowers(ImportDraft* draft) {
     }
   }
   for (int j = 0; j < std::ssize(start); ++j) {
-    if (start[j] != 0.0) d.initial.coordinates.push_back({j, {start[j]}});
+    if (start[j] != 0.0 && d.joints[j].motions.empty())
+      d.initial.coordinates.push_back({j, {start[j]}});
   }
 }
 

@@ -56,6 +56,12 @@ class FactoredState {
   /// as long as they are suitable. Returns true if others replaced them: these are open by about
   /// the accuracy.
   bool AcceptReleased();
+  /// Takes over times, positions, speeds and released directions.
+  void Follow(const Kinematics<Space, S>& kinematics) {
+    kinematics_ = kinematics;
+    released_ = kinematics.released();
+    ForgetFactors();
+  }
   /// Releases the mechanism's choice again: runs do not depend on runs before.
   void ForgetReleased() { released_ = mechanism().released(); }
 

@@ -153,7 +153,7 @@ Nearby Passage<Space, S>::Look(const Kinematics<Space, S>& at) {
   }
   if (!(speed > S(0))) return Nearby::kUnknown;
   mechanism.Rates(at.q(), at.u(), rates_);
-  state_.kinematics() = at;  // measured angles continue from the same step
+  state_.Follow(at);  // measured angles continue from the same step
   state_.kinematics().SetRegularization(kRegularization);
   state_.ForgetFactors();
   const Nearby beside = Judge(at, least, S(kBeside) / speed);

@@ -276,7 +276,12 @@ bool System<Space, S>::ReplaceReleased() {
     closing_ = MakeLevel(mechanism_, FormulationOptions{.enforcement = Enforcement::kPosition});
   }
   state_.ForgetFactors();
-  closing_->Accept(state_, S(0));
+  const VectorX<S> q = state_.q(), u = state_.u();
+  if (closing_->Accept(state_, S(0)) ==
+      Accepted::kFailed) {  // the level closes them, or reports it
+    state_.SetPositions(q);
+    state_.SetSpeeds(u);
+  }
   return true;
 }
 

@@ -44,9 +44,10 @@ void ForEachSpeedOfCoordinate(const Kinematics<Space, S>& kinematics, int index,
     if (joint.num_drives == 0) sink(joint.u_offset, S(1));
     return;
   }
-  ForEachSpeedOfLoop(kinematics, index, [&](int column, const Velocity<Space, S>& V) {
-    sink(column, S(joint.kind->inverse_H_squared * kinematics.joints()[index].basis[0].dot(V)));
-  });
+  const Wrench<Space, S> along = WrenchOfEffort<Space, S>(kinematics.joints()[index].basis[0],
+                                                          joint.kind->inverse_H_squared, S(1));
+  ForEachSpeedOfLoop(kinematics, index,
+                     [&](int column, const Velocity<Space, S>& V) { sink(column, along.dot(V)); });
 }
 
 }  // namespace loopbench

@@ -307,13 +307,15 @@ void TreeDynamics<Space, S>::CouplingJacobian(const Kinematics<Space, S>& kinema
   for (std::size_t r = 0; r < rotors; ++r) add(couplings + r, mechanism.rotors()[r].joint, S(1));
 }
 
-/// H^T (A_Q - A_P - g) / |H|^2, where g has a prescribed acceleration.
+/// Along H of A_Q - A_P - g, where g has a prescribed acceleration.
 template <class Space, class S>
 S CoordinateAcceleration(const Kinematics<Space, S>& kinematics, int index,
                          std::span<const Acceleration<Space, S>> A) {
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
-  S sum = joint.kind->inverse_H_squared * kinematics.joints()[index].basis[0].dot(
-                                              RelativeAcceleration<Space, S>(kinematics, index, A));
+  const Acceleration<Space, S> relative = RelativeAcceleration<Space, S>(kinematics, index, A);
+  S sum = WrenchOfEffort<Space, S>(kinematics.joints()[index].basis[0],
+                                   joint.kind->inverse_H_squared, S(1))
+              .dot(relative);
   if (joint.num_drives > 0) sum += kinematics.drives()[joint.first_drive].acceleration;
   return sum;
 }
@@ -358,14 +360,15 @@ S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   S sum = S(0);
   if (joint.num_drives > 0) return sum;
-  const S scale = joint.kind->inverse_H_squared;
+  const Wrench<Space, S> effort = WrenchOfEffort<Space, S>(kinematics.joints()[index].basis[0],
+                                                           joint.kind->inverse_H_squared, S(1));
   for (const auto& [body, r] : {std::pair{joint.to, kinematics.ArmQ(index, masses)},
                                 std::pair{joint.from, kinematics.ArmP(index, masses)}}) {
     if (body == kGround) continue;
-    const Wrench<Space, S> F = ShiftForce<Space, S>(kinematics.joints()[index].basis[0], r);
+    const Wrench<Space, S> F = ShiftForce<Space, S>(effort, r);
     const Acceleration<Space, S> A(kinematics.RotationalInverse(inertias[body], body) * F.angular,
                                    F.linear / inertias[body].mass);
-    sum += scale * scale * F.dot(A);
+    sum += F.dot(A);
   }
   return sum;
 }

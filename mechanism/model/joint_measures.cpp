@@ -64,7 +64,9 @@ S Kinematics<Space, S>::JointSpeed(int index) const {
   if (joint.in_tree()) {
     return joint.num_drives > 0 ? drives_[joint.first_drive].rate : u_[joint.u_offset];
   }
-  return joints_[index].H(0).dot(joints_[index].V_rel) * joint.kind->inverse_H_squared;
+  const S along = WrenchOfEffort<Space, S>(joints_[index].H(0), joint.kind->inverse_H_squared, S(1))
+                      .dot(joints_[index].V_rel);
+  return along;
 }
 
 template <class Space, class S>

@@ -106,6 +106,7 @@ Redundancy Find(const MechanismDescription& description) {
     if (result.rank == result.rows) return result;
     bool moves = false;  // which leaves a speed
     const double excess = excursion.excess();
+    const Excursion<Space> first = excursion;
     excursion = Roam(std::move(excursion), mechanism, moves);
     result.rank = excursion.rank();
     if (!IsRegular(excursion, accuracy > 0.0 ? kRoundedProbe : kProbe)) {
@@ -113,7 +114,9 @@ Redundancy Find(const MechanismDescription& description) {
       continue;
     }
     if (result.rank == result.rows || result.rank == mechanism.num_u()) return result;
-    result.released = Release(excursion, mechanism, description);
+    // rounded rows are imposed or not, so that those of the start must serve there
+    const bool starts_regular = accuracy > 0.0 && first.rank() == excursion.rank();
+    result.released = Release(starts_regular ? first : excursion, mechanism, description);
     if (accuracy > 0.0) {
       result.rounding = std::max(excess, start.position_residual / mechanism.length());
     }

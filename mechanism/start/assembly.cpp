@@ -1,10 +1,13 @@
 #include "mechanism/start/assembly.h"
 
+#include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/closure.h"
 #include "mechanism/start/conflict.h"
+#include "mechanism/start/guesses.h"
 #include "mechanism/start/mobility.h"
 
 namespace loopbench {
@@ -128,6 +131,32 @@ class Assembler {
   std::vector<double> given_cut_speeds_;
 };
 
+/// If directions are released for the accuracy of the input: the description with guesses at the
+/// start of all constraints, where the released ones are closed within the accuracy. Other
+/// positions may close the imposed ones alone.
+template <class Space>
+MechanismDescription NearAllImposed(const MechanismDescription& description) {
+  MechanismDescription near = description;
+  if (!description.rounded) return near;
+  MechanismDescription all = description;
+  all.rounded = false;
+  all = Unreleased(all);
+  const Mechanism<Space, double> mechanism(all, Coordinates::kJoint);
+  const Start<double> start = Assembler<Space>(all, mechanism).Run();
+  if (start.outcome != Outcome::kFinished) return near;
+  std::vector<JointValues>& values = near.initial.coordinates;
+  const auto is_held = [&](int joint) {
+    return std::ranges::find(near.initial.held, joint) != near.initial.held.end();
+  };
+  std::erase_if(values, [&](const JointValues& one) {
+    return mechanism.joints()[one.joint].in_tree() && !is_held(one.joint);
+  });
+  for (JointValues& one : TreeValues(mechanism, start.q)) {
+    if (!is_held(one.joint)) values.push_back(std::move(one));
+  }
+  return near;
+}
+
 }  // namespace
 
 template <class Space>
@@ -138,7 +167,7 @@ Start<double> Assemble(const MechanismDescription& description,
   }
   // released directions hold, too
   const Mechanism<Space, double> joints(Unreleased(description), Coordinates::kJoint);
-  Start<double> start = Assembler<Space>(description, joints).Run();
+  Start<double> start = Assembler<Space>(NearAllImposed<Space>(description), joints).Run();
   if (start.outcome != Outcome::kFinished) return start;
   if (mechanism.coordinates() == Coordinates::kJoint) return start;
   Kinematics<Space, double> from(joints), to(mechanism);

@@ -19,7 +19,7 @@ constexpr double kNear = 0.1;
 /// If the drawn position closes within the accuracy of the input, exact closures within this
 /// distance [rad or lengths] are taken instead. Some redundant constraints that are rounded close
 /// exactly far away only, or nowhere: a loop that opens by the square of a small motion x closes
-/// again within some sqrt(2e-5).
+/// again within x = sqrt(2e-5), here with a margin for several loops.
 constexpr double kDrawn = 0.03;
 /// Least damping on the way to the least residual near a drawn position: motions that hardly close
 /// the loops stay small.
@@ -129,7 +129,7 @@ class Closure {
       }
     }
     most.segment(mechanism_.num_rows(), mechanism_.couplings().size()).setOnes();
-    return (e.cwiseAbs().array() <= description_.accuracy * most.array()).all();
+    return (e.cwiseAbs().array() <= closed_ + description_.accuracy * most.array()).all();
   }
 
   /// Largest distance of a body's joints from one of them.

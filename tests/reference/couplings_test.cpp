@@ -158,5 +158,30 @@ TEST(Couplings, DriftAsOtherConstraintsDo) {
   }
 }
 
+/// A rotor on a screw that closes a loop. Its effort is a moment; the thread carries the force.
+TEST(Couplings, RotorsOfScrewsKeepTheEnergyBalance) {
+  const MechanismFile file = ParseMechanism(R"({
+    "name": "screw", "space": "spatial", "gravity": [0, 0, 0],
+    "bodies": [{"name": "A", "mass": 1, "inertia": [0.02, 0.03, 0.025]},
+               {"name": "C", "mass": 1.2, "inertia": [0.02, 0.03, 0.025]},
+               {"name": "B", "mass": 0.9, "inertia": [0.02, 0.03, 0.025]}],
+    "joints": [
+      {"name": "J1", "type": "prismatic", "from": {"body": "ground"}, "to": {"body": "A"},
+       "axis": [0, 0, 1], "motion": {"type": "harmonic", "amplitude": 0.2, "omega": 3.0}},
+      {"name": "J2", "type": "planar", "from": {"body": "A"}, "to": {"body": "C"}},
+      {"name": "J3", "type": "universal", "from": {"body": "C"}, "to": {"body": "B"}},
+      {"name": "J4", "type": "helical", "pitch": 0.3, "from": {"body": "ground"},
+       "to": {"body": "B"}, "axis": [0, 0, 1], "cut": true, "rotor_inertia": 0.05}],
+    "initial": {"coordinates": {}}})",
+                                            "screw.json");
+  const Experiment experiment = Single(file);
+  for (const Method& method : PositionMethods()) {
+    const Record record = RunCase(experiment, CaseOf(experiment, "screw", method, 1e-9, 2.0));
+    ASSERT_EQ(record.Text("outcome"), "finished") << ToString(method) << record.Text("message");
+    // Some 500 steps with errors of the tolerance.
+    EXPECT_LT(record.Number("energy_error_relative"), 500 * 1e-9) << ToString(method);
+  }
+}
+
 }  // namespace couplings_test
 }  // namespace loopbench::harness::reference

@@ -144,6 +144,27 @@ TEST(RoundedInput, OverconstrainedLinkagesKeepTheirMotion) {
   }
 }
 
+/// Positions where the directions released elsewhere would leave the joint open.
+TEST(RoundedInput, StartsOfLinkagesAreClosed) {
+  for (const double angle : {2.4, 2.5, 5.9}) {
+    MechanismDescription description = SixDecimals("bennett-turning").description;
+    for (JointValues& values : description.initial.coordinates) {
+      if (description.joints[values.joint].name == "J1") values.values = {angle};
+    }
+    const MechanismDescription run_as = Release(description, FindRedundancy(description));
+    const Mechanism<Spatial, double> mechanism(run_as, Coordinates::kJoint);
+    const Start<double> start = Assemble<Spatial>(run_as, mechanism);
+    ASSERT_EQ(start.outcome, Outcome::kFinished) << angle << ": " << start.message;
+    Kinematics<Spatial, double> kinematics(mechanism);
+    kinematics.UpdatePosition(start.q);
+    for (const int joint : mechanism.constraints()) {
+      const auto open = kinematics.Forbidden(joint, kinematics.ConstraintMismatch(joint));
+      // Leans of 1e-6 rad, times coefficients that pivoting keeps near one.
+      EXPECT_LT(open.angular.norm() + open.linear.norm(), 1e-4) << angle;
+    }
+  }
+}
+
 TEST(RoundedInput, StartsWhereItIsDrawn) {
   for (const char* name : {"octahedron", "scissor-lift-tilted"}) {
     const MechanismFile file = SixDecimals(name);

@@ -109,7 +109,7 @@ template <class Space, class S>
 Acceleration<Space, S> Joins<Space, S>::Held(int n, const Wrench<Space, S>& F,
                                              const Components<Space, S>& c0) const {
   const PlanSide& hold = plan_.leaves()[n].hold;
-  const Acceleration<Space, S>* dual = &Mc_[c_offset_[hold.joint]];
+  const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[hold.joint];
   auto A = Acceleration<Space, S>::Zero();
   for (int i = 0; i < hold.rows; ++i) A -= dual[i] * c0[i];
   const Acceleration<Space, S> held = A;
@@ -185,7 +185,7 @@ void Joins<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses ma
   const JointState<Space, S>& state = kinematics.joints()[side.joint];
   const Linear<Space, S> r =
       side.at_Q ? kinematics.ArmQ(side.joint, masses) : kinematics.ArmP(side.joint, masses);
-  Wrench<Space, S>* c = &c_[c_offset_[side.joint] + (side.at_Q ? side.rows : 0)];
+  Wrench<Space, S>* c = c_.data() + c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
   const S sign = side.at_Q ? S(1) : S(-1);
   Repeat(rows, [&](int i) { c[i] = ShiftForce<Space, S>(state.D(i), r) * sign; });
 }
@@ -212,7 +212,7 @@ void Joins<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses ma
     if (!hold.at_Q) dual = -dual;
   }
   const int size = Space::kDim - hold.rows;
-  FreeDirection* free = &free_[places_[n].hold];
+  FreeDirection* free = free_.data() + places_[n].hold;
   JointMatrix<S> T(size, size);
   for (int k = 0; k < size; ++k) {
     // released directions follow D
@@ -247,12 +247,12 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   if (is_held) FillHold(kinematics, masses, n);
   const std::span<const FreeDirection> free = FreeDirections(n);
   const int terms = is_held ? static_cast<int>(free.size()) : Space::kDim;
-  S* Z = &Z_[places_[n].z];
+  S* Z = Z_.data() + places_[n].z;
   int first = 0;
   for (const PlanSide& side : leaf.sides) {
     const int offset = Offset(side);
-    const Wrench<Space, S>* c = &c_[offset];
-    Acceleration<Space, S>* Zc = &Mc_[offset];
+    const Wrench<Space, S>* c = c_.data() + offset;
+    Acceleration<Space, S>* Zc = Mc_.data() + offset;
     WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
       FillRows(kinematics, masses, side, rows);
       operations_ += rows * (is_held ? terms * Space::kDim : kApply<Space>);
@@ -269,7 +269,7 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
       });
       int before = 0;
       for (const PlanSide& other : leaf.sides.first(&side - leaf.sides.data() + 1)) {
-        const Acceleration<Space, S>* Zc_other = &Mc_[Offset(other)];
+        const Acceleration<Space, S>* Zc_other = Mc_.data() + Offset(other);
         S* block = Z + leaf.width * before + other.rows * first;
         S* mirror = Z + leaf.width * first + rows * before;
         const auto fill = [&](auto others) LOOPBENCH_INLINED {
@@ -317,7 +317,7 @@ template <class Rows, class Width, class Numbers>
     Rows count, Width known, Numbers width, bool adds, S* Y) const {
   const int child = node.children[side.child], b_end = width;
   S sum[Space::kDim * Space::kDim];
-  const S* Z = &Z_[places_[child].z + places_[child].size * side.place];
+  const S* Z = Z_.data() + places_[child].z + places_[child].size * side.place;
   if (!IsBody<Space>(side, known)) {
     Z += count * handle.place;
     Repeat(Product(count, width), [&](int k) { sum[k] = Z[k]; });
@@ -351,7 +351,7 @@ template <class Rows, class Width>
 void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Rows rows,
                                    Width known) {
   const int n = rows;
-  S* X = &X_[place.x];
+  S* X = X_.data() + place.x;
   int first = 0;
   for (const NodeJoint& joint : node.joints) {
     const auto count = RowsOf<Space>(joint, rows, known);
@@ -364,13 +364,13 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Row
       for (const Handle& handle : node.handles) {
         if (handle.child != side.child) continue;
         WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
-          S* Y = &Y_[place.y + handle.number * n + first * width];
+          S* Y = Y_.data() + place.y + handle.number * n + first * width;
           RespondAt(node, side, handle, c, count, known, width, self_joins, Y);
         });
       }
     });
     each_side([&](const Handle& side, const Wrench<Space, S>* c, bool adds) LOOPBENCH_INLINED {
-      const S* Y = &Y_[place.y + side.number * n];
+      const S* Y = Y_.data() + place.y + side.number * n;
       Repeat(count, [&](int i) LOOPBENCH_INLINED {  // (16, 42, 66)
         S* X_i = X + first + i;
         for (int l = 0; l <= first + i; ++l) {
@@ -485,7 +485,7 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
   const int n = rows;
   for (int e : node.kept) {
     const Handle& handle = node.handles[e];
-    S* Y = &Y_[place.y + handle.number * n];
+    S* Y = Y_.data() + place.y + handle.number * n;
     if (node.closes_loop) {
       using RowByRow = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       Eigen::Map<RowByRow> block(Y, n, handle.width);
@@ -494,7 +494,7 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
       loops_[place.loop].Apply(columns);
       block = columns;
     } else {
-      const S* L = &X_[place.x];
+      const S* L = X_.data() + place.x;
       WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
         Repeat(rows, [&](int i) LOOPBENCH_INLINED {
           S V[Space::kDim];
@@ -517,14 +517,14 @@ template <class Space, class S>
 template <class Rows, class Width>
 void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows rows, Width known) {
   const int n = rows, size = place.size;
-  const S* Y = &Y_[place.y];
-  S* to = &Z_[place.z];
+  const S* Y = Y_.data() + place.y;
+  S* to = Z_.data() + place.z;
   int column = 0;
   for (int f : node.kept) {
     const Handle& at_f = node.handles[f];
     const Place& child = places_[node.children[at_f.child]];
     WithWidth<Space>(at_f, known, [&](auto width_f) LOOPBENCH_INLINED {
-      const S* Z = &Z_[child.z + child.size * at_f.place];
+      const S* Z = Z_.data() + child.z + child.size * at_f.place;
       const S* V_f = Y + at_f.number * n;
       int row = 0;
       for (int e : node.kept) {

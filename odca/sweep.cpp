@@ -53,7 +53,7 @@ void Sweep<Space, S>::Correct(std::span<const Acceleration<Space, S>> b,
     } else {
       start_[n] = b.empty() ? Acceleration<Space, S>::Zero() : b[n + 1];
     }
-    S* slot = &b_[leaf.slot];
+    S* slot = b_.data() + leaf.slot;
     if (leaf.is_body) {
       LOOPBENCH_UNROLL
       for (int d = 0; d < Space::kDim; ++d) slot[d] = start_[n][d];
@@ -117,7 +117,7 @@ template <class Space, class S>
 template <class Rows, class Width>
 void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
                          std::span<const Components<Space, S>> c0) {
-  S* s = &s_[node.joints.front().row];
+  S* s = s_.data() + node.joints.front().row;
   int row = 0;
   for (const NodeJoint& joint : node.joints) {
     const int count = RowsOf<Space>(joint, rows, known);
@@ -125,7 +125,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
     for (const bool at_Q : {false, true}) {
       const int h = at_Q ? joint.to : joint.from;
       if (h < 0) continue;
-      const S* b = &b_[node.handles[h].slot];
+      const S* b = b_.data() + node.handles[h].slot;
       if (!IsBody<Space>(node.handles[h], known)) {
         for (int i = 0; i < count; ++i) s[row + i] += b[i];
         continue;
@@ -145,7 +145,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
   for (int e : node.kept) {
     const Handle& handle = node.handles[e];
     const S* V = joins_.V(node, n, handle);
-    S* b = &b_[handle.slot];
+    S* b = b_.data() + handle.slot;
     WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
       for (int i = 0; i < rows; ++i) {
         Repeat(width, [&](int a) { b[a] -= V[i * width + a] * s[i]; });  // (29-30, 72)
@@ -163,12 +163,12 @@ template <class Space, class S>
 template <class Rows, class Width>
 void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows, Width known) {
   const int first = node.joints.front().row;
-  S* phi = &F_[first];
+  S* phi = F_.data() + first;
   for (int i = 0; i < rows; ++i) phi[i] = -s_[first + i];
   for (int e : node.kept) {
     const Handle& handle = node.handles[e];
     const S* V = joins_.V(node, n, handle);
-    const S* F = &F_[handle.force];
+    const S* F = F_.data() + handle.force;
     WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
       for (int i = 0; i < rows; ++i) {
         S sum = phi[i];
@@ -187,7 +187,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows, Width known) 
       const Wrench<Space, S>* c = joins_.c(joint.index, at_Q, joint.rows);
       auto sum = Wrench<Space, S>::Zero();
       for (int i = 0; i < count; ++i) sum += c[i] * phi[i];  // (18, 39, 47-48, 65)
-      S* F = &F_[plan_.num_rows() + Space::kDim * (node.handles[h].body - 1)];
+      S* F = F_.data() + plan_.num_rows() + Space::kDim * (node.handles[h].body - 1);
       LOOPBENCH_UNROLL
       for (int d = 0; d < Space::kDim; ++d) F[d] += sum[d];
       operations_ += Space::kDim * count;

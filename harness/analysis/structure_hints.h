@@ -1,4 +1,4 @@
-// What `explain` finds out about a structure: idle degrees of freedom, hints on parts that may be
+// Findings of `explain` on a structure: idle degrees of freedom, hints on parts that may be
 // mistakes, the degrees of freedom that a file expects, and the range of a driven coordinate.
 #pragma once
 

@@ -187,8 +187,8 @@ void PlaceFollowers(ImportDraft* draft) {
     }
   }
   for (int j = 0; j < std::ssize(start); ++j) {
-    if (start[j] != 0.0 && d.joints[j].motions.empty())
-      d.initial.coordinates.push_back({j, {start[j]}});
+    const bool is_free = d.joints[j].motions.empty();
+    if (is_free && start[j] != 0.0) d.initial.coordinates.push_back({j, {start[j]}});
   }
 }
 

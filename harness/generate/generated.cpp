@@ -207,15 +207,12 @@ void GeneratedDerivative<Space>::AddBranch() {
     subject_.options.gains = system_.level().gains();
   }
   // Directions released for the accuracy of the input depend on the run so far.
-  MechanismDescription described = subject_.description;
   for (const Released& out : system_.kinematics().released()) {
+    MechanismDescription& described = subject_.description;
     if (described.rounded) described.joints[out.joint].released = out.directions;
   }
-  const RecordingSubject subject{described,         subject_.coordinates, subject_.formulation,
-                                 subject_.options,  subject_.with_work,   subject_.keeps_numbers,
-                                 subject_.quantity, subject_.most_nodes};
   RecordedFunction recorded =
-      RecordFunction(subject, mode_->start, x_[0], {x_.begin() + 1, x_.end()});
+      RecordFunction(subject_, mode_->start, x_[0], {x_.begin() + 1, x_.end()});
   for (int i = 0; i < system_.num_state_speeds(); ++i) {
     if (system_.state_speed(i) != recorded.carried_speeds[static_cast<std::size_t>(i)]) {
       throw NotCovered("the state carries other speeds in the recorded text than in double");

@@ -31,7 +31,7 @@ enum class Quantity {
 
 /// A formulation of a mechanism. `options.general` is always taken as set.
 struct RecordingSubject {
-  const MechanismDescription& description;
+  MechanismDescription description;
   Coordinates coordinates = Coordinates::kJoint;
   std::string formulation = "odca";
   FormulationOptions options = {};

@@ -277,8 +277,8 @@ bool System<Space, S>::ReplaceReleased() {
   }
   state_.ForgetFactors();
   const VectorX<S> q = state_.q(), u = state_.u();
-  if (closing_->Accept(state_, S(0)) ==
-      Accepted::kFailed) {  // the level closes them, or reports it
+  const bool is_closed = closing_->Accept(state_, S(0)) != Accepted::kFailed;
+  if (!is_closed) {  // the level closes them, or reports a failure
     state_.SetPositions(q);
     state_.SetSpeeds(u);
   }

@@ -44,7 +44,7 @@ void System<Space, S>::NoteRankAhead() {
   mechanism_.Rates(q(), u(), ahead);
   ahead = q() + step * ahead;
   mechanism_.Normalise(ahead);
-  Kinematics<Space, S> there(mechanism_);
+  Kinematics<Space, S> there = kinematics();  // with the directions released at present
   there.SetTime(kinematics().time() + step);
   there.UpdatePosition(ahead);
   drives_->NoteRank(FirmRank(there));
@@ -61,7 +61,7 @@ bool System<Space, S>::IsOffBranch() const {
   if constexpr (std::is_same_v<S, double>) {
     double e = 0.0;
     for (int index : mechanism_.constraints()) {
-      const Velocity<Space, S> miss = kinematics().ConstraintMismatch(index);
+      const auto miss = kinematics().Constrained(index, kinematics().ConstraintMismatch(index));
       e = std::max({e, miss.angular.norm(), miss.linear.norm() / mechanism_.length()});
     }
     for (int c = 0; c < std::ssize(mechanism_.couplings()); ++c) {

@@ -64,9 +64,8 @@ S Kinematics<Space, S>::JointSpeed(int index) const {
   if (joint.in_tree()) {
     return joint.num_drives > 0 ? drives_[joint.first_drive].rate : u_[joint.u_offset];
   }
-  const S along = WrenchOfEffort<Space, S>(joints_[index].H(0), joint.kind->inverse_H_squared, S(1))
-                      .dot(joints_[index].V_rel);
-  return along;
+  return WrenchOfEffort<Space, S>(joints_[index].H(0), joint.kind->inverse_H_squared, S(1))
+      .dot(joints_[index].V_rel);
 }
 
 template <class Space, class S>

@@ -55,6 +55,7 @@ class Closure {
         units_(units),
         guesses_(description, mechanism_, units),
         guess_(guess),
+        sizes_(FindSizes()),
         pull_units_(units) {
     // round-off of a closure that passes through every body
     const double eps = std::numeric_limits<double>::epsilon(), extent = Extent(mechanism_, units);
@@ -73,17 +74,16 @@ class Closure {
     if (e.size() > 0 || HasTargets()) {
       const bool is_drawn =
           IsRounded(e) && !HasTargets() && guesses_.Farthest(kinematics_) <= kNear;
-      bool closed = Close(kMaxIterations, 1e-16, &q, &e);
+      bool closed = Close(kMaxIterations, &q, &e);
       if (is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > kDrawn) {
         q = guess_;
         e = Residual(q);
-        closed = Close(kMaxIterations, kStayDamping, &q, &e);
+        closed = Close(kMaxIterations, &q, &e, kStayDamping);
       }
       if (is_drawn && !closed) {
-        Place(q);
         start->position_residual = InSi(e, units_.With(kinematics_, guesses_.held()));
         start->q = q;
-        return;
+        return Place(q);
       }
       Vector nearest = q;
       if (closed) Unwind(&nearest);
@@ -115,31 +115,42 @@ class Closure {
   }
 
   /// Returns true if a residual is within the accuracy of the input: in rad, or relative to the
-  /// distances from the joints that close the loops to other joints of their bodies.
+  /// sizes of the bodies that close the loops.
   bool IsRounded(const Vector& e) const {
     Vector most = Vector::Zero(e.size());
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
       const JointState<Space, double>& state = kinematics_.joints()[index];
-      const double arm = std::max({Reach(joint.from, joint.X_PF.p), Reach(joint.to, joint.X_QM.p),
-                                   joint.kind->parameter});  // length of a rod
+      const double size = std::max(
+          {sizes_[joint.from], sizes_[joint.to], joint.kind->parameter});  // length of a rod
       for (int i = 0; i < joint.num_constraints(); ++i) {
         const bool turns = state.D(i).angular.squaredNorm() > 0.0;
-        most[joint.row + i] = (turns ? 1.0 : std::min(mechanism_.length(), arm) / units_.length);
+        most[joint.row + i] = (turns ? 1.0 : std::min(mechanism_.length(), size) / units_.length);
       }
     }
     most.segment(mechanism_.num_rows(), mechanism_.couplings().size()).setOnes();
     return (e.cwiseAbs().array() <= closed_ + description_.accuracy * most.array()).all();
   }
 
-  /// Largest distance of a body's joints from one of them.
-  double Reach(int body, const Linear<Space, double>& from) const {
-    double farthest = 0.0;
+  /// Sizes of bodies: twice the largest distance of a joint from the middle of the body's joints.
+  std::vector<double> FindSizes() const {
+    using Point = Linear<Space, double>;
+    const auto bodies = static_cast<std::size_t>(mechanism_.num_bodies());
+    std::vector<Point> middles(bodies, Point::Zero());
+    std::vector<double> counts(bodies, 0.0), sizes(bodies, 0.0);
     for (const Joint<Space, double>& joint : mechanism_.joints()) {
-      if (joint.from == body) farthest = std::max(farthest, (joint.X_PF.p - from).norm());
-      if (joint.to == body) farthest = std::max(farthest, (joint.X_QM.p - from).norm());
+      for (const auto& [body, point] :
+           {std::pair{joint.from, joint.X_PF.p}, std::pair{joint.to, joint.X_QM.p}}) {
+        middles[body] += (point - middles[body]) / ++counts[body];
+      }
     }
-    return farthest;
+    for (const Joint<Space, double>& joint : mechanism_.joints()) {
+      for (const auto& [body, point] :
+           {std::pair{joint.from, joint.X_PF.p}, std::pair{joint.to, joint.X_QM.p}}) {
+        sizes[body] = std::max(sizes[body], 2.0 * (point - middles[body]).norm());
+      }
+    }
+    return sizes;
   }
 
   void Place(const Vector& q) {
@@ -186,7 +197,7 @@ class Closure {
   }
 
   /// Levenberg-Marquardt from q, with the residual e, to a closed position: whether it gets there.
-  bool Close(int iterations, double least_damping, Vector* q, Vector* e) {
+  bool Close(int iterations, Vector* q, Vector* e, double least_damping = 1e-16) {
     double damping = 1e-3;
     const VectorX<double> row_units = units_.With(kinematics_, guesses_.held());
     // where every coordinate is prescribed there is nothing to move
@@ -277,7 +288,7 @@ class Closure {
     Vector turned = guesses_.Unwound(*q);
     if (turned == *q) return;
     Vector e = Residual(turned);
-    if (Close(kTrialIterations, 1e-16, &turned, &e) && Distance(turned) < Distance(*q)) *q = turned;
+    if (Close(kTrialIterations, &turned, &e) && Distance(turned) < Distance(*q)) *q = turned;
   }
 
   double Distance(const Vector& q) {
@@ -320,7 +331,7 @@ class Closure {
       q = Move(q, d);
       Pull(start == 0 ? 0 : static_cast<std::size_t>(start) % std::size(kPulls), &q);
       Vector e = Residual(q);
-      if (!Close(kTrialIterations, 1e-16, &q, &e)) continue;
+      if (!Close(kTrialIterations, &q, &e)) continue;
       Unwind(&q);
       const double distance = Distance(q);
       if (distance >= (1.0 - kNearer) * least) continue;
@@ -348,6 +359,7 @@ class Closure {
   const AssemblyUnits<Space>& units_;
   const Guesses<Space> guesses_;
   const Vector guess_;
+  const std::vector<double> sizes_;  ///< of bodies [m]
   AssemblyUnits<Space> pull_units_;  ///< of speeds: longer without a guess
   double goal_, closed_;             ///< of residuals: to reach, and good enough
   double work_ = 0.0;

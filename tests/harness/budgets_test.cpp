@@ -38,9 +38,9 @@ constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
     {"mechanism/algebra",       { 2053,  22,   0},  1900},
     {"mechanism/description",   { 2109,  28,   1},  1750},
-    {"mechanism/model",         { 3051,  22,   2},  2300},
+    {"mechanism/model",         { 3050,  22,   2},  2300},
     {"mechanism/loops",         { 3167,  23,   2},  1900},
-    {"mechanism/start",         { 2085,  18,   4},   700},
+    {"mechanism/start",         { 2097,  18,   4},   700},
     {"mechanism/formulation",   { 2624,  23,   4},  1500},
     {"mechanism/simplify",      { 3289,  25,   5},  2600},
     {"odca",                    { 6998,  38,   5},  3900},
@@ -52,7 +52,7 @@ constexpr Budget kBudgets[] = {
     {"harness/store",           { 1656,   8,   3},  1300},
     {"harness/config",          { 6307,  24,  11},  4000},
     {"harness/analysis",        { 2117,   8,   9},  1200},
-    {"harness/generate",        { 2298,  12,   7},  1230},
+    {"harness/generate",        { 2295,  12,   7},  1230},
     {"harness/integrator",      { 1388,   7,   4},   900},
     {"harness/reference",       {  913,   4,   4},   800},
     {"harness/trajectory",      { 2478,   9,  12},  1750},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2037,  10,   7},  1500},
     {"harness/cli",             { 8378,  26,  29},  3600},
     {"peers",                   {  718,  12,   5},   650},
-    {"",                        {92154, 507, 242}, 62000}
+    {"",                        {92162, 507, 242}, 62000}
 };
 // clang-format on
 

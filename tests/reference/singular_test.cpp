@@ -289,7 +289,7 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
   }
 }
 
-/// The same parallelogram in space. Its third bar has spherical joints at both ends.
+/// A parallelogram in space. Its third bar has spherical joints at both ends.
 TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranchInSpace) {
   const double bound = 1e-8;  // as above
   for (const auto& [bar, mass] :

@@ -16,11 +16,11 @@ constexpr double kPi = std::numbers::pi;
 constexpr int kMaxIterations = 200;
 /// Positions whose guesses are all missed by less [rad or lengths] are taken for the nearest.
 constexpr double kNear = 0.1;
-/// If the drawn position closes within the accuracy of the input, exact closures within this
-/// distance [rad or lengths] are taken instead. Some redundant constraints that are rounded close
-/// exactly far away only, or nowhere: a loop that opens by the square of a small motion x closes
-/// again within x = sqrt(2e-5), here with a margin for several loops.
-constexpr double kDrawn = 0.03;
+/// If the drawn position closes within the accuracy e of the input, exact closures within this
+/// times sqrt(2 e) [rad or lengths] are taken instead. A loop that opens by x^2 / 2 after a small
+/// motion x closes again within sqrt(2 e); the factor is a margin for several loops. Some rounded
+/// redundant constraints close exactly far away only, or nowhere.
+constexpr double kDrawn = 7.0;
 /// Least damping on the way to the least residual near a drawn position: motions that hardly close
 /// the loops stay small.
 constexpr double kStayDamping = 1e-3;
@@ -75,7 +75,8 @@ class Closure {
       const bool is_drawn =
           IsRounded(e) && !HasTargets() && guesses_.Farthest(kinematics_) <= kNear;
       bool closed = Close(kMaxIterations, &q, &e);
-      if (is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > kDrawn) {
+      const double near_drawn = kDrawn * std::sqrt(2.0 * description_.accuracy);
+      if (is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > near_drawn) {
         q = guess_;
         e = Residual(q);
         closed = Close(kMaxIterations, &q, &e, kStayDamping);

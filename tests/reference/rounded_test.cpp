@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "mechanism/simplify/redundancy.h"
@@ -174,6 +175,20 @@ TEST(RoundedInput, StartsWhereItIsDrawn) {
     const VectorX<double> drawn = GuessedPositions(file.description, mechanism);
     EXPECT_LT((start.q - drawn).lpNorm<Eigen::Infinity>(), 1e-3) << name;
   }
+}
+
+/// A coarse accuracy does not leave loops open that close nearby.
+TEST(RoundedInput, CoarseDrawingsCloseExactly) {
+  MechanismFile file = FourBar(kQuarter);
+  file.description.accuracy = 0.1;
+  file.description.initial.coordinates = {{0, {0.3}}, {1, {-0.2}}, {2, {0.25}}};
+  const Mechanism<Spatial, double> mechanism(file.description, Coordinates::kJoint);
+  const Start<double> start = Assemble<Spatial>(file.description, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  const VectorX<double> drawn = GuessedPositions(file.description, mechanism);
+  EXPECT_GT((start.q - drawn).lpNorm<Eigen::Infinity>(), 0.04) << "too near to test it";
+  // Sums of three lengths below 1 m and of three angles.
+  EXPECT_LT(start.position_residual, 16 * std::numeric_limits<double>::epsilon());
 }
 
 }  // namespace rounded_test

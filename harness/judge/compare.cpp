@@ -91,18 +91,28 @@ Ruling CompareValues(const Pair& pair, const CompareOptions& options, Finding* f
   return base == fresh ? Ruling{} : Ruling{Judgement::kWorse, "must be equal"};
 }
 
-/// Returns true if samples of at least three times are separated by a factor of 1.5. Rank tests of
-/// few repetitions cannot decide among many times, and noise of one machine is smaller.
-bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh) {
+/// Returns true if samples of at least three times are separated by the factor `gap`. Rank tests of
+/// few repetitions cannot decide among many times.
+bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh, double gap) {
   constexpr std::size_t kFewest = 3;
-  constexpr double kGap = 1.5;
   if (std::min(base.size(), fresh.size()) < kFewest) return false;
   const auto [base_least, base_most] = std::ranges::minmax(base);
   const auto [fresh_least, fresh_most] = std::ranges::minmax(fresh);
-  return fresh_least > kGap * base_most || base_least > kGap * fresh_most;
+  return fresh_least > gap * base_most || base_least > gap * fresh_most;
+}
+
+/// Returns the time of the calibration workload in NEW as a multiple of its time in BASE; 1 if it
+/// is unknown, within noise, or was compiled differently.
+double SpeedRatio(const Pair& pair, const Measure& measure) {
+  const double ratio =
+      CalibrationOf(pair.fresh, measure.key) / CalibrationOf(pair.base, measure.key);
+  const bool is_equal_work = OriginOf(pair.base).compiler == OriginOf(pair.fresh).compiler;
+  return is_equal_work && (ratio > kOtherSpeed || ratio < 1.0 / kOtherSpeed) ? ratio : 1.0;
 }
 
 /// Stores the unadjusted p of "different by more than the ratio" in the finding, for Holm's method.
+/// If the machine changed its speed, the ratio is multiplied by the square of the change, because
+/// other work may slow down more than the calibration workload.
 void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding) {
   const std::vector<double>& base = pair.base.Numbers(finding->measure.key);
   const std::vector<double>& fresh = pair.fresh.Numbers(finding->measure.key);
@@ -110,14 +120,20 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
   finding->base = fmt::format("{:.4g}", base_median);
   finding->fresh = fmt::format("{:.4g}", fresh_median);
   finding->ratio = fresh_median / base_median;
+  const double speed = SpeedRatio(pair, finding->measure);
+  const double margin = std::max(speed * speed, 1.0 / (speed * speed));
+  if (speed != 1.0) {
+    finding->why = fmt::format("the machine took {:.3g} of the time for equal work", speed);
+  }
   std::vector<double> lifted_base = base, lifted_fresh = fresh;
-  for (double& time : lifted_base) time *= options.time_ratio;
-  for (double& time : lifted_fresh) time *= options.time_ratio;
+  for (double& time : lifted_base) time *= options.time_ratio * margin;
+  for (double& time : lifted_fresh) time *= options.time_ratio * margin;
   const double slower = MannWhitney(fresh, lifted_base).p_greater;
   const double faster = MannWhitney(base, lifted_fresh).p_greater;
   finding->p = std::min(1.0, 2.0 * std::min(slower, faster));
   finding->least_p = 2.0 * SmallestP(base.size(), fresh.size());
-  finding->is_apart = AreApart(base, fresh);
+  constexpr double kGap = 1.5;  // exceeds the noise of one machine
+  finding->is_apart = AreApart(base, fresh, kGap * margin);
 }
 
 /// Returns the ruling for a missing or invalid measure; nothing if both sides have it.
@@ -152,13 +168,6 @@ std::string ObstacleOf(const Measure& measure, const Pair& pair) {
                ? "machine not known"
                : "another machine";
   }
-  const double speed =
-      CalibrationOf(pair.fresh, measure.key) / CalibrationOf(pair.base, measure.key);
-  // only if known and compiled equally; compilers may generate different instructions
-  const bool is_equal_work = OriginOf(pair.base).compiler == OriginOf(pair.fresh).compiler;
-  if (is_equal_work && (speed > kOtherSpeed || speed < 1.0 / kOtherSpeed)) {
-    return fmt::format("the machine took {:.3g} of the time for equal work", speed);
-  }
   if (measure.repeats == Repeats::kUnderOneArithmetic && !pair.same_arithmetic) {
     return "another compiler, flags or mathematical library";
   }
@@ -174,7 +183,6 @@ Finding Compared(const std::string& one, const Measure& measure, const Pair& pai
                  const CompareOptions& options) {
   Finding finding{.one = one, .measure = measure};
   Ruling ruling;
-  const bool is_time = measure.rule == Rule::kTime;
   if (const auto missing = ClassifyMissing(pair, measure)) {
     finding.base = Shown(pair.base, measure.key);
     finding.fresh = Shown(pair.fresh, measure.key);
@@ -185,8 +193,9 @@ Finding Compared(const std::string& one, const Measure& measure, const Pair& pai
     finding.fresh = pair.fresh.Text(measure.key);
     if (const std::string obstacle = ObstacleOf(measure, pair); !obstacle.empty()) {
       ruling = {Judgement::kNotMeasured, obstacle};
-    } else if (is_time) {
+    } else if (measure.rule == Rule::kTime) {
       TestTimes(pair, options, &finding);
+      return finding;  // DecideTimes judges all times together
     } else if (TypeOf(measure.key) == ValueType::kText) {
       ruling = CompareTexts(measure.rule, finding.base, finding.fresh);
     } else {
@@ -218,6 +227,8 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
       finding.judgement = finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter;
       finding.why = is_sure ? fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p)
                             : fmt::format("ratio {:.3f}, samples far apart", finding.ratio);
+    } else if (!finding.why.empty()) {  // within the change of the machine's speed
+      finding.judgement = Judgement::kNotMeasured;
     } else if (finding.least_p * tests > options.alpha) {
       finding.judgement = Judgement::kNotMeasured;
       finding.why = fmt::format("too few repetitions to decide among {} times", times.size());

@@ -93,7 +93,13 @@ void PrintFreedom(const Structure& s, const std::vector<std::string>& idle,
 void PrintRedundant(const MechanismDescription& description, const Structure& structure,
                     const ExplainView& view) {
   if (!structure.analysed) return;
-  Say(view, "\nRedundant constraints: {}\n", structure.redundant.size());
+  const int listed = static_cast<int>(structure.redundant.size());
+  const int rest = structure.loop_rows - structure.rank_nearby - listed;
+  const int implied = structure.couplings > 0 ? std::max(rest, 0) : 0;
+  Say(view, "\nRedundant constraints: {}\n", listed + implied);
+  if (implied > 0) {
+    Say(view, "  couplings: {} of them follow from other constraints at the start\n", implied);
+  }
   bool released = false;
   for (const RedundantDirection& one : structure.redundant) {
     Say(view, "  {}: {}{}\n", description.joints[one.joint].name, one.name,

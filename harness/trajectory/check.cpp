@@ -362,7 +362,6 @@ std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory
 }
 
 double ValueAt(const Trajectory& ours, std::size_t column, double t) {
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const std::size_t rows = ours.rows();
   std::size_t low = 0, high = rows;  // first row not before t
   while (low < high) {
@@ -377,7 +376,7 @@ double ValueAt(const Trajectory& ours, std::size_t column, double t) {
       return ours.At(row, column);
     }
   }
-  if (low == 0 || low == rows) return kNaN;
+  if (low == 0 || low == rows) return std::numeric_limits<double>::quiet_NaN();
   const std::size_t count = std::min<std::size_t>(4, rows);
   const std::size_t first = std::min(low < 2 ? 0 : low - 2, rows - count);
   double value = 0.0;

@@ -45,6 +45,12 @@ class Builder {
     return random.Vector(1.5, true);
   }
 
+  /// Where a bar of about a metre meets the next one.
+  Eigen::Vector3d Tip() {
+    const Eigen::Vector3d along = random.Uniform(0.6, 1.4) * Eigen::Vector3d::UnitX();
+    return along + random.Vector(0.2, spatial);
+  }
+
   /// Tree joint from `parent` to `child`; `turned`: in any frames, the other way round at times.
   int AddJoint(JointType type, int parent, const Eigen::Vector3d& at_parent, int child,
                const Eigen::Vector3d& at_child, double q, bool turned = true);

@@ -6,15 +6,9 @@ namespace loopbench::testing {
 
 namespace {
 
-/// Where a bar of about a metre meets the next one.
-Eigen::Vector3d Tip(Builder& b) {
-  const Eigen::Vector3d along = b.random.Uniform(0.6, 1.4) * Eigen::Vector3d::UnitX();
-  return along + b.random.Vector(0.2, b.spatial);
-}
-
 int Append(Builder& b, JointType type, int parent) {
   const int body = b.AddBody(1.0);
-  const Eigen::Vector3d at = Tip(b);
+  const Eigen::Vector3d at = b.Tip();
   b.AddJoint(type, parent, at, body, b.random.Vector(0.2, b.spatial), b.random.Uniform(-2.0, 2.0));
   return body;
 }
@@ -31,8 +25,8 @@ MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed
   }
   int last = 0;
   for (int i = 0; i < n; ++i) last = Append(b, kinds[i % kinds.size()], last);
-  b.Close(JointType::kRevolute, 0, last, Tip(b), 0.0);
-  b.Close(JointType::kRod, n / 2 - 4, n / 2 + 4, Tip(b), 0.0);
+  b.Close(JointType::kRevolute, 0, last, b.Tip(), 0.0);
+  b.Close(JointType::kRod, n / 2 - 4, n / 2 + 4, b.Tip(), 0.0);
   Append(b, JointType::kFree, last);
   return b.Finish();
 }
@@ -51,7 +45,7 @@ MechanismDescription NestedLoops(int loops, SpaceKind space, std::uint64_t seed)
         from_right = right;
       }
     }
-    b.Close(JointType::kRevolute, left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
+    b.Close(JointType::kRevolute, left, right, b.Tip(), b.random.Uniform(-1.0, 1.0));
   }
   return b.Finish();
 }

@@ -9,18 +9,12 @@ namespace loopbench::testing {
 
 namespace {
 
-/// Where a bar of about a metre meets the next one.
-Eigen::Vector3d Tip(Builder& b) {
-  const Eigen::Vector3d along = b.random.Uniform(0.6, 1.4) * Eigen::Vector3d::UnitX();
-  return along + b.random.Vector(0.2, b.spatial);
-}
-
 /// A branch of n bars from a body; the last bar.
 int Grow(Builder& b, int root, int n) {
   for (int i = 0; i < n; ++i) {
     const int body = b.AddBody(1.0);
     const JointType type = b.random.Chance(0.8) ? JointType::kRevolute : JointType::kPrismatic;
-    const Eigen::Vector3d at = Tip(b);
+    const Eigen::Vector3d at = b.Tip();
     b.AddJoint(type, root, at, body, b.random.Vector(0.2, b.spatial), b.random.Uniform(-2.0, 2.0));
     root = body;
   }
@@ -130,7 +124,7 @@ MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed)
     const JointType type = draw < 0.7   ? JointType::kRevolute
                            : draw < 0.9 ? JointType::kPrismatic
                                         : JointType::kWeld;
-    b.Close(type, left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
+    b.Close(type, left, right, b.Tip(), b.random.Uniform(-1.0, 1.0));
   }
   Grow(b, b.random.Below(static_cast<int>(b.description.bodies.size())), 2);
   return b.Finish();
@@ -149,7 +143,7 @@ MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, 
       const JointType type = any();
       if (type == JointType::kRod) continue;  // not in a tree
       const int body = b.AddBody(1.0);
-      const Eigen::Vector3d at = Tip(b);
+      const Eigen::Vector3d at = b.Tip();
       b.AddJoint(type, root, at, body, b.random.Vector(0.2, b.spatial),
                  b.random.Uniform(-2.0, 2.0));
       freedom += NumValues(type, space, true);
@@ -164,7 +158,7 @@ MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, 
     const int bodies = static_cast<int>(b.description.bodies.size());
     const int from = b.random.Below(bodies), to = b.random.Below(bodies);
     const int left = grow(from, enough), right = grow(to, enough);
-    b.Close(any(), left, right, Tip(b), b.random.Uniform(-1.0, 1.0));
+    b.Close(any(), left, right, b.Tip(), b.random.Uniform(-1.0, 1.0));
   }
   b.AddMotions(motions);
   return b.Finish();
@@ -220,7 +214,7 @@ MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed) {
                b.random.Vector(0.02, b.spatial), angle(slope, 0.03), b.spatial);
     if (i > 0 && b.spatial) {
       const int left = Grow(b, last, 9), right = Grow(b, crank, 9);
-      b.Close(JointType::kRevolute, left, right, Tip(b), 0.0);
+      b.Close(JointType::kRevolute, left, right, b.Tip(), 0.0);
     } else if (i > 0) {
       const int coupler = b.AddBody(1.0);
       b.AddJoint(JointType::kRevolute, last, tip(), coupler, b.random.Vector(0.02, b.spatial),

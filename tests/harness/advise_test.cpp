@@ -121,7 +121,7 @@ TEST_F(AdviceTest, KeepsTheErrorInARunOfItsOwn) {
 }
 
 TEST_F(AdviceTest, SaysThatNothingReachedIt) {
-  Load("four-bar", 1.0);
+  Load("four-bar", 0.3);
   const Advice advice = Ask({.error = 1e-16, .budget = {}, .cpu_s = 60.0});
   EXPECT_FALSE(advice.reached);
   ASSERT_FALSE(advice.finalists.empty());
@@ -131,7 +131,7 @@ TEST_F(AdviceTest, SaysThatNothingReachedIt) {
 }
 
 TEST_F(AdviceTest, SpendsABudgetOnAccuracy) {
-  Load("four-bar", 1.0);
+  Load("four-bar", 0.3);
   // a hundredth of a second for each is far more than round-off takes here on any machine
   const Advice advice = Ask({.error = {}, .budget = 0.01, .cpu_s = 60.0});
   ASSERT_TRUE(advice.reached);

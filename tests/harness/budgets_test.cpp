@@ -55,7 +55,7 @@ constexpr Budget kBudgets[] = {
     {"harness/generate",        { 2295,  12,   7},  1230},
     {"harness/integrator",      { 1388,   7,   4},   900},
     {"harness/reference",       {  913,   4,   4},   800},
-    {"harness/trajectory",      { 2478,   9,  12},  1750},
+    {"harness/trajectory",      { 2477,   9,  12},  1750},
     {"harness/observers",       { 1146,   4,   7},  1000},
     {"harness/run",             { 1748,  12,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
@@ -71,9 +71,9 @@ constexpr Budget kBudgets[] = {
     {"harness/exchange",        { 9124,  36,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2037,  10,   7},  1500},
-    {"harness/cli",             { 8378,  26,  29},  3600},
+    {"harness/cli",             { 8384,  26,  29},  3600},
     {"peers",                   {  718,  12,   5},   650},
-    {"",                        {92174, 507, 242}, 62000}
+    {"",                        {92179, 507, 242}, 62000}
 };
 // clang-format on
 

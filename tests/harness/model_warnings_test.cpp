@@ -62,6 +62,15 @@ TEST_F(ExplainMechanismTest, NamesLoopsAndEndsWell) {
                {"OC OA AB BC", "1 by counting", "1 by rank", "Redundant constraints: 0"});
 }
 
+TEST_F(ExplainMechanismTest, CouplingsThatFollowFromOthersAreCounted) {
+  std::string text = ReadFile(kConfigs / "mechanisms/geared-five-bar.json");
+  text.insert(text.find("    {\"name\": \"gears\""),
+              R"({"name": "again", "coefficients": {"A": 2.0, "E": 1.0}}, )");
+  Write("geared.json", text);
+  ExpectEnding(Call("explain geared.json"), 0,
+               {"1 by rank", "Redundant constraints: 1", "couplings: 1 of them"});
+}
+
 TEST_F(ExplainMechanismTest, StartThatDoesNotCloseIsSaidAfterAllElse) {
   EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [5.0, 0.0]");
   ExpectEnding(Call("explain four-bar.json"), 2,

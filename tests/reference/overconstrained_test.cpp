@@ -92,30 +92,26 @@ MechanismFile WithTurnedFrames(MechanismFile mechanism, double angle) {
   return mechanism;
 }
 
-class BennettsFrames : public ::testing::TestWithParam<double> {};
-
-TEST_P(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) {
-  const MechanismFile bennett = WithTurnedFrames(Shipped("bennett"), GetParam());
+TEST(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) {
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
         const Record away = RunProblem(ModelledAway(), At("odca", level, set), rtol, 100.0);
-        const Record record = RunProblem(bennett, At("odca", level, set), rtol, 100.0);
         ASSERT_EQ(away.Text("outcome"), "finished");
-        EXPECT_EQ(record.Text("outcome"), "finished");
-        const double ratio =
-            record.Number("drift_position_max") / away.Number("drift_position_max");
-        // rows of another joint in another scale: measured 0.7 to 3.6, at every angle the same
-        EXPECT_LE(ratio, 5.0);
-        std::cout << ToString(level) << " " << ToString(set) << " " << rtol << ": "
-                  << record.Number("drift_position_max") << " m, " << ratio
-                  << " times that modelled away\n";
+        for (const double angle : {0.0, 0.4, 0.8, 1.2}) {
+          const Record record = RunProblem(WithTurnedFrames(Shipped("bennett"), angle),
+                                           At("odca", level, set), rtol, 100.0);
+          EXPECT_EQ(record.Text("outcome"), "finished");
+          const double ratio =
+              record.Number("drift_position_max") / away.Number("drift_position_max");
+          // rows of another joint in another scale: measured 0.7 to 3.6, at every angle the same
+          EXPECT_LE(ratio, 5.0) << ToString(level) << " " << ToString(set) << " " << rtol << " "
+                                << angle;
+        }
       }
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Angles, BennettsFrames, ::testing::Values(0.0, 0.4, 0.8, 1.2));
 
 class Overconstrained : public ::testing::TestWithParam<std::string> {};
 

@@ -50,8 +50,9 @@ class SelfStress {
 
   /// J, T and W at the positions of `kinematics`, and its imposed directions turned as above,
   /// unless the released ones are constraints within the accuracy of the input only. No other call
-  /// may come first. No allocation. False if other released directions serve better here: elements
-  /// of T exceed ten, which costs a digit, or imposed rows are nearly dependent.
+  /// may come first. No allocation. False if other released directions serve better here: imposed
+  /// rows are nearly dependent, or elements of T exceed ten, which costs a digit. For directions
+  /// released within the accuracy the limit is two, because elements of T multiply the rounding.
   bool Factor(Kinematics<Space, S>& kinematics);
   /// The released directions that serve best here, as many of each joint as the mechanism releases.
   /// Allocates.

@@ -39,7 +39,7 @@ constexpr Budget kBudgets[] = {
     {"mechanism/algebra",       { 2053,  22,   0},  1900},
     {"mechanism/description",   { 2109,  28,   1},  1750},
     {"mechanism/model",         { 3050,  22,   2},  2300},
-    {"mechanism/loops",         { 3167,  23,   2},  1900},
+    {"mechanism/loops",         { 3170,  23,   2},  1900},
     {"mechanism/start",         { 2098,  18,   4},   700},
     {"mechanism/formulation",   { 2624,  23,   4},  1500},
     {"mechanism/simplify",      { 3289,  25,   5},  2600},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2037,  10,   7},  1500},
     {"harness/cli",             { 8384,  26,  29},  3600},
     {"peers",                   {  718,  12,   5},   650},
-    {"",                        {92179, 507, 242}, 62000}
+    {"",                        {92182, 507, 242}, 62000}
 };
 // clang-format on
 

@@ -192,42 +192,6 @@ Table LimitTable(const RobustnessMap& map) {
   return table;
 }
 
-// Returns all cells that do not hold.
-Table DetailTable(const RobustnessMap& map) {
-  Table table{.title = "Cells that do not hold",
-              .columns = {{"row", "stress test"},
-                          {"column", "method"},
-                          {"class", "class"},
-                          {"number", "number"},
-                          {"count", "hold"},
-                          {"reason", "why"}}};
-  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapMethod& column,
-                         const MapCell& cell) {
-    if (cell.state == CellState::kHolds) return;
-    AddRow({row.label, column.label, cell.word + (cell.demanded ? " (must hold)" : ""),
-            DecidingNumber(cell), HoldingCount(cell), cell.reason},
-           &table);
-  });
-  return table;
-}
-
-// Returns cells that hold with warnings, each to be explained.
-Table FlaggedTable(const RobustnessMap& map) {
-  Table table{.title = "Cells that hold, with runs with warnings",
-              .columns = {{"row", "stress test"},
-                          {"column", "method"},
-                          {"count", "with warnings"},
-                          {"warnings", "warnings"}}};
-  EachCell(map, [&table](const MapGroup&, const MapRow& row, const MapMethod& column,
-                         const MapCell& cell) {
-    if (!HoldsWithWarnings(cell)) return;
-    AddRow({row.label, column.label, fmt::format("{} of {}", cell.flagged, cell.holding),
-            cell.warnings},
-           &table);
-  });
-  return table;
-}
-
 /// Returns "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
 std::string CountCells(const RobustnessMap& map) {
   std::string text;
@@ -310,10 +274,7 @@ std::string MapMarkdown(const RobustnessMap& map, const std::vector<std::string>
     page += ToMarkdown(table) + "\n";
   }
   page += ToMarkdown(LimitTable(map)) + "\n";
-  Table details = DetailTable(map);
-  if (!details.rows.empty()) page += ToMarkdown(details);
-  Table warnings = FlaggedTable(map);
-  if (!warnings.rows.empty()) page += "\n" + ToMarkdown(warnings);
+  page += "Reasons and warnings of each cell: `robustness-map.csv`.\n";
   for (const std::string& note : notes) page += "\n" + EscapeMarkdownParagraph(note) + "\n";
   return page;
 }

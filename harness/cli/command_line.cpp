@@ -385,6 +385,11 @@ template <class T>
 CLI::Option* AddValue(CLI::App* app, const Option& row, T* place) {
   CLI::Option* option = app->add_option(row.names, *place, row.sentence);
   const double from = row.rules.from, to = row.rules.to;
+  if constexpr (std::is_same_v<T, std::filesystem::path>) {
+    option->check([](const std::string& text) {  // "" is a shell variable that is not set
+      return text.empty() ? "found an empty name, expected a file or folder" : "";
+    });
+  }
   if constexpr (std::is_same_v<T, int>) {
     if (to > from) option->check(NumberFrom(static_cast<int>(from), static_cast<int>(to)));
   } else if (to > from) {

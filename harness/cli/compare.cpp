@@ -270,6 +270,10 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   std::vector<std::string> notes;
   if (!base_name.empty()) notes.push_back(base_name);
   notes.insert(notes.end(), origins.begin(), origins.end());
+  if (!command.markdown.empty() && command.markdown == command.junit) {
+    throw ConfigError(fmt::format("--markdown and --junit: found \"{}\" twice, expected two files",
+                                  command.junit.string()));
+  }
   if (!command.markdown.empty()) {
     WriteFileAtomically(command.markdown,
                         ComparisonMarkdown(comparison, Conclusion(comparison, options), notes));

@@ -232,6 +232,7 @@ int PrintMap(const MapCommand& command, const std::string& typed) {
 
 int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
   const std::vector<Record> records = LoadRecords(command.store);
+  if (records.empty()) throw ConfigError(command.store.string() + ": found no records to judge");
   RequireOneContent(records, command.store, "check-claims");
   std::vector<ClaimResult> results;
   for (const ClaimRule& rule : ReadClaims(command.claims)) {
@@ -241,7 +242,14 @@ int PrintVerdicts(const VerdictCommand& command, const std::string& typed) {
     WriteFileAtomically(command.out, ClaimsMarkdown(results, Provenance(typed)));
   }
   Table verdicts = VerdictTable(results);
-  verdicts.notes = Provenance(typed);
+  for (const ClaimResult& result : results) {
+    for (const CheckResult& check : result.checks) {
+      if (result.verdict != Verdict::kNotMeasured || check.reason.empty()) continue;
+      verdicts.notes.push_back(fmt::format("{}: {}", result.rule.id, check.reason));
+    }
+  }
+  const std::vector<std::string> provenance = Provenance(typed);
+  verdicts.notes.insert(verdicts.notes.end(), provenance.begin(), provenance.end());
   PrintText(ToScreen(verdicts) + "\n");
   if (!command.out.empty()) Print("wrote {}\n", command.out.string());
   return 0;

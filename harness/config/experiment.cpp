@@ -104,7 +104,8 @@ Record CaseKeys(const Experiment& experiment, const Case& one) {
   keys.Set("atol", is_fixed || one.atols ? Value() : Value(one.atol));
   if (one.atols) {
     AtolFields().Show(*one.atols, [&keys](const std::string& quantity, const Json& value) {
-      keys.Set("atol_" + quantity, value.get<double>());
+      // a tolerance that is no number has been reported
+      keys.Set("atol_" + quantity, value.is_number() ? Value(value.get<double>()) : Value());
     });
   }
   if (is_fixed) keys.Set("step", one.step);

@@ -274,6 +274,7 @@ void ReadMotions(const JsonNode& node, Joint& joint) {
     joint.motions = {{0, ReadTimeFunction(node)}};
     return;
   }
+  if (node.value().empty()) node.Fail("at least one motion");
   for (const JsonNode& element : node.Elements("motions")) {
     MotionOfJoint motion{{0, Polynomial{{0.0}}}, speeds, &joint.motions};
     MotionFields().Read(element, &motion);

@@ -490,7 +490,7 @@ const Fields<Draft>& MechanismFileFields() {
            {"independent", By(NamesSchema(), ReadIndependent, WriteIndependent),
             "Independent speeds of the fixed coordinate reduction: joint names for joint "
             "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute coordinates."},
-           {"accuracy", Number(&Draft::accuracy, kPositive),
+           {"accuracy", Number(&Draft::accuracy, {.min = 0.0, .max = 0.1, .above_min = true}),
             "Accuracy of points, axes and initial values [rad, or lengths of the mechanism]. "
             "Loops with smaller gaps are closed; constraints with smaller differences are "
             "redundant."},

@@ -192,24 +192,27 @@ void ImportDraft::AddSpringAndDamper(double stiffness, double rest, double dampi
   if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
 }
 
-void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name, int follower,
-                              CouplingDescription::Part leader, double offset) {
-  const auto has_coordinate = [&](int joint) {
-    return NumValues(description.joints[joint].type, SpaceKind::kSpatial, false) == 1;
+void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name,
+                              std::vector<CouplingDescription::Part> parts, double offset) {
+  const auto has_coordinate = [&](const CouplingDescription::Part& part) {
+    return NumValues(description.joints[part.joint].type, SpaceKind::kSpatial, false) == 1;
   };
+  if (!std::ranges::all_of(parts, has_coordinate)) return Note(element, kNotCoupled, true);
+  std::erase_if(parts, [](const CouplingDescription::Part& part) { return part.ratio == 0.0; });
+  if (parts.size() == 1) {
+    const auto [joint, ratio] = parts.front();
+    description.joints[joint].motions = {{0, Polynomial{{offset / ratio}}}};
+  } else if (!parts.empty()) {
+    description.couplings.push_back({joints_.Take(name), std::move(parts), offset});
+  }
+}
+
+void ImportDraft::AddFollower(const XmlElement& element, const std::string& name, int follower,
+                              CouplingDescription::Part leader, double offset) {
   if (follower == leader.joint) {
     element.Fail("a joint that follows itself", "another joint");
   }
-  if (!has_coordinate(follower) || !has_coordinate(leader.joint)) {
-    Note(element, kNotCoupled, true);
-    return;
-  }
-  if (leader.ratio == 0.0) {
-    description.joints[follower].motions = {{0, Polynomial{{offset}}}};
-    return;
-  }
-  leader.ratio = -leader.ratio;
-  description.couplings.push_back({joints_.Take(name), {{follower, 1.0}, leader}, offset});
+  AddCoupling(element, name, {{follower, 1.0}, {leader.joint, -leader.ratio}}, offset);
 }
 
 void ImportDraft::AddMimic(const XmlElement& element, int follower,
@@ -223,7 +226,7 @@ void ImportDraft::AddMimic(const XmlElement& element, int follower,
   if (first == follower && leader.joint != follower) {
     element.Fail("joints that follow each other", "no cycle");
   }
-  AddCoupling(element, description.joints[follower].name + " mimic", follower, leader, offset);
+  AddFollower(element, description.joints[follower].name + " mimic", follower, leader, offset);
   leaders_[follower] = first;
 }
 

@@ -195,9 +195,12 @@ class ImportDraft {
   void Fix(int parent, const Placement& X, int body, const char* ending);
   /// Adds spring and damper of the joint that was added last, where they are not 0.
   void AddSpringAndDamper(double stiffness, double rest, double damping);
-  /// Adds the coupling q_follower = ratio q_leader + offset; a motion for the ratio 0. Dropped with
-  /// a note unless both joints have one coordinate.
-  void AddCoupling(const XmlElement& element, const std::string& name, int follower,
+  /// Adds the coupling sum_i ratio_i q_i = offset; a motion if one ratio is not 0. Dropped with a
+  /// note unless all joints have one coordinate.
+  void AddCoupling(const XmlElement& element, const std::string& name,
+                   std::vector<CouplingDescription::Part> parts, double offset);
+  /// Adds the coupling q_follower = ratio q_leader + offset.
+  void AddFollower(const XmlElement& element, const std::string& name, int follower,
                    CouplingDescription::Part leader, double offset);
   /// Adds the coupling of a joint that follows another one by its description. Rejects cycles.
   void AddMimic(const XmlElement& element, int follower, CouplingDescription::Part leader,

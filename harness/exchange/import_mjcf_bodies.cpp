@@ -225,7 +225,7 @@ void IgnoreGeom(const MjcfElement& geom, const std::string& fate, MjcfModel* mod
 
 /// Contents of a body, without intermediate <frame> elements.
 struct Contents {
-  std::vector<MjcfPlaced> bodies, geoms, sites, joints;
+  std::vector<MjcfPlaced> bodies, geoms, sites, joints, inertials;
 };
 
 std::string ClassWithin(const MjcfModel& model, const XmlElement& element,
@@ -273,13 +273,12 @@ void GatherReplicas(MjcfModel* model, const MjcfPlaced& placed, Contents* conten
 
 /// Collects contents in file order, inside and outside of frames; this is the order of qpos.
 void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
-  std::map<std::string, std::vector<MjcfPlaced>*> lists = {{"body", &contents->bodies},
-                                                           {"geom", &contents->geoms},
-                                                           {"site", &contents->sites},
-                                                           {"joint", &contents->joints},
-                                                           {"freejoint", &contents->joints}};
+  std::map<std::string, std::vector<MjcfPlaced>*> lists = {
+      {"body", &contents->bodies},        {"geom", &contents->geoms},
+      {"site", &contents->sites},         {"joint", &contents->joints},
+      {"inertial", &contents->inertials}, {"freejoint", &contents->joints}};
   for (const XmlElement& child : placed.element.Children(
-           {"body", "geom", "site", "joint", "freejoint", "frame", "replicate"})) {
+           {"body", "geom", "site", "joint", "freejoint", "inertial", "frame", "replicate"})) {
     const std::string tag = child.tag();
     if (placed.replica != nullptr) model->CountCopy(child);
     if (tag.ends_with("joint") && placed.element.tag() == "replicate") {
@@ -316,8 +315,9 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
 }
 
 /// Reads <inertial>: about its own axes, rotated into body axes.
-BodyDescription ReadInertial(const XmlElement& element, const MjcfModel& model) {
-  const Placement X = model.PlacementOf(MjcfElement(element));
+BodyDescription ReadInertial(const MjcfPlaced& placed, const MjcfModel& model) {
+  const XmlElement& element = placed.element;
+  const Placement X = placed.X * model.PlacementOf(MjcfElement(element));
   BodyDescription read;
   read.mass = element.Required("mass", "a number [kg]").Number(kNotNegative);
   read.com = X.p;
@@ -335,23 +335,26 @@ BodyDescription ReadInertial(const XmlElement& element, const MjcfModel& model) 
 }
 
 /// Reads masses. `is_fixed`: fixed to the ground, where masses matter only for a total mass.
-void ReadMasses(const XmlElement& element, const Contents& contents, int body, bool is_fixed,
-                MjcfModel* model) {
-  const auto inertial = element.Child("inertial");
+void ReadMasses(const Contents& contents, int body, bool is_fixed, MjcfModel* model) {
+  const bool has_inertial = !contents.inertials.empty();
+  if (contents.inertials.size() > 1) {
+    contents.inertials[1].element.Fail("a second <inertial>", "at most one in a body");
+  }
   const MjcfSettings& settings = model->settings;
   std::vector<MjcfGeom> geoms;
   for (const MjcfPlaced& geom : contents.geoms) {
     geoms.push_back({model->defaults.Of(geom.element, geom.childclass), geom.X});
   }
   const bool wants_geoms = settings.inertia == MjcfSettings::kFromGeoms ||
-                           (settings.inertia == MjcfSettings::kAuto && !inertial);
+                           (settings.inertia == MjcfSettings::kAuto && !has_inertial);
   BodyDescription masses;
   if (wants_geoms) masses = MassOfGeoms(*model, geoms, is_fixed && settings.total_mass <= 0.0);
   const bool from_geoms = masses.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains
-  if (from_geoms && inertial) {
-    model->draft->DropWhole(*inertial, "inertiafromgeom asks for the geoms' masses");
-  } else if (inertial) {
-    masses = ReadInertial(*inertial, *model);
+  if (from_geoms && has_inertial) {
+    model->draft->DropWhole(contents.inertials[0].element,
+                            "inertiafromgeom asks for the geoms' masses");
+  } else if (has_inertial) {
+    masses = ReadInertial(contents.inertials[0], *model);
   }
   BodyDescription& described = model->draft->description.bodies[body];
   described.mass = masses.mass;
@@ -375,7 +378,7 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   Contents contents;
   Gather(model, {element, {}, childclass, placed.replica}, &contents);
   is_fixed = is_fixed && contents.joints.empty();
-  ReadMasses(element, contents, body, is_fixed, model);
+  ReadMasses(contents, body, is_fixed, model);
   ReadSites(contents.sites, body, model);
   const double lift = NumberOr(element.Attribute("gravcomp"), 0.0);
   if (lift != 0.0 && model->settings.has_passive()) draft->AddLift(body, lift);
@@ -406,6 +409,9 @@ void ReadMjcfWorld(const XmlElement& world, MjcfModel* model) {
   }
   for (const MjcfPlaced& joint : contents.joints) {
     joint.element.Fail("a joint of the world", "joints in bodies");
+  }
+  for (const MjcfPlaced& inertial : contents.inertials) {
+    inertial.element.Fail("a mass of the world", "masses of bodies");
   }
   ReadSites(contents.sites, kGround, model);
   for (const MjcfPlaced& body : contents.bodies) ReadBody(body, kGround, true, model);

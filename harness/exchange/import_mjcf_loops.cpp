@@ -116,7 +116,7 @@ bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
     return true;
   }
   const auto name = equality.own().Attribute("name");
-  model->draft->AddCoupling(equality.own(), (name ? name->Name() : "equality") + model->Suffix(),
+  model->draft->AddFollower(equality.own(), (name ? name->Name() : "equality") + model->Suffix(),
                             joint.joint, {leader->joint, a[1]}, a[0]);
   return true;
 }
@@ -206,13 +206,43 @@ double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<P
   return (place(ends.first) - place(ends.second)).norm();
 }
 
+/// Adds a fixed tendon of constant length: a coupling of the joints' coordinates, which are 0 in
+/// the drawn position.
+void AddFixedTendon(const XmlElement& element, const XmlElement& held, MjcfModel* model) {
+  std::vector<CouplingDescription::Part> parts;
+  for (const XmlElement& child : element.Children("joint")) {
+    const MjcfJoint& joint =
+        model->joints[model->JointNamed(child.Required("joint", "the name of a joint"))];
+    if (!joint.has_coordinate()) return model->draft->Note(element, kNotCoupled, true);
+    const auto part = std::ranges::find(parts, joint.joint, &CouplingDescription::Part::joint);
+    if (part != parts.end()) child.Fail("a joint twice", "each joint once");
+    parts.push_back({joint.joint, child.Required("coef", "a number").Number()});
+  }
+  const MjcfElement equality = model->defaults.Of(held, "", "equality");
+  equality.own().Attribute("name");  // the coupling has the name of the tendon
+  model->draft->AddCoupling(element, element.Attribute("name")->Name() + model->Suffix(),
+                            std::move(parts), PolynomialOf(equality)[0]);
+  const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
+  model->NoteLimits(tendon, "tendons do not end");
+  for (const char* key : {"stiffness", "damping", "frictionloss", "armature"}) {
+    model->DropNonzero(tendon, key, "the length of the tendon is constant");
+  }
+}
+
 void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElement>& held,
                 const std::vector<Placement>& free_poses, MjcfModel* model) {
   const auto name = element.Attribute("name");
+  const bool is_held = name && held.contains(name->text()) && model->settings.has_equality;
+  if (element.tag() == "fixed" && is_held) {
+    return AddFixedTendon(element, held.at(name->text()), model);
+  }
   const auto ends = element.tag() == "spatial" ? StraightEnds(element, *model) : std::nullopt;
   if (!ends || ends->first.body == ends->second.body) {
     return model->draft->DropWhole(
-        element, "only spatial tendons straight between two sites of two bodies are springs here",
+        element,
+        is_held ? "only straight spatial and fixed tendons are constraints here: this is a freedom "
+                  "more than in the file"
+                : "only spatial tendons straight between two sites of two bodies are springs here",
         true);
   }
   const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
@@ -220,7 +250,7 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   model->NoteLimits(tendon, "tendons do not end");
   model->DropNonzero(tendon, "frictionloss", "there is no dry friction");
   model->DropNonzero(tendon, "armature", "tendons have no inertia");
-  if (!name || !held.contains(name->text()) || !model->settings.has_equality) return;
+  if (!is_held) return;
   const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
   equality.own().Attribute("name");  // the rod has the name of the tendon
   const double length = LengthOf(*ends, model->draft->at_rest) + PolynomialOf(equality)[0];
@@ -241,11 +271,13 @@ void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
   ReadEquality(root, model);
   const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
   for (const XmlElement& element : root.InSections("tendon")) {
-    MjcfModel::References sites;
-    for (const XmlElement& site : element.Children("site")) {
-      sites.emplace_back("site", site.Attribute("site"));
+    MjcfModel::References parts;
+    for (const char* kind : {"site", "joint"}) {
+      for (const XmlElement& part : element.Children(kind)) {
+        parts.emplace_back(kind, part.Attribute(kind));
+      }
     }
-    model->ForReplicas(sites, [&] { ReadTendon(element, held, free_poses, model); });
+    model->ForReplicas(parts, [&] { ReadTendon(element, held, free_poses, model); });
   }
 }
 

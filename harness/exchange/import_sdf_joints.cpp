@@ -266,7 +266,7 @@ void SdfReader::ReadGearbox(const XmlElement& element, const SdfScope& scope) co
     ReadDynamics(about, false);
   }
   if (const auto physics = element.Child("physics")) physics->Ignore();
-  draft_->AddCoupling(element, scope.prefix + element.RequiredName(), parts[1].joint,
+  draft_->AddFollower(element, scope.prefix + element.RequiredName(), parts[1].joint,
                       {parts[0].joint, -ratio * parts[0].ratio * parts[1].ratio}, 0.0);
 }
 

@@ -219,6 +219,10 @@ std::vector<Record> ReadResults(const HistoryEntry& entry, std::vector<std::stri
   reader.Feed(ReadFile(entry.results));
   reader.End();
   if (!reader.warning().empty()) warnings->push_back(reader.warning());
+  if (records.empty()) {
+    throw ConfigError(fmt::format("{}: found no record, expected the results of commit {}",
+                                  entry.results.string(), entry.commit));
+  }
   records = LatestRecords(records);
   SortRows(&records);
   return records;

@@ -31,6 +31,7 @@ struct Sample {
   std::vector<Record> rows;
   std::vector<double> values;  // finite measures of usable runs
   std::size_t failed = 0, unmet = 0, missing = 0;
+  bool is_selected = false;  // records match, with the measure or without
 };
 
 Sample Take(const Check& check, const Selection& selection, std::span<const Record> records) {
@@ -44,6 +45,7 @@ Sample Take(const Check& check, const Selection& selection, std::span<const Reco
   std::set<std::string> kinds;  // kinds of records with the measure
   for (const Record& record : records) {
     if (!Matches(record, selection)) continue;
+    sample.is_selected = true;
     selected.push_back(&record);
     if (record.Find(measure) != nullptr) kinds.insert(record.Text("kind"));
   }
@@ -173,8 +175,10 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
       check.demand,
       fmt::format("{}{} {}", is_ratio ? "ratio of " : "", statistic, check.demand.measure), true);
   if (sample.rows.empty() || (is_ratio && base.rows.empty())) {
-    result.reason =
-        "no record of " + ToText(sample.rows.empty() ? check.select : check.relative_to);
+    const Sample& empty = sample.rows.empty() ? sample : base;
+    result.reason = "no record of " +
+                    ToText(sample.rows.empty() ? check.select : check.relative_to) +
+                    (empty.is_selected ? " has " + check.demand.measure : "");
     return result;
   }
   std::string uncertain;

@@ -91,6 +91,8 @@ Ruling CompareValues(const Pair& pair, const CompareOptions& options, Finding* f
   return base == fresh ? Ruling{} : Ruling{Judgement::kWorse, "must be equal"};
 }
 
+constexpr double kGap = 1.5;  ///< ratio that exceeds the usual noise of one machine
+
 /// Returns true if samples of at least three times are separated by the factor `gap`. Rank tests of
 /// few repetitions cannot decide among many times.
 bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh, double gap) {
@@ -132,7 +134,6 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
   const double faster = MannWhitney(base, lifted_fresh).p_greater;
   finding->p = std::min(1.0, 2.0 * std::min(slower, faster));
   finding->least_p = 2.0 * SmallestP(base.size(), fresh.size());
-  constexpr double kGap = 1.5;  // exceeds the noise of one machine
   finding->is_apart = AreApart(base, fresh, kGap * margin);
 }
 
@@ -232,6 +233,9 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
     } else if (finding.least_p * tests > options.alpha) {
       finding.judgement = Judgement::kNotMeasured;
       finding.why = fmt::format("too few repetitions to decide among {} times", times.size());
+    } else if (finding.ratio > kGap || finding.ratio < 1.0 / kGap) {
+      finding.judgement = Judgement::kNotMeasured;
+      finding.why = fmt::format("ratio {:.3g} of medians, but samples overlap", finding.ratio);
     }
   }
 }

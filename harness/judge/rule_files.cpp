@@ -198,6 +198,7 @@ struct ClaimsFile {
 };
 
 void ReadRules(const JsonNode& node, ClaimsFile& file) {
+  if (node.value().empty()) node.Fail("at least one claim");
   std::vector<std::string> ids;
   for (const JsonNode& element : node.Elements("claims")) {
     RuleInFile rule;

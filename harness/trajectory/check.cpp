@@ -247,6 +247,7 @@ class Checker {
         given_.back().push_back(PlaceOf(column, reader.columns()));
       }
     }
+    followed_.resize(user.joints.size());
     supplied_ = PlaceOf({"energy", "", "supplied", "J"}, reader.columns());
     dissipated_ = PlaceOf({"energy", "", "dissipated", "J"}, reader.columns());
     if (!check_.has_speeds) {
@@ -281,7 +282,11 @@ class Checker {
   void Add(double t, const std::vector<double>& row) {
     if (check_.rows++ == 0) check_.from = t;
     check_.to = t;
-    mechanism_.Set(t, motion_.Read(t, row));
+    for (std::size_t j = 0; j < followed_.size(); ++j) {
+      const bool is_given = given_[j].size() == 2 && given_[j][0] != kNowhere;  // and its speed
+      followed_[j] = is_given ? row[given_[j][0]] : std::numeric_limits<double>::quiet_NaN();
+    }
+    mechanism_.Set(t, motion_.Read(t, row), followed_);
     for (std::size_t j = 0; j < check_.joints.size(); ++j) AddJoint(j, t, row);
     if (check_.no_energy.empty()) {
       const Energy<double> energy = ComputeEnergy(mechanism_.kinematics());
@@ -334,6 +339,7 @@ class Checker {
   std::vector<Pair> pairs_;
   std::vector<std::size_t> motions_;             ///< columns of the mechanism's motion
   std::vector<std::vector<std::size_t>> given_;  ///< columns of joints, by the user's joint
+  std::vector<double> followed_;                 ///< given coordinates, NaN if not given
   std::size_t supplied_ = kNowhere, dissipated_ = kNowhere;
   double first_energy_ = 0.0;
   Window window_;

@@ -198,7 +198,7 @@ class RowOf final : public RowWriter {
   void Write(const RunSample& moment, std::vector<double>* row) override {
     row_ = row;
     row->assign(1, moment.t);
-    mechanism_.Set(moment.t, moment.bodies);
+    mechanism_.Set(moment.t, moment.bodies, moment.followed);
     if (output_.Has(OutputPart::kJoints)) Joints(moment);
     for (std::size_t b = 1; b < user_.bodies.size(); ++b) {
       if (output_.Has(OutputPart::kBodies)) Body(moment.bodies[b]);

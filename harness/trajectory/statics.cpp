@@ -38,7 +38,12 @@ class AtRestSearch {
                                                         Acceleration<Space, double>::Zero());
     EnterPart<Space>(compiled, 0, kinematics_, none, &sample_.bodies);
     sample_.followed.assign(held_.joints.size(), std::numeric_limits<double>::quiet_NaN());
-    user_.Set(0.0, sample_.bodies);
+    for (std::size_t j = 0; j < held_.joints.size(); ++j) {
+      const Joint<Space, double>& joint = mechanism_.joints()[j];
+      if (!joint.in_tree() || joint.kind->num_u != 1) continue;
+      sample_.followed[j] = kinematics_.JointCoordinate(static_cast<int>(j));
+    }
+    user_.Set(0.0, sample_.bodies, sample_.followed);
     applied_.assign(mechanism_.num_bodies(), Wrench<Space, double>::Zero());
     AppliedForces<Space, double>(kinematics_, applied_);
   }

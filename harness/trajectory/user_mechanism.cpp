@@ -99,7 +99,8 @@ UserMechanism<Space>::UserMechanism(const MechanismDescription& user)
 }
 
 template <class Space>
-void UserMechanism<Space>::Set(double t, std::span<const BodyMotion> bodies) {
+void UserMechanism<Space>::Set(double t, std::span<const BodyMotion> bodies,
+                               std::span<const double> followed) {
   for (const TreeStep& step : mechanism_.tree()) {
     // virtual free joint from Ground to the centre of mass
     const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
@@ -123,8 +124,12 @@ void UserMechanism<Space>::Set(double t, std::span<const BodyMotion> bodies) {
     }
   }
   kinematics_.SetTime(t);
+  for (std::size_t j = 0; j < followed.size(); ++j) {
+    if (std::isfinite(followed[j])) kinematics_.ContinueFrom(static_cast<int>(j), followed[j]);
+  }
   kinematics_.UpdatePosition(q_);
   kinematics_.UpdateVelocity(u_);
+  kinematics_.AcceptStep();
 }
 
 template <class Space>

@@ -64,8 +64,10 @@ class UserMechanism {
  public:
   explicit UserMechanism(const MechanismDescription& user);
 
-  /// Sets the state from `bodies`, indexed by the user's body, Ground included.
-  void Set(double t, std::span<const BodyMotion> bodies);
+  /// Sets the state from `bodies`, indexed by the user's body, Ground included. Angles of joints
+  /// in space, with full turns, are next to those in `followed` (by joint, NaN if unknown), or to
+  /// those of the last call, at first to the initial values.
+  void Set(double t, std::span<const BodyMotion> bodies, std::span<const double> followed = {});
 
   const Mechanism<Space, double>& mechanism() const { return mechanism_; }
   const Kinematics<Space, double>& kinematics() const { return kinematics_; }

@@ -58,6 +58,7 @@ Outcome System<Space, S>::Start(S t, const VectorX<S>& q, const VectorX<S>& u) {
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.SetTime(t);
   state_.ForgetReleased();
+  kinematics.ForgetSteps();
   kinematics.SetRegularization(kRegularization);
   state_.SetPositions(q);
   state_.SetSpeeds(u);

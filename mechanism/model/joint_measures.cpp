@@ -86,6 +86,13 @@ S Kinematics<Space, S>::CouplingSpeed(int index) const {
 }
 
 template <class Space, class S>
+void Kinematics<Space, S>::ForgetSteps() {
+  for (int j = 0; j < static_cast<int>(accepted_.size()); ++j) {
+    ContinueFrom(j, S(mechanism_->joints()[j].initial));
+  }
+}
+
+template <class Space, class S>
 void Kinematics<Space, S>::AcceptStep() {
   for (int index : mechanism_->constraints()) {
     if (mechanism_->joints()[index].kind->num_u == 1) accepted_[index] = JointCoordinate(index);
@@ -161,6 +168,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   template S Kinematics<Space, S>::JointSpeed(int) const;                                    \
   template S Kinematics<Space, S>::CouplingMismatch(int) const;                              \
   template S Kinematics<Space, S>::CouplingSpeed(int) const;                                 \
+  template void Kinematics<Space, S>::ForgetSteps();                                         \
   template void Kinematics<Space, S>::AcceptStep();                                          \
   template void Kinematics<Space, S>::CountTurns();                                          \
   template void Kinematics<Space, S>::CountTurnsLike(const Kinematics<Space, S>&);           \

@@ -68,6 +68,7 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())) {
   SetTime(S(0));
+  ForgetSteps();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     JointState<Space, S>& state = joints_[j];

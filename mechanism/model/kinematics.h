@@ -182,6 +182,13 @@ class Kinematics {
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
+  /// Continues the measured coordinate of a joint from this value, after SetTime().
+  void ContinueFrom(int joint, const S& coordinate) {
+    accepted_[joint] = coordinate;
+    if (!accepted_speeds_.empty()) accepted_speeds_[joint] = S(0);
+  }
+  /// Continues measured angles from the initial values of the mechanism, as at first.
+  void ForgetSteps();
   /// Sets the turns of measured angles so that couplings hold. Call after AcceptStep() at a start.
   void CountTurns();
   /// Continues angles from where `other` does.

@@ -95,6 +95,9 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
     const double inertia = description.joints[j].rotor_inertia;
     if (inertia > 0.0) rotors_.push_back({j, S(inertia)});
   }
+  for (const JointValues& values : description.initial.coordinates) {
+    if (values.values.size() == 1) joints_[values.joint].initial = values.values[0];
+  }
   forces_ = ForceElements<Space, S>(description);
   AddStopTimes();
   AddGeometry(description);

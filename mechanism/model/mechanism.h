@@ -36,6 +36,7 @@ struct Joint {
   int first_drive = 0, num_drives = 0;  ///< its prescribed coordinates, in Mechanism::drives()
   int num_released = 0;                 ///< directions of D that are not imposed (redundancy.h)
   Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
+  double initial = 0.0;                 ///< initial value of its only coordinate, or 0
 
   bool in_tree() const { return q_offset >= 0; }
   /// The kind's numbers, with each prescribed coordinate counted as a constraint.

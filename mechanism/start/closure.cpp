@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -16,14 +17,17 @@ constexpr double kPi = std::numbers::pi;
 constexpr int kMaxIterations = 200;
 /// Positions whose guesses are all missed by less [rad or lengths] are taken for the nearest.
 constexpr double kNear = 0.1;
-/// If the drawn position closes within the accuracy e of the input, exact closures within this
-/// times sqrt(2 e) [rad or lengths] are taken instead. A loop that opens by x^2 / 2 after a small
-/// motion x closes again within sqrt(2 e); the factor is a margin for several loops. Some rounded
-/// redundant constraints close exactly far away only, or nowhere.
+/// If the drawn position closes within the accuracy of the input, with a gap e, exact closures
+/// within this times sqrt(2 e) [rad or lengths] are taken instead. A loop that opens by x^2 / 2
+/// after a small motion x closes again within sqrt(2 e); the factor is a margin for several loops.
+/// Some rounded redundant constraints close exactly far away only, or nowhere.
 constexpr double kDrawn = 7.0;
-/// Least damping on the way to the least residual near a drawn position: motions that hardly close
-/// the loops stay small.
-constexpr double kStayDamping = 1e-3;
+/// Least damping where rounded loops close within the accuracy only. Along a free motion a gap
+/// changes by its own size, 1e-5 at most: a step moves by 1e-5^2 / kStayDamping^2 = 1e-6. Steps
+/// that reduce the residual by less than kSlow end the iteration.
+constexpr double kStayDamping = 1e-2, kSlow = 0.1;
+/// Gaps beyond the accuracy by less than this factor have a hint.
+constexpr double kHint = 100.0;
 
 /// The search ends when so many starts in a row have found nothing nearer: a branch that every
 /// fourth start leads to is missed by one search in 1e6. Positions count as nearer beyond round-off
@@ -41,6 +45,11 @@ constexpr int kPullIterations = 8, kTrialIterations = 40;
 constexpr double kLongestStep = 0.5;
 /// Weight of changes of a coordinate without a guess; of a guessed one it is 1.
 constexpr double kFree = 0.03;
+/// The last steps along the closed positions to the nearest one: their mu, their number, and the
+/// least step [rad or lengths] and decrease of the squared distance that are worth it. Where no
+/// motion is free, nothing is nearer and the position stays as it is.
+constexpr double kLastPull = 1e-3, kLeastStep = 1e-4, kLeastDecrease = 1e-6;
+constexpr int kLastSteps = 30;
 
 template <class Space>
 class Closure {
@@ -74,26 +83,27 @@ class Closure {
     if (e.size() > 0 || HasTargets()) {
       const bool is_drawn =
           IsRounded(e) && !HasTargets() && guesses_.Farthest(kinematics_) <= kNear;
+      const double near_drawn = kDrawn * std::sqrt(2.0 * e.template lpNorm<Eigen::Infinity>());
       bool closed = Close(kMaxIterations, &q, &e);
-      const double near_drawn = kDrawn * std::sqrt(2.0 * description_.accuracy);
-      if (is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > near_drawn) {
+      const bool has_left =
+          is_drawn && guesses_.Apart(q).template lpNorm<Eigen::Infinity>() > near_drawn;
+      Place(q);
+      if (has_left || (!closed && IsRounded(e))) {
         q = guess_;
         e = Residual(q);
-        closed = Close(kMaxIterations, &q, &e, kStayDamping);
+        closed = Close(kMaxIterations, &q, &e, /*stays=*/true);
+        Place(q);
       }
-      if (is_drawn && !closed) {
-        start->position_residual = InSi(e, units_.With(kinematics_, guesses_.held()));
-        start->q = q;
-        return Place(q);
-      }
+      const bool is_rounded = !closed && IsRounded(e);
       Vector nearest = q;
       if (closed) Unwind(&nearest);
       Place(nearest);
-      const bool near =
-          closed && guesses_.Farthest(kinematics_) <= (HasTargets() ? closed_ : kNear);
+      const bool near = (closed || is_rounded) &&
+                        guesses_.Farthest(kinematics_) <= (HasTargets() ? closed_ : kNear);
       const bool free = std::ranges::find(guesses_.fixed(), false) != guesses_.fixed().end();
       if (!near && free && Search(closed, &nearest)) closed = true;
-      e = Residual(closed ? q = nearest : q);
+      if ((closed || is_rounded) && free) Approach(!closed, &nearest);
+      e = Residual(closed || is_rounded ? q = nearest : q);
       const Vector row_units = units_.With(kinematics_, guesses_.held());
       if (e.size() > 0) start->position_residual = InSi(e, row_units);
       closed = closed || IsRounded(e);
@@ -102,6 +112,12 @@ class Closure {
         start->message =
             mechanism_.name() + ": " +
             DescribeConflict(description_, kinematics_, {e, row_units, false, guesses_.held()});
+        if (const double needed = AccuracyOf(e); needed < kHint * description_.accuracy) {
+          char hint[64];
+          std::snprintf(hint, sizeof hint, "; it closes with an \"accuracy\" of %.1e",
+                        1.05 * needed);
+          start->message += hint;
+        }
       }
     }
     start->q = q;
@@ -115,9 +131,11 @@ class Closure {
     });
   }
 
-  /// Returns true if a residual is within the accuracy of the input: in rad, or relative to the
-  /// sizes of the bodies that close the loops.
-  bool IsRounded(const Vector& e) const {
+  bool IsRounded(const Vector& e) const { return AccuracyOf(e) <= description_.accuracy; }
+
+  /// Returns the accuracy of the input within which a residual is closed: in rad, or relative to
+  /// the sizes of the bodies that close the loops.
+  double AccuracyOf(const Vector& e) const {
     Vector most = Vector::Zero(e.size());
     for (int index : mechanism_.constraints()) {
       const Joint<Space, double>& joint = mechanism_.joints()[index];
@@ -130,7 +148,7 @@ class Closure {
       }
     }
     most.segment(mechanism_.num_rows(), mechanism_.couplings().size()).setOnes();
-    return (e.cwiseAbs().array() <= closed_ + description_.accuracy * most.array()).all();
+    return e.size() == 0 ? 0.0 : ((e.cwiseAbs().array() - closed_) / most.array()).maxCoeff();
   }
 
   /// Sizes of bodies: twice the largest distance of a joint from the middle of the body's joints.
@@ -198,7 +216,8 @@ class Closure {
   }
 
   /// Levenberg-Marquardt from q, with the residual e, to a closed position: whether it gets there.
-  bool Close(int iterations, Vector* q, Vector* e, double least_damping = 1e-16) {
+  /// `stays`: or to one that closes within the accuracy, without moving along free motions.
+  bool Close(int iterations, Vector* q, Vector* e, bool stays = false) {
     double damping = 1e-3;
     const VectorX<double> row_units = units_.With(kinematics_, guesses_.held());
     // where every coordinate is prescribed there is nothing to move
@@ -208,18 +227,19 @@ class Closure {
       Place(*q);
       LeastSquares steps =
           Solver(LoopRows(kinematics_, units_, row_units, guesses_.held(), guesses_.fixed()));
-      bool improved = false;
+      bool improved = false, is_slow = false;
       for (; damping < 1e8 && !improved; damping *= 10) {
         const Vector trial = Move(*q, -steps.Damped(*e, damping));
         const Vector e_trial = Residual(trial);
         if (!(e_trial.norm() < e->norm())) continue;
+        is_slow = stays && e_trial.norm() > (1.0 - kSlow) * e->norm() && IsRounded(e_trial);
         improved = true;
         *q = trial;
         *e = e_trial;
         damping *= 1e-3;  // the loop's own step multiplies by ten
       }
-      if (!improved) break;
-      damping = std::max(damping, least_damping);
+      if (!improved || is_slow) break;
+      damping = std::max(damping, stays ? kStayDamping : 1e-16);
     }
     return e->template lpNorm<Eigen::Infinity>() <= closed_;
   }
@@ -281,6 +301,30 @@ class Closure {
         }
         if (value > 0.99 * before) break;
       }
+    }
+  }
+
+  /// Moves a closed position along the closed positions to the nearest one. `stays`: of those that
+  /// close within the accuracy.
+  void Approach(bool stays, Vector* q) {
+    searching_ = true;
+    work_ = 0.0;
+    double distance = Distance(*q);
+    for (int i = 0; i < kLastSteps && work_ < kMaxWork; ++i) {
+      const Vector d = PullStep(*q, kLastPull);
+      if (i == 0 && work_ > 0.1 * kMaxWork) return;  // closing again takes ten times the work
+      if (!(d.template lpNorm<Eigen::Infinity>() > kLeastStep)) return;
+      bool is_nearer = false;
+      for (double part = 1.0; part > 1e-2 && !is_nearer && work_ < kMaxWork; part *= 0.5) {
+        Vector trial = Move(*q, part * d), e = Residual(trial);
+        if (!Close(kTrialIterations, &trial, &e, stays) && !(stays && IsRounded(e))) continue;
+        const double next = Distance(trial);
+        is_nearer = next < (1.0 - kLeastDecrease) * distance;
+        if (!is_nearer) continue;
+        *q = trial;
+        distance = next;
+      }
+      if (!is_nearer) return;
     }
   }
 

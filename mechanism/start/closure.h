@@ -9,8 +9,9 @@
 //   |e(q)|^2 + mu^2 |w (q - guess)|^2    over the guessed coordinates, for mu falling to 1e-2
 //
 // so that guesses are kept first, coordinates without a guess adapt to them, and guesses change
-// last. The start is the closed position nearest to the guesses. Angles lie within half a turn of
-// their guesses, since whole turns change no pose.
+// last. From the position that is found, further steps of this kind with closed loops lead to the
+// nearest one: the start is the closed position nearest to the guesses. Angles lie within half a
+// turn of their guesses, since whole turns change no pose.
 #pragma once
 
 #include "mechanism/start/assembly.h"

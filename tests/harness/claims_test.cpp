@@ -241,6 +241,10 @@ TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {
       markdown, "**Verdict: partially reproduced: square problem. Not measured: general problem"));
 }
 
+TEST(ClaimsReader, NoClaimsAreAMistake) {
+  EXPECT_THROW(ParseClaims(R"({"claims": []})", "rules.json"), ConfigError);
+}
+
 TEST(ClaimsReader, MistakesAreReportedTogetherWithTheirPlaces) {
   const std::string text = R"({"claims": [{"id": "a", "claim": "c", "where": "w", "checks": [
     {"label": "x", "select": {"rtol": [1e-6, {}]}, "measure": "m", "statistic": "maximum",

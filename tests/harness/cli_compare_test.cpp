@@ -64,6 +64,9 @@ TEST_F(ComparisonCommands, APathIsNotComparedWithItself) {
   }
   fs::copy(folder_ / "out", folder_ / "copy", fs::copy_options::recursive);
   Expect("compare out copy", 0, {"NO CHANGE"});
+  Expect("compare out copy --markdown both --junit both", 2, {"found \"both\" twice"});
+  EXPECT_FALSE(fs::exists(folder_ / "both"));
+  Expect("table out --out ''", 2, {"found an empty name, expected a file or folder"});
 }
 
 // Files of Google Benchmark name a machine only where the program wrote it.

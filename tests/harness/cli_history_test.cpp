@@ -62,6 +62,10 @@ TEST_F(CommandLineHistory, OfAFolder) {
   ExpectEnding(Call("history report --store past --title '<b>'"), 0, {"past/history.html"});
   EXPECT_NE(ReadFile(folder_ / "past/history.html").find("&lt;b&gt;"), std::string::npos);
   ExpectEnding(Call("history show"), 2, {"--store"});
+  for (const fs::directory_entry& file : fs::directory_iterator(folder_ / "past/results")) {
+    fs::resize_file(file.path(), 0);
+  }
+  ExpectEnding(Call("history report --store past"), 2, {"past/results/", "found no record"});
 }
 
 TEST_F(CommandLineHistory, OfABranchAndAsABase) {

@@ -183,6 +183,15 @@ TEST(ImportMjcf, JointsWithinFramesStandAndTurnWithThem) {
            -Eigen::Vector3d::UnitX());
   EXPECT_EQ(joint(turned + "<joint type=\"ball\" pos=\"0 0 3\"/></frame>").to.position,
             Eigen::Vector3d(1, 2, 3));
+  // and so does <inertial>
+  const Imported heavy = ImportText(
+      "<mujoco><worldbody><body><joint/>" + turned +
+          R"(<inertial pos="0 1 0" mass="7" diaginertia="1 2 3"/></frame></body></worldbody>)"
+          "</mujoco>",
+      "file.xml");
+  EXPECT_EQ(heavy.description.bodies[1].mass, 7.0);
+  EXPECT_LE((heavy.description.bodies[1].com - Eigen::Vector3d(0, 2, 0)).norm(), kEps);
+  EXPECT_NEAR(heavy.description.bodies[1].inertia(0, 0), 2.0, 10 * kEps);
   // a free joint is that of the body, wherever it stands in the file
   const Imported free = Read(turned + "<freejoint/></frame>", "", "", "pos=\"4 5 6\"");
   EXPECT_EQ(free.description.joints[0].to.position, Eigen::Vector3d::Zero());

@@ -96,6 +96,27 @@ TEST(ImportMjcf, TendonsBetweenTwoSitesAreSpringsOrRods) {
   ExpectNote(wrapped, "<spatial name=\"t\">", "only spatial tendons straight");
 }
 
+TEST(ImportMjcf, FixedTendonsOfConstantLengthAreCouplings) {
+  const std::string model =
+      R"(<mujoco><worldbody><body><joint name="j"/><inertial pos="0 0 0" mass="1"
+      diaginertia="1 1 1"/></body><body><joint name="k"/><inertial pos="0 0 0" mass="1"
+      diaginertia="1 1 1"/></body><body><joint name="l"/><inertial pos="0 0 0" mass="1"
+      diaginertia="1 1 1"/></body></worldbody><tendon><fixed name="t"><joint joint="j" coef="1"/>
+      <joint joint="k" coef="2"/><joint joint="l" coef="-3"/></fixed></tendon>)";
+  const Imported held = ImportText(
+      model + R"(<equality><tendon tendon1="t" polycoef="0.5"/></equality></mujoco>)", "file.xml");
+  ASSERT_EQ(held.description.couplings.size(), 1u);
+  const CouplingDescription& coupling = held.description.couplings[0];
+  EXPECT_EQ(coupling.name, "t");
+  EXPECT_EQ(coupling.offset, 0.5);
+  ASSERT_EQ(coupling.parts.size(), 3u);
+  EXPECT_EQ(coupling.parts[1].joint, 1);
+  EXPECT_EQ(coupling.parts[2].ratio, -3.0);
+  const Imported alone = ImportText(model + "</mujoco>", "file.xml");
+  EXPECT_TRUE(alone.description.couplings.empty());
+  ExpectNote(alone, "<fixed name=\"t\">", "only spatial tendons straight");
+}
+
 TEST(ImportMjcf, CoordinatesThatStayAreImposedExactlyToo) {
   const Imported held = Two("<equality><joint name=\"e\" joint1=\"j\"/></equality>");
   ExpectNote(held, "<joint name=\"e\">", "imposed exactly");

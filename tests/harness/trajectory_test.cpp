@@ -419,6 +419,10 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
     write(5, "", 0);
     ExpectEnding(Call(command), 2, {"theirs.csv: found no row"});
   }
+  write(1, "nan");
+  ExpectEnding(Call("trajectory ours.csv --compare-with theirs.csv"), 2,
+               {"theirs.csv: found nan in", "as in ours.csv"});
+  ExpectEnding(Call("trajectory theirs.csv --compare-with theirs.csv"), 2, {"found nan in"});
   // numbers whose energy is none
   write(1, "1e300");
   ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not known"});

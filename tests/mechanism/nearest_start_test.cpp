@@ -50,6 +50,43 @@ std::vector<Eigen::Vector2d> RockerPositions(double crank) {
   return positions;
 }
 
+/// A closed chain of five bars with two free motions. Its start is a stationary point of the
+/// squared distance from the guesses along both.
+TEST(NearestStart, IsStationaryAlongFreeMotions) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), x = Eigen::Vector3d::UnitX();
+  const double lengths[] = {1.0, 1.4, 0.8, 1.2};
+  MechanismDescription d;
+  d.name = "chain";
+  for (const double length : lengths) {
+    d.bodies.push_back(Bar("bar" + std::to_string(d.bodies.size()), 1.0, 1.0, length));
+  }
+  for (int i = 0; i < 4; ++i) {
+    d.joints.push_back(Revolute("J" + std::to_string(i), i,
+                                i == 0 ? origin : Eigen::Vector3d(lengths[i - 1] * x), i + 1,
+                                origin));
+  }
+  d.joints.push_back(Revolute("end", 4, lengths[3] * x, 0, 1.5 * x));
+  const Eigen::Vector4d guess(1.2, -0.5, -1.3, -0.2);  // missed by 0.1 to 0.3 rad
+  for (int i = 0; i < 4; ++i) d.initial.coordinates.push_back({i, {guess[i]}});
+  const Joints mechanism(d, Coordinates::kJoint);
+  const Start<double> start = Assemble<Planar>(d, mechanism);
+  ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+  // rows of the closure: derivatives of the end's place by each angle
+  Eigen::Matrix<double, 2, 4> J = Eigen::Matrix<double, 2, 4>::Zero();
+  double angle = 0.0;
+  for (int bar = 0; bar < 4; ++bar) {
+    angle += start.q[bar];
+    for (int i = 0; i <= bar; ++i) {
+      J.col(i) += lengths[bar] * Eigen::Vector2d(-std::sin(angle), std::cos(angle));
+    }
+  }
+  const Eigen::Vector4d apart = start.q - guess;
+  const Eigen::Vector4d free = apart - J.transpose() * (J * J.transpose()).ldlt().solve(J * apart);
+  // The last steps end where they gain less than a share of 1e-6.
+  EXPECT_GT(apart.norm(), 0.05);
+  EXPECT_LT(free.norm(), 1e-2 * apart.norm());
+}
+
 double ModuloTurn(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
 
 /// Angles A and C of a start of the rocker.

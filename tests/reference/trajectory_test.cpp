@@ -189,6 +189,41 @@ TEST(Trajectory, ErrorOfDenseOutputIsOfOrderSix) {
   EXPECT_NEAR(errors[1] / errors[2], 64, 12);
 }
 
+/// In space a pose gives an angle within half a turn only; springs and torques follow full turns.
+TEST(Trajectory, ForcesInSpaceFollowFullTurns) {
+  const MechanismFile mechanism = ParseMechanism(R"({
+    "name": "wound", "space": "spatial", "gravity": [0, 0, 0],
+    "bodies": [{"name": "arm", "mass": 1.0, "inertia": 0.1, "com": [0.5, 0, 0]}],
+    "joints": [{"name": "A", "type": "revolute", "from": {"body": "ground"},
+                "to": {"body": "arm"}}],
+    "forces": [{"type": "joint_spring", "joint": "A", "stiffness": 0.1, "rest": 0.0},
+               {"type": "joint_torque", "joint": "A", "value": 0.2}],
+    "initial": {"coordinates": {"A": 4.0}, "speeds": {"A": 3.0}, "fixed": ["A"]}
+  })",
+                                                 "wound.json");
+  constexpr double kTolerance = 1e-9;
+  CompileOptions spatial;
+  spatial.planar = false;
+  for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    Method method = kOdcaJoint;
+    method.coordinates = set;
+    // the rows are up to 3 rad apart
+    const Written run =
+        WriteTrajectory(mechanism, method, "ode45", kTolerance, 2.0, Rows(3), spatial);
+    const double first = run.At(0, "energy", "", "kinetic") + run.At(0, "energy", "", "potential");
+    for (std::size_t row = 0; row < run.rows.rows(); ++row) {
+      const double angle = run.At(row, "joint", "A", "angle");
+      const double energy =
+          run.At(row, "energy", "", "kinetic") + run.At(row, "energy", "", "potential");
+      const double bound = 100.0 * BoundOf(run, kTolerance);
+      EXPECT_NEAR(energy, first, bound);
+      EXPECT_NEAR(run.At(row, "energy", "", "potential"), 0.05 * angle * angle - 0.2 * angle,
+                  bound);
+    }
+    EXPECT_GT(run.At(run.rows.rows() - 1, "joint", "A", "angle"), 2.0 * kPi);
+  }
+}
+
 TEST(Trajectory, LeavesTheRunAsItIs) {
   // the parallelogram passes singular positions, near which rows see regularized constraints too
   for (const char* name : {"four-bar", "parallelogram", "driven-four-bar", "bennett"}) {

@@ -245,8 +245,20 @@ TEST(Compare, CatchesSlowerTimesBeyondTwoPercentOnly) {
   std::vector<Record> base = Sound(), fresh = Sound();
   base[0].Set("series.rhs_ns", Times(500.0, 8, 500));
   fresh[0].Set("series.rhs_ns", Times(505.0, 9, 500));
+  EXPECT_EQ(Compare(base, fresh, {}).Count(Judgement::kWorse), 0);
+}
+
+/// A busy machine: half of the samples take nine times as long, in NEW all three times as long.
+TEST(Compare, OverlappingSamplesOfDistantMediansAreNotTheSame) {
+  std::vector<Record> base = Sound(), fresh = Sound();
+  std::vector<double> times;
+  for (int i = 0; i < 15; ++i) times.push_back(i < 8 ? 750.0 + i : 6600.0 + i);
+  base[0].Set("series.rhs_ns", times);
+  for (double& time : times) time *= 3.0;
+  fresh[0].Set("series.rhs_ns", times);
   const Finding overlap = Only(Compare(base, fresh, {}), Judgement::kNotMeasured);
   EXPECT_EQ(overlap.measure.key, "series.rhs_ns");
+  EXPECT_EQ(overlap.why, "ratio 3 of medians, but samples overlap");
 }
 
 TEST(Compare, SaysWhenSamplesAreTooSmall) {

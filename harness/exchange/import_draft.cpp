@@ -199,10 +199,12 @@ void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name
   };
   if (!std::ranges::all_of(parts, has_coordinate)) return Note(element, kNotCoupled, true);
   std::erase_if(parts, [](const CouplingDescription::Part& part) { return part.ratio == 0.0; });
-  if (parts.size() == 1) {
+  if (parts.empty()) {
+    Note(element, "dropped: all coefficients are 0", offset != 0.0);
+  } else if (parts.size() == 1) {
     const auto [joint, ratio] = parts.front();
     description.joints[joint].motions = {{0, Polynomial{{offset / ratio}}}};
-  } else if (!parts.empty()) {
+  } else {
     description.couplings.push_back({joints_.Take(name), std::move(parts), offset});
   }
 }

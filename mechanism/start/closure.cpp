@@ -310,6 +310,7 @@ class Closure {
     searching_ = true;
     work_ = 0.0;
     double distance = Distance(*q);
+    if (!(distance > kLeastStep * kLeastStep)) return;
     for (int i = 0; i < kLastSteps && work_ < kMaxWork; ++i) {
       const Vector d = PullStep(*q, kLastPull);
       if (i == 0 && work_ > 0.1 * kMaxWork) return;  // closing again takes ten times the work

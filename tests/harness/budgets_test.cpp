@@ -40,7 +40,7 @@ constexpr Budget kBudgets[] = {
     {"mechanism/description",   { 2109,  28,   1},  1750},
     {"mechanism/model",         { 3070,  22,   2},  2300},
     {"mechanism/loops",         { 3170,  23,   2},  1900},
-    {"mechanism/start",         { 2143,  18,   4},   700},
+    {"mechanism/start",         { 2144,  18,   4},   700},
     {"mechanism/formulation",   { 2625,  23,   4},  1500},
     {"mechanism/simplify",      { 3289,  25,   5},  2600},
     {"odca",                    { 6998,  38,   5},  3900},
@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3685,  18,   6},  2700},
     {"harness/figures",         { 3045,  12,   7},  1900},
     {"harness/view",            { 2376,   7,   8},  2050},
-    {"harness/exchange",        { 9168,  36,  10},  5000},
+    {"harness/exchange",        { 9170,  36,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
-    {"harness/cli",             { 8421,  26,  29},  3600},
+    {"harness/cli",             { 8412,  26,  29},  3600},
     {"peers",                   {  718,  12,   5},   650},
-    {"",                        {92323, 507, 242}, 62000}
+    {"",                        {92317, 507, 242}, 62000}
 };
 // clang-format on
 

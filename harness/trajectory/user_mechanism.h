@@ -65,8 +65,8 @@ class UserMechanism {
   explicit UserMechanism(const MechanismDescription& user);
 
   /// Sets the state from `bodies`, indexed by the user's body, Ground included. Angles of joints
-  /// in space, with full turns, are next to those in `followed` (by joint, NaN if unknown), or to
-  /// those of the last call, at first to the initial values.
+  /// in space include full turns. They continue from `followed` (by joint, NaN if unknown),
+  /// otherwise from the last call, at first from the initial values.
   void Set(double t, std::span<const BodyMotion> bodies, std::span<const double> followed = {});
 
   const Mechanism<Space, double>& mechanism() const { return mechanism_; }

@@ -229,7 +229,7 @@ bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
   }
   FactorInPlace(C_);
   if (mechanism_->is_redundant()) Turn(kinematics);
-  // Rows within the accuracy: errors of speeds grow as T^2, those of accelerations as T^3.
+  // Rows within the accuracy: speeds err by T^2, accelerations by T^3 times the rounding.
   const S most = mechanism_->is_redundant() ? S(10) : S(2);
   return T_.size() == 0 || (pivot >= S(1e-4) && T_.cwiseAbs().maxCoeff() <= most);
 }

@@ -107,9 +107,10 @@ class Maker {
     // if directions are no axes of F, all of them are imposed
     const JointKind<Space, double>& kind = KindOf<Space, double>(type);
     if (!joint.in_tree() && joint.num_released > 0 && kind.basis == nullptr) {
-      const std::vector<int>& released = description_.joints[joint.description].released;
+      const JointDescription& described = description_.joints[joint.description];
+      const Released out{joint.description, described.released, described.moving};
       for (int i = 0; i < kind.num_constraints(); ++i) {
-        if (std::ranges::find(released, i) != released.end()) continue;
+        if (!out.Imposes(i)) continue;
         made.imposed.push_back(kind.axes[kind.num_u + i]);
       }
     }

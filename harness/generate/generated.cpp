@@ -174,6 +174,8 @@ void GeneratedDerivative<Space>::FindMode() {
     choices_.push_back(released.joint);
     choices_.insert(choices_.end(), released.directions.begin(), released.directions.end());
     choices_.push_back(-1);
+    choices_.insert(choices_.end(), released.moving.begin(), released.moving.end());
+    choices_.push_back(-1);
   }
   system_.solver().AppendMode(choices_);
   const BaumgarteGains& gains = system_.level().gains();

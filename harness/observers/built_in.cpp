@@ -28,7 +28,8 @@ class JointView {
     const bool same = !with_released || mechanism.released().empty();
     if (mechanism.coordinates() == Coordinates::kJoint && same) return;
     own_ = std::make_unique<Mechanism<Space, double>>(
-        with_released ? Unreleased(description) : description, Coordinates::kJoint);
+        with_released && !description.rounded ? Unreleased(description) : description,
+        Coordinates::kJoint);
     mechanism_ = own_.get();
     kinematics_ = std::make_unique<Kinematics<Space, double>>(*own_);
   }
@@ -118,7 +119,7 @@ struct DriftObserver<Space>::Rest {
     for (int index : view.mechanism().constraints()) {
       loop_names.emplace_back(index, view.mechanism().joint_names()[index]);
     }
-    coupling_max.assign(mechanism.couplings().size(), 0.0);
+    coupling_max.assign(mechanism.num_coordinate_couplings(), 0.0);
   }
 
   TreeDynamics<Space, double> dynamics;
@@ -147,7 +148,7 @@ void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
   for (int index : kinematics.mechanism().constraints()) now.Add(kinematics, index);
   const std::string* worst =
       now.joint < 0 ? nullptr : &kinematics.mechanism().joint_names()[now.joint];
-  for (int c = 0; c < std::ssize(kinematics.mechanism().couplings()); ++c) {
+  for (int c = 0; c < kinematics.mechanism().num_coordinate_couplings(); ++c) {
     const double by = ShiftOf(kinematics, c, kinematics.CouplingMismatch(c), &now.rotation);
     if (rest_ != nullptr) Keep(&rest_->coupling_max[c], by);
     if (by <= now.shift) continue;
@@ -175,7 +176,7 @@ void DriftObserver<Space>::ObserveRest(const Sample<Space>& sample) {
     Keep(&rest.acceleration,
          shift_of(RelativeAcceleration<Space, double>(kinematics, index, rest.A)));
   }
-  for (int c = 0; c < std::ssize(kinematics.mechanism().couplings()); ++c) {
+  for (int c = 0; c < kinematics.mechanism().num_coordinate_couplings(); ++c) {
     double rotation = 0.0;
     Keep(&rest.velocity, ShiftOf(kinematics, c, kinematics.CouplingSpeed(c), &rotation));
     const double acceleration =

@@ -182,10 +182,12 @@ std::string Validate(const MechanismDescription& description) {
 }
 
 MechanismDescription Unreleased(const MechanismDescription& description) {
-  if (description.rounded) return description;
   MechanismDescription result = description;
   for (JointDescription& joint : result.joints) {
-    joint.released.clear();
+    std::erase_if(joint.released, [&](int direction) {
+      return !description.rounded || std::ranges::binary_search(joint.moving, direction);
+    });
+    joint.moving.clear();
   }
   return result;
 }

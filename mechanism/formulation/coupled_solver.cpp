@@ -203,7 +203,7 @@ std::string CoupledSolver<Space, S>::WhySingular() const {
   if (!why.empty()) return why;
   std::string names;
   for (std::size_t i = static_cast<std::size_t>(rank_); i < order_.size(); ++i) {
-    if (order_[i] >= num_couplings_) continue;
+    if (order_[i] >= mechanism_.num_coordinate_couplings()) continue;
     names += (names.empty() ? "\"" : ", \"") +
              mechanism_.couplings()[static_cast<std::size_t>(order_[i])].name + '"';
   }

@@ -79,7 +79,7 @@ bool Drives<Space, S>::Followed(const Kinematics<Space, S>& kinematics, const Ve
     worst_ = max(worst_, missed_[index]);
   }
   for (int c = 0; c < static_cast<int>(mechanism.couplings().size()); ++c) {
-    const int first = mechanism.couplings()[c].parts.front().joint, row = mechanism.num_rows() + c;
+    const int first = kinematics.FirstOf(c).joint, row = mechanism.num_rows() + c;
     S left = CouplingAcceleration<Space, S>(kinematics, c, &udot, A_);
     if (feedback.size() > row) left += feedback[row];
     missed_[first] = max(missed_[first], SizeOfCoupling(kinematics, c, left));

@@ -1,9 +1,9 @@
 // Chooses rows that differ from each other as much as they can: Gram-Schmidt with pivoting, under
-// quotas of joints. Dense; for analyses.
+// quotas of joints, then as moving rows (mechanism.h) without quotas. Dense; for analyses.
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
+#include <limits>
 #include <vector>
 
 #include "mechanism/model/mechanism.h"
@@ -19,26 +19,27 @@ struct Quota {
 
 class RowChoice {
  public:
-  RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas);
+  /// Takes all rows of joints that keep all and prescribed ones, the best others until all quotas
+  /// are full, then the best of all until `total` are taken.
+  RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int total);
 
-  /// Takes one row of a joint (index into the quotas).
-  void Take(std::size_t joint, int row);
-  /// Takes rows without a choice: rows of joints that keep all, and prescribed ones.
-  void TakeFixed();
-  /// More rows by pivoting, of those `allowed`, until `total` are taken. The least norm that a row
-  /// had left when it was taken.
-  double TakeBest(int total, const std::function<bool(int row)>& allowed);
-
-  const std::vector<bool>& taken() const { return is_taken_; }
-  /// Returns the rows not taken, as directions of `joints` (one per quota).
-  std::vector<Released> NotTaken(const std::vector<int>& joints) const;
+  /// The least norm that a row had left when it was taken.
+  double least() const { return least_; }
+  /// Returns the rows beyond the quotas as directions of `joints` (one per quota).
+  std::vector<Released> BeyondQuotas(const std::vector<int>& joints) const;
 
  private:
+  /// Takes one row of a joint (index into the quotas).
+  void Take(std::size_t joint, int row);
+  /// More rows by pivoting until `total` are taken.
+  void TakeBest(int total);
+
   Eigen::MatrixXd left_;  ///< rows less their parts along those taken
   std::vector<Quota> quotas_;
-  std::vector<bool> is_taken_;
+  std::vector<bool> is_taken_, is_in_quota_;
   std::vector<int> taken_;  ///< by joint
   int num_taken_ = 0;
+  double least_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace loopbench

@@ -67,10 +67,12 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
   y_ = x_;
   missed_.setZero(d_);
   along_ = missed_;
-  feedback_.setZero(mechanism.num_rows());
+  feedback_.setZero(mechanism.num_moving_rows() > 0 ? mechanism.num_equations()
+                                                    : mechanism.num_rows());
   share_ = feedback_;
   if (D_ == 0) force_.setZero(mechanism.num_u());
-  is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0;
+  is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0 &&
+              mechanism.num_moving_rows() == 0;
 }
 
 /// In joint coordinates the forest is the tree of the mechanism, in absolute ones a forest of
@@ -120,7 +122,7 @@ void SelfStress<Space, S>::Span() {
     if (spans[j]) continue;
     loops_.push_back({.joint = j,
                       .imposed = r_,
-                      .released = d_,
+                      .rows_released = std::vector<int>(joints[j].num_released),
                       .num_u = joints[j].num_u(),
                       .num_imposed = joints[j].num_constraints(),
                       .num_released = joints[j].num_released,
@@ -131,7 +133,22 @@ void SelfStress<Space, S>::Span() {
     r_ += joints[j].num_constraints();
     d_ += joints[j].num_released;
   }
-  for (Loop& loop : loops_) loop.released += r_;
+  r_ += mechanism_->num_moving_rows();
+  d_ -= mechanism_->num_moving_rows();
+  Arrange(mechanism_->released());
+}
+
+template <class Space, class S>
+void SelfStress<Space, S>::Arrange(const std::vector<Released>& released) {
+  arranged_ = released;
+  rows_.setZero();  // other columns may belong to a moving row
+  int next_moving = r_ - mechanism_->num_moving_rows(), next = r_;
+  for (const Released& out : released) {
+    Loop& loop = *std::ranges::find(loops_, out.joint, &Loop::joint);
+    for (std::size_t q = 0; q < out.directions.size(); ++q) {
+      loop.rows_released[q] = out.IsMoving(out.directions[q]) ? next_moving++ : next++;
+    }
+  }
 }
 
 template <class Space, class S>
@@ -214,6 +231,7 @@ S SelfStress<Space, S>::FactorRows() {
 
 template <class Space, class S>
 bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
+  if (kinematics.released() != arranged_) Arrange(kinematics.released());
   for (Loop& loop : loops_) FillRows(kinematics, loop);
   const S pivot = r_ > 0 ? FactorRows() : S(1);
   for (int q = 0; q < d_ && D_ > 0; ++q) {
@@ -247,17 +265,16 @@ std::vector<Released> SelfStress<Space, S>::Choose(const Kinematics<Space, S>& k
       rows.row(next++) = rows_.col(loop.row(k)).transpose().template cast<double>();
     }
   }
-  RowChoice choice(rows, quotas);
-  choice.TakeFixed();
-  choice.TakeBest(r_, [](int) { return true; });
-  std::vector<Released> released = choice.NotTaken(joints);
+  std::vector<Released> released = RowChoice(rows, quotas, r_).BeyondQuotas(joints);
   // rows count imposed directions first
   for (Released& out : released) {
     const int drives = mechanism_->joints()[out.joint].num_drives;
-    for (int& direction : out.directions) {
-      direction = kinematics.DirectionOf(out.joint, drives + direction);
+    for (std::vector<int>* directions : {&out.directions, &out.moving}) {
+      for (int& direction : *directions) {
+        direction = kinematics.DirectionOf(out.joint, drives + direction);
+      }
+      std::ranges::sort(*directions);
     }
-    std::ranges::sort(out.directions);
   }
   return released;
 }
@@ -390,7 +407,8 @@ const VectorX<S>& SelfStress<Space, S>::ShareOfSpeeds(const Kinematics<Space, S>
   for (const Loop& loop : loops_) {
     const Velocity<Space, S>& V = kinematics.joints()[loop.joint].V_rel;
     for (int q = 0; q < loop.num_released; ++q) {
-      const int row = loop.released + q;
+      const int row = loop.rows_released[q];
+      if (row < r_) continue;
       missed_[row - r_] = row_scale_[row] * loop.basis[loop.num_u + loop.num_imposed + q].dot(V);
     }
   }
@@ -404,7 +422,8 @@ const VectorX<S>& SelfStress<Space, S>::ShareOfAccelerations(
     if (loop.num_released == 0) continue;
     const Components<Space, S> left = JointAcceleration<Space, S>(kinematics, loop.joint, A);
     for (int q = 0; q < loop.num_released; ++q) {
-      const int row = loop.released + q;
+      const int row = loop.rows_released[q];
+      if (row < r_) continue;
       missed_[row - r_] = row_scale_[row] * left[loop.num_imposed + q] + z_c_[row];
     }
   }
@@ -420,10 +439,14 @@ const VectorX<S>& SelfStress<Space, S>::ForceOfStress(const VectorX<S>& lambda) 
       const int row = loop.imposed + k;
       e_c_[row] = lambda[mechanism_->joints()[loop.joint].row + k] / row_scale_[row];
       if (k < loop.num_drives) continue;
-      for (int q = loop.released; q < loop.released + loop.num_released; ++q) {
-        e_c_[q] += T_(row, q - r_) * e_c_[row];
+      for (const int q : loop.rows_released) {
+        if (q >= r_) e_c_[q] += T_(row, q - r_) * e_c_[row];
       }
     }
+  }
+  for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
+    const int row = r_ - mechanism_->num_moving_rows() + i;
+    e_c_[row] = lambda[FirstMovingEquation() + i] / row_scale_[row];
   }
   ProjectOnStress(e_t_, e_c_);
   force_.setZero();
@@ -439,8 +462,8 @@ const VectorX<S>& SelfStress<Space, S>::Share() {
   e_c_.head(r_).setZero();
   for (const Loop& loop : loops_) {
     for (int k = loop.num_drives; k < loop.num_imposed; ++k) {
-      for (int q = loop.released; q < loop.released + loop.num_released; ++q) {
-        e_c_[loop.imposed + k] -= T_(loop.imposed + k, q - r_) * e_c_[q];
+      for (const int q : loop.rows_released) {
+        if (q >= r_) e_c_[loop.imposed + k] -= T_(loop.imposed + k, q - r_) * e_c_[q];
       }
     }
   }
@@ -457,12 +480,15 @@ void SelfStress<Space, S>::ToRows(const VectorX<S>& forest, const VectorX<S>& lo
     for (int k = 0; k < loop.num_imposed; ++k) {
       const int row = loop.imposed + k;
       S sum = loops[row];
-      for (int q = loop.released; k >= loop.num_drives && q < loop.released + loop.num_released;
-           ++q) {
-        sum += T_(row, q - r_) * loops[q];
+      for (const int q : loop.rows_released) {
+        if (k >= loop.num_drives && q >= r_) sum += T_(row, q - r_) * loops[q];
       }
       rows[mechanism_->joints()[loop.joint].row + k] = sum / row_scale_[row];
     }
+  }
+  for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
+    const int row = r_ - mechanism_->num_moving_rows() + i;
+    rows[FirstMovingEquation() + i] = loops[row] / row_scale_[row];
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];

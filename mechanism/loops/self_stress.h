@@ -21,6 +21,7 @@
 //
 // D are the directions constrained by joints of the forest; joint coordinates have none. Each joint
 // imposes its part of U: direction k becomes D_k + sum_q T_kq D_q over its released directions q.
+// A moving row (mechanism.h) is one more row of U, imposed as it is.
 // For one loop in joint coordinates this is complete, and solvers solve (1). Otherwise a solution
 // x0 violates c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong to one
 // joint, and rho must lie along W. The solution is x0 + y with U_b^T J y = U_b^T W W^T rho.
@@ -64,8 +65,10 @@ class SelfStress {
       for (int k = loop.num_drives; k < loop.num_imposed; ++k) {
         Basis<Space, Any>& basis = kinematics.basis(loop.joint);
         for (int q = 0; q < loop.num_released; ++q) {
-          const S share = T_(loop.imposed + k, loop.released - r_ + q) *
-                          row_scale_[loop.released + q] / row_scale_[loop.imposed + k];
+          const int row = loop.rows_released[q];
+          if (row < r_) continue;
+          const S share =
+              T_(loop.imposed + k, row - r_) * row_scale_[row] / row_scale_[loop.imposed + k];
           basis[loop.num_u + k] += basis[loop.num_u + loop.num_imposed + q] * Any(share);
         }
       }
@@ -100,19 +103,25 @@ class SelfStress {
     S sign = S(1);
     Linear<Space, S> arm, arm_rate;  ///< from it to the point of the loop's joint
   };
-  /// A joint that closes a loop. Rows of loops are imposed ones, then released ones.
+  /// A joint that closes a loop. Rows of loops are imposed ones, moving ones, then released ones.
   struct Loop {
-    int joint = 0, imposed = 0, released = 0;  ///< first rows
+    int joint = 0, imposed = 0;      ///< first row
+    std::vector<int> rows_released;  ///< of its released directions: moving or not imposed
     int num_u = 0, num_imposed = 0, num_released = 0, num_drives = 0;
     std::vector<Link> links;
     Basis<Space, S> basis, rate;  ///< as UpdatePosition() has it
 
     int row(int direction) const {
-      return direction < num_imposed ? imposed + direction : released + direction - num_imposed;
+      return direction < num_imposed ? imposed + direction : rows_released[direction - num_imposed];
     }
     int directions() const { return num_imposed + num_released; }
   };
+  int FirstMovingEquation() const {
+    return mechanism_->num_rows() + mechanism_->num_coordinate_couplings();
+  }
   void Span();
+  /// Sets the rows of released directions.
+  void Arrange(const std::vector<Released>& released);
   std::vector<Link> LinksOf(int joint) const;
   /// Column of J for column i of a joint's [H D].
   int ColumnOf(const Edge& edge, int i) const {
@@ -143,7 +152,8 @@ class SelfStress {
   std::vector<int> forest_;  ///< children of the forest's joints
   std::vector<Loop> loops_;
   bool is_exact_ = false;
-  int r_ = 0, d_ = 0;                    ///< imposed and released rows of loops
+  std::vector<Released> arranged_;
+  int r_ = 0, d_ = 0;                    ///< imposed (with moving) and released rows of loops
   int H_ = 0, D_ = 0;                    ///< columns of J_H and J_D
   MatrixX<S> rows_;                      ///< J_H transposed; rows and columns in scale
   VectorX<S> row_scale_, column_scale_;  ///< factors of rows, and of columns: 1 / length

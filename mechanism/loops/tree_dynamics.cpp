@@ -211,14 +211,22 @@ std::span<const Wrench<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
   }
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  const auto carry = [&](int index, const Wrench<Space, S>& F) {
+    const Joint<Space, S>& joint = mechanism.joints()[index];
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
+    F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
+  };
   for (int c = 0; mechanism.num_rows() + c < static_cast<int>(lambda.size()); ++c) {
+    const S& mu = lambda[mechanism.num_rows() + c];
+    if (mechanism.couplings()[c].is_moving_row) {
+      const MovingRow& row = kinematics.moving_row(c);
+      carry(row.joint, Wrench<Space, S>(kinematics.direction(row) * mu));
+    }
     for (const auto& [index, ratio] : mechanism.couplings()[c].parts) {
-      const Joint<Space, S>& joint = mechanism.joints()[index];
-      const JointState<Space, S>& state = kinematics.joints()[index];
-      const Wrench<Space, S> F = WrenchOfEffort<Space, S>(
-          state.basis[0], joint.kind->inverse_H_squared, ratio * lambda[mechanism.num_rows() + c]);
-      F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
-      F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
+      carry(index, WrenchOfEffort<Space, S>(kinematics.joints()[index].basis[0],
+                                            mechanism.joints()[index].kind->inverse_H_squared,
+                                            ratio * mu));
     }
   }
   return F_;
@@ -303,6 +311,11 @@ void TreeDynamics<Space, S>::CouplingJacobian(const Kinematics<Space, S>& kinema
   };
   for (std::size_t c = 0; c < couplings; ++c) {
     for (const auto& [joint, ratio] : mechanism.couplings()[c].parts) add(c, joint, ratio);
+    if (!mechanism.couplings()[c].is_moving_row) continue;
+    const MovingRow& row = kinematics.moving_row(static_cast<int>(c));
+    ForEachSpeedOfLoop(kinematics, row.joint, [&](int column, const Velocity<Space, S>& V) {
+      G(static_cast<Eigen::Index>(c), column) = kinematics.direction(row).dot(V);
+    });
   }
   for (std::size_t r = 0; r < rotors; ++r) add(couplings + r, mechanism.rotors()[r].joint, S(1));
 }
@@ -325,6 +338,11 @@ template <class Space, class S>
 S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, const VectorX<S>* udot,
                        std::span<const Acceleration<Space, S>> A) {
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
+  if (mechanism.couplings()[coupling].is_moving_row) {
+    const MovingRow& row = kinematics.moving_row(coupling);
+    return kinematics.direction(row).dot(
+        RelativeAcceleration<Space, S>(kinematics, row.joint, A));
+  }
   S sum = S(0);
   for (const auto& [index, ratio] : mechanism.couplings()[coupling].parts) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
@@ -354,14 +372,15 @@ void AddRotorWrenches(const Kinematics<Space, S>& kinematics,
   }
 }
 
+namespace {
+
+/// Relative motion, along an effort of a joint, of its two bodies if nothing else holds them.
 template <class Space, class S>
-S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses, int index) {
+S FreeResponseTo(const Kinematics<Space, S>& kinematics, Masses masses, int index,
+                 const Wrench<Space, S>& effort) {
   const std::vector<Inertia<Space, S>>& inertias = kinematics.mechanism().bodies(masses);
   const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
   S sum = S(0);
-  if (joint.num_drives > 0) return sum;
-  const Wrench<Space, S> effort = WrenchOfEffort<Space, S>(kinematics.joints()[index].basis[0],
-                                                           joint.kind->inverse_H_squared, S(1));
   for (const auto& [body, r] : {std::pair{joint.to, kinematics.ArmQ(index, masses)},
                                 std::pair{joint.from, kinematics.ArmP(index, masses)}}) {
     if (body == kGround) continue;
@@ -373,8 +392,24 @@ S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses
   return sum;
 }
 
+}  // namespace
+
+template <class Space, class S>
+S FreeResponseOfCoordinate(const Kinematics<Space, S>& kinematics, Masses masses, int index) {
+  const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
+  if (joint.num_drives > 0) return S(0);
+  return FreeResponseTo(kinematics, masses, index,
+                        WrenchOfEffort<Space, S>(kinematics.joints()[index].basis[0],
+                                                 joint.kind->inverse_H_squared, S(1)));
+}
+
 template <class Space, class S>
 S FreeResponseOf(const Kinematics<Space, S>& kinematics, Masses masses, int coupling) {
+  if (kinematics.mechanism().couplings()[coupling].is_moving_row) {
+    const MovingRow& row = kinematics.moving_row(coupling);
+    return FreeResponseTo(kinematics, masses, row.joint,
+                          Wrench<Space, S>(kinematics.direction(row)));
+  }
   S sum = S(0);
   for (const auto& [joint, ratio] : kinematics.mechanism().couplings()[coupling].parts) {
     sum += ratio * ratio * FreeResponseOfCoordinate(kinematics, masses, joint);

@@ -79,6 +79,13 @@ bool HasGroundShifts(const Joint<Space, S>& joint) {
 template <class Space, class S>
 void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
   released_ = released;
+  moving_rows_.clear();
+  for (const Released& out : released_) {
+    const int first = Space::kDim - static_cast<int>(out.directions.size());
+    for (int i = 0; i < static_cast<int>(out.directions.size()); ++i) {
+      if (out.IsMoving(out.directions[i])) moving_rows_.push_back({out.joint, first + i});
+    }
+  }
   for (int j = 0; j < static_cast<int>(joints_.size()); ++j) {
     const Joint<Space, S>& joint = mechanism_->joints()[j];
     if (joint.kind->basis != nullptr) continue;

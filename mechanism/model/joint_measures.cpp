@@ -71,6 +71,10 @@ S Kinematics<Space, S>::JointSpeed(int index) const {
 template <class Space, class S>
 S Kinematics<Space, S>::CouplingMismatch(int index) const {
   const Coupling<S>& coupling = mechanism_->couplings()[index];
+  if (coupling.is_moving_row) {
+    const MovingRow& row = moving_row(index);
+    return direction(row).dot(ConstraintMismatch(row.joint));
+  }
   S sum = -coupling.offset - turns_[index];
   for (const auto& [joint, ratio] : coupling.parts) sum += ratio * JointCoordinate(joint);
   return sum;
@@ -78,10 +82,13 @@ S Kinematics<Space, S>::CouplingMismatch(int index) const {
 
 template <class Space, class S>
 S Kinematics<Space, S>::CouplingSpeed(int index) const {
-  S sum = S(0);
-  for (const auto& [joint, ratio] : mechanism_->couplings()[index].parts) {
-    sum += ratio * JointSpeed(joint);
+  const Coupling<S>& coupling = mechanism_->couplings()[index];
+  if (coupling.is_moving_row) {
+    const MovingRow& row = moving_row(index);
+    return direction(row).dot(joints_[row.joint].V_rel);
   }
+  S sum = S(0);
+  for (const auto& [joint, ratio] : coupling.parts) sum += ratio * JointSpeed(joint);
   return sum;
 }
 

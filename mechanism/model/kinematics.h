@@ -127,7 +127,11 @@ class Kinematics {
   Direction<Space, S> Constrained(int joint, const SpatialVector<Space, S, Kind>& V) const {
     const JointState<Space, S>& state = joints_[joint];
     if (mechanism_->is_redundant()) return Forbidden(joint, V);
-    return state.Sum(state.Along(V, state.rows()), state.rows());
+    Direction<Space, S> part = state.Sum(state.Along(V, state.rows()), state.rows());
+    for (const MovingRow& row : moving_rows_) {
+      if (row.joint == joint) part += direction(row) * direction(row).dot(V);
+    }
+    return part;
   }
   /// The part of a relative motion across the free directions of a joint.
   template <class Kind>
@@ -157,13 +161,27 @@ class Kinematics {
   S CouplingSpeed(int coupling) const;
   /// A mismatch or a rate of a coupling in the unit of its first coordinate [rad or m].
   S OfFirstJoint(int coupling, const S& mismatch) const {
-    return mismatch / mechanism_->couplings()[coupling].parts.front().ratio;
+    const Coupling<S>& given = mechanism_->couplings()[coupling];
+    return given.is_moving_row ? mismatch : S(mismatch / given.parts.front().ratio);
   }
   /// Returns true if that unit is an angle.
   bool FirstTurns(int coupling) const {
-    return !joints_[mechanism_->couplings()[coupling].parts.front().joint]
-                .basis[0]
-                .angular.isZero();
+    const MovingRow first = FirstOf(coupling);
+    return !joints_[first.joint].basis[first.column].angular.isZero();
+  }
+  /// Its first joint and direction.
+  MovingRow FirstOf(int coupling) const {
+    const Coupling<S>& given = mechanism_->couplings()[coupling];
+    return given.is_moving_row ? moving_row(coupling) : MovingRow{given.parts.front().joint, 0};
+  }
+
+  /// The released direction imposed by a coupling that is a moving row.
+  const MovingRow& moving_row(int coupling) const {
+    return moving_rows_[coupling - mechanism_->num_coordinate_couplings()];
+  }
+  const std::vector<MovingRow>& moving_rows() const { return moving_rows_; }
+  const Direction<Space, S>& direction(const MovingRow& row) const {
+    return joints_[row.joint].basis[row.column];
   }
 
   /// Directions that are not imposed from now on, as many of each joint as the mechanism releases.
@@ -227,6 +245,7 @@ class Kinematics {
   std::vector<S> accepted_speeds_, turns_;
   S accepted_time_ = S(0);
   std::vector<Released> released_;
+  std::vector<MovingRow> moving_rows_;
   VectorX<S> q_, u_;
   S time_ = S(0);
   double regularization_ = kRegularization;

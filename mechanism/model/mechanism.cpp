@@ -201,7 +201,8 @@ void Mechanism<Space, S>::AddJoints(const MechanismDescription& description,
     }
     if (const std::vector<int>& released = description.joints[index].released; !released.empty()) {
       joint.num_released = static_cast<int>(released.size());
-      released_.push_back({index, released});
+      released_.push_back({index, released, description.joints[index].moving});
+      num_moving_rows_ += static_cast<int>(released_.back().moving.size());
     }
     joint.row = num_rows_;
     num_rows_ += joint.num_constraints();
@@ -224,6 +225,7 @@ void Mechanism<Space, S>::AddCouplings(const MechanismDescription& description) 
     }
     std::ranges::sort(coupling.measured_turns, std::greater<>());
   }
+  for (int i = 0; i < num_moving_rows_; ++i) couplings_.emplace_back().is_moving_row = true;
 }
 
 template <class Space, class S>

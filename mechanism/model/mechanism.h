@@ -2,6 +2,7 @@
 // formulations. Every frame of a body is re-expressed from the body's centre of mass.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -68,6 +69,7 @@ struct Coupling {
   /// Changes of the sum by a turn of each angle of a cut joint, which is measured modulo a turn;
   /// largest first.
   std::vector<S> measured_turns;
+  bool is_moving_row = false;  ///< imposes a released direction instead (MovingRow); no parts
 };
 
 /// Inertia along the coordinate of a joint, or along a rate given by a drive.
@@ -82,8 +84,21 @@ struct Rotor {
 struct Released {
   int joint = 0;
   std::vector<int> directions;
+  /// Those of them that moving rows impose at present, ascending. In several overconstrained loops
+  /// the number of independent rows of one joint changes during a motion; solvers need it constant.
+  /// So rows that must move between joints are imposed like couplings.
+  std::vector<int> moving = {};
 
+  bool IsMoving(int direction) const { return std::ranges::binary_search(moving, direction); }
+  bool Imposes(int direction) const {
+    return IsMoving(direction) || !std::ranges::binary_search(directions, direction);
+  }
   friend bool operator==(const Released&, const Released&) = default;
+};
+
+/// A released direction that is imposed at present: a column of the joint's basis [H D].
+struct MovingRow {
+  int joint = 0, column = 0;
 };
 
 /// A tree joint seen from its root side. `sign` is +1 when the child is the joint's Q, else -1.
@@ -132,7 +147,12 @@ class Mechanism {
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
+  /// Couplings of coordinates, then a place for each moving row.
   const std::vector<Coupling<S>>& couplings() const { return couplings_; }
+  int num_moving_rows() const { return num_moving_rows_; }
+  int num_coordinate_couplings() const {
+    return static_cast<int>(couplings_.size()) - num_moving_rows_;
+  }
   const std::vector<Rotor<S>>& rotors() const { return rotors_; }
   /// Directions that constraints do not impose at first, by joint; usually empty.
   const std::vector<Released>& released() const { return released_; }
@@ -186,7 +206,8 @@ class Mechanism {
 
   std::string name_;
   Coordinates coordinates_;
-  int num_q_ = 0, num_u_ = 0, num_rows_ = 0, num_loops_ = 0, num_joint_speeds_ = 0;
+  int num_q_ = 0, num_u_ = 0, num_rows_ = 0, num_loops_ = 0, num_joint_speeds_ = 0,
+      num_moving_rows_ = 0;
   std::vector<Inertia<Space, S>> bodies_, geometric_bodies_;
   std::vector<Linear<Space, S>> geometric_centres_;
   std::vector<std::string> body_names_, joint_names_;

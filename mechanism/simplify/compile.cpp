@@ -195,6 +195,7 @@ class Compiler {
             : "at every position";
     for (const Released& out : redundancy.released) {
       for (const int direction : out.directions) {
+        if (out.IsMoving(direction)) continue;
         result_.report.push_back("joint \"" + description.joints[out.joint].name +
                                  "\": " + NameOfDirection(description, out, direction) +
                                  " is redundant " + where);

@@ -21,6 +21,9 @@ int Positions(int speeds) { return speeds <= 40 ? 48 : 6; }
 /// singular by x^2 / 2, which must be far beyond the accuracy of rounded input.
 constexpr double kProbe = 0.01, kRoundedProbe = 0.05;
 
+/// Speeds of mechanisms whose rows may move between joints: walks cover a whole turn.
+constexpr int kMaxWithMoving = 40;
+
 /// Returns true if all free speeds lead to finite motions, as for constraints that are redundant at
 /// every position. Otherwise more constraints hold nearby: a ladder of windows in line has a branch
 /// for each opening direction of each window, and a walk finds few of them open.
@@ -38,14 +41,17 @@ bool IsRegular(const Excursion<Space>& position, double probe) {
 }
 
 /// Walks through positions of the largest rank met; returns the one farthest from losing it.
-/// `moves`: whether the walk left its start.
+/// `moves`: whether the walk left its start. `rows`: at all positions with the rank of the best.
 template <class Space>
 Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>& mechanism,
-                      bool& moves) {
+                      bool& moves, std::vector<Eigen::MatrixXd>& rows) {
   Excursion<Space> best = excursion;
+  rows = {excursion.rows().rows};
   for (int k = 1; k <= Positions(mechanism.num_u()) && best.rank() < mechanism.num_rows(); ++k) {
     if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < best.rank()) continue;
     moves = true;
+    if (excursion.rank() > best.rank()) rows.clear();
+    rows.push_back(excursion.rows().rows);
     if (excursion.rank() > best.rank() || excursion.conditioning() > best.conditioning()) {
       best = excursion;
     }
@@ -53,12 +59,46 @@ Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>
   return best;
 }
 
+/// Lets rows move between joints (mechanism.h) until the quotas of joints serve at all positions.
+void AdaptQuotas(const std::vector<Eigen::MatrixXd>& rows, int rank, std::vector<Quota>& quotas) {
+  // Elements of T up to ten are accepted (self_stress.h), and a walk misses the worst position.
+  constexpr double kServes = 0.2, kBetter = 1.5;
+  std::vector<Quota> none = quotas;
+  for (Quota& quota : none) quota.keep = quota.fixed;
+  std::vector<double> best;  // without quotas
+  for (const Eigen::MatrixXd& at : rows) best.push_back(RowChoice(at, none, rank).least());
+  const auto serve = [&] {
+    double share = 1.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      share = std::min(share, RowChoice(rows[i], quotas, rank).least() / best[i]);
+    }
+    return share;
+  };
+  for (double share = serve(); share < kServes;) {
+    double most = kBetter * share;
+    Quota* reduced = nullptr;
+    for (Quota& quota : quotas) {
+      if (quota.keep <= quota.fixed) continue;
+      --quota.keep;
+      if (const double other = serve(); other > most) {
+        most = other;
+        reduced = &quota;
+      }
+      ++quota.keep;
+    }
+    if (reduced == nullptr) return;
+    --reduced->keep;
+    share = most;
+  }
+}
+
 /// The rows of a position that depend most on the others, so that `rank` stay imposed. Joints with
 /// prescribed coordinates keep all theirs: such coordinates change the order of the rows.
 template <class Space>
 std::vector<Released> Release(const Excursion<Space>& position,
                               const Mechanism<Space, double>& mechanism,
-                              const MechanismDescription& description) {
+                              const MechanismDescription& description,
+                              const std::vector<Eigen::MatrixXd>& everywhere) {
   const std::vector<int>& constraints = mechanism.constraints();
   const DirectionRows& at = position.rows();
   std::vector<Quota> quotas;
@@ -66,12 +106,17 @@ std::vector<Released> Release(const Excursion<Space>& position,
     const bool keeps_all = !description.joints[constraints[c]].motions.empty();
     quotas.push_back({at.first[c], at.count[c], keeps_all ? at.count[c] : 0, at.count[c]});
   }
-  RowChoice choice(at.rows, quotas);
-  for (std::size_t c = 0; c < quotas.size(); ++c) {
-    for (int i = 0; i < quotas[c].fixed; ++i) choice.Take(c, quotas[c].first + i);
+  for (Quota& quota : quotas) quota.keep = quota.fixed;
+  const std::vector<Released> released =
+      RowChoice(at.rows, quotas, position.rank()).BeyondQuotas(constraints);
+  // quotas of the best position; rows taken there count as moving
+  for (std::size_t c = 0; c < quotas.size(); ++c) quotas[c].keep = quotas[c].count;
+  for (const Released& out : released) {
+    const auto c = std::ranges::find(constraints, out.joint) - constraints.begin();
+    quotas[c].keep -= static_cast<int>(out.directions.size() - out.moving.size());
   }
-  choice.TakeBest(position.rank(), [](int) { return true; });
-  return choice.NotTaken(constraints);
+  if (quotas.size() > 1) AdaptQuotas(everywhere, position.rank(), quotas);
+  return RowChoice(at.rows, quotas, position.rank()).BeyondQuotas(constraints);
 }
 
 /// Redundancy of one part: bodies that joints connect.
@@ -107,7 +152,8 @@ Redundancy Find(const MechanismDescription& description) {
     bool moves = false;  // which leaves a speed
     const double excess = excursion.excess();
     const Excursion<Space> first = excursion;
-    excursion = Roam(std::move(excursion), mechanism, moves);
+    std::vector<Eigen::MatrixXd> rows;
+    excursion = Roam(std::move(excursion), mechanism, moves, rows);
     result.rank = excursion.rank();
     if (!IsRegular(excursion, accuracy > 0.0 ? kRoundedProbe : kProbe)) {
       result.rank = std::min(result.rows, mechanism.num_u() - (moves ? 1 : 0));
@@ -116,7 +162,8 @@ Redundancy Find(const MechanismDescription& description) {
     if (result.rank == result.rows || result.rank == mechanism.num_u()) return result;
     // rounded rows are imposed or not, so that those of the start must serve there
     const bool starts_regular = accuracy > 0.0 && first.rank() == excursion.rank();
-    result.released = Release(starts_regular ? first : excursion, mechanism, description);
+    if (mechanism.num_u() > kMaxWithMoving) rows.clear();
+    result.released = Release(starts_regular ? first : excursion, mechanism, description, rows);
     if (accuracy > 0.0) {
       result.rounding = std::max(excess, start.position_residual / mechanism.length());
     }
@@ -176,6 +223,7 @@ MechanismDescription Release(const MechanismDescription& description,
   for (int joint : redundancy.cut) result.joints[joint].cut = true;
   for (const Released& out : redundancy.released) {
     result.joints[out.joint].released = out.directions;
+    result.joints[out.joint].moving = out.moving;
   }
   return result;
 }

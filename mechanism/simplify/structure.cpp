@@ -26,24 +26,30 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
   const auto& order = qr.colsPermutation().indices();
   std::vector<int> left(order.data() + scaled.rank, order.data() + order.size());
   std::ranges::sort(left);
+  const auto add = [&](int index, int row) {
+    const Joint<Space, double>& joint = mechanism.joints()[index];
+    // drivers come first in D
+    const bool drive = row < joint.num_drives;
+    dependent.push_back({joint.description,
+                         drive ? "the prescribed motion"
+                               : NameOfDirection(description, {joint.description, {}},
+                                                 kinematics.DirectionOf(index, row)),
+                         false});
+  };
   for (const int row : left) {
-    if (row >= mechanism.num_rows()) {
-      const Coupling<double>& coupling = mechanism.couplings()[row - mechanism.num_rows()];
-      dependent.push_back(
-          {coupling.parts.front().joint, "coupling \"" + coupling.name + "\"", false});
+    if (const int c = row - mechanism.num_rows(); c >= 0) {
+      const Coupling<double>& coupling = mechanism.couplings()[c];
+      const auto [joint, column] = kinematics.FirstOf(c);
+      if (coupling.is_moving_row) {
+        add(joint, column - mechanism.joints()[joint].num_u());
+      } else {
+        dependent.push_back({joint, "coupling \"" + coupling.name + "\"", false});
+      }
       continue;
     }
     for (int index : mechanism.constraints()) {
       const Joint<Space, double>& joint = mechanism.joints()[index];
-      const int i = row - joint.row;
-      if (i < 0 || i >= joint.num_constraints()) continue;
-      // drivers come first in D
-      const bool drive = i < joint.num_drives;
-      dependent.push_back({joint.description,
-                           drive ? "what its given motion prescribes"
-                                 : NameOfDirection(description, {joint.description, {}},
-                                                   kinematics.DirectionOf(index, i)),
-                           false});
+      if (row >= joint.row && row < joint.row + joint.num_constraints()) add(index, row - joint.row);
     }
   }
   return dependent;
@@ -75,6 +81,7 @@ class Analysis {
     result_.rounding = redundancy.rounding;
     for (const Released& out : redundancy.released) {
       for (const int direction : out.directions) {
+        if (out.IsMoving(direction)) continue;
         result_.redundant.push_back(
             {out.joint, NameOfDirection(description_, out, direction), true});
       }

@@ -127,6 +127,31 @@ SimbodyMobilizer MakeMobilizer(const Model& model, std::size_t index) {
   return made;
 }
 
+void AddCouplers(const Model& model, SimbodyParts* parts) {
+  for (const Coupling& coupling : model.couplings) {
+    SimbodyCoupler& made = parts->couplers.emplace_back();
+    for (const auto& [joint, ratio] : coupling.parts) {
+      made.terms.emplace_back(model.tree[joint].child(), ratio * parts->mobilizers[joint].sign);
+    }
+    made.constant = 0.0 - coupling.offset;  // not -0
+  }
+  int flywheel = static_cast<int>(model.bodies.size());
+  for (std::size_t i = 0; i < model.tree.size(); ++i) {
+    const double J = model.tree[i].rotor_inertia;
+    if (J == 0.0) continue;
+    SimbodyMobilizer made;
+    made.type = "Pin";
+    made.joint = i;
+    made.is_flywheel = true;
+    made.child = flywheel;
+    made.mass = 1.0;  // of no effect
+    made.inertia = {J, J, J, 0.0, 0.0, 0.0};
+    parts->couplers.push_back(
+        {{{flywheel++, 1.0}, {model.tree[i].child(), -parts->mobilizers[i].sign}}, 0.0});
+    parts->mobilizers.push_back(made);
+  }
+}
+
 void AddForces(const Model& model, std::vector<SimbodyForce>* forces) {
   using Force = SimbodyForceType;
   for (const JointForce& force : model.joint_forces) {
@@ -158,13 +183,6 @@ void AddForces(const Model& model, std::vector<SimbodyForce>* forces) {
 
 SimbodyParts MakeSimbodyParts(const Model& model) {
   std::vector<std::string> missing = model.missing;
-  for (const Coupling& coupling : model.couplings) {
-    missing.push_back(fmt::format("coupling \"{}\"", coupling.name));
-  }
-  for (const Joint& joint : model.tree) {
-    if (joint.rotor_inertia > 0.0)
-      missing.push_back(fmt::format("rotor of joint \"{}\"", joint.name));
-  }
   SimbodyParts parts;
   for (std::size_t i = 0; i < model.tree.size(); ++i) {
     const SimbodyMobilizer& made = parts.mobilizers.emplace_back(MakeMobilizer(model, i));
@@ -187,6 +205,7 @@ SimbodyParts MakeSimbodyParts(const Model& model) {
     if (!fault.empty()) missing.push_back(fault);
   }
   if (!missing.empty()) throw Unsupported(std::move(missing));
+  AddCouplers(model, &parts);
   AddForces(model, &parts.forces);
   return parts;
 }
@@ -222,16 +241,17 @@ std::string Member(const std::string& key, const std::string& name) {
 class Writer {
  public:
   explicit Writer(const Model& model) : model_(model), parts_(MakeSimbodyParts(model)) {
-    number_.assign(model.bodies.size(), 0);
+    number_.assign(parts_.mobilizers.size() + 1, 0);
     for (std::size_t i = 0; i < parts_.mobilizers.size(); ++i) {
       number_[parts_.mobilizers[i].child] = i + 1;
     }
   }
 
   SimbodyProgramText Write() {
-    std::string tree, closures, forces;
+    std::string tree, closures, couplers, forces;
     for (const SimbodyMobilizer& one : parts_.mobilizers) tree += Text(one);
     for (const SimbodyConstraint& one : parts_.constraints) closures += Text(one);
+    for (std::size_t i = 0; i < parts_.couplers.size(); ++i) couplers += CouplerText(i);
     for (const SimbodyForce& one : parts_.forces) forces += Text(one);
     AddNotes();
     made_.program =
@@ -240,8 +260,8 @@ class Writer {
                                 "for Simbody 3.7. SI units, angles in rad.") +
         kHead + CommentOfNotes("// ", made_.notes) + kDeclarations +
         "Mechanism::Mechanism() {\n  body.push_back(matter.Ground());\n" + tree + closures +
-        format("  Force::Gravity(forces, matter, {});\n", Point(model_.gravity)) + forces +
-        "}\n\n" + Start() + Names() + kTail;
+        couplers + format("  Force::Gravity(forces, matter, {});\n", Point(model_.gravity)) +
+        forces + "}\n\n" + Start() + Names() + kTail;
     return std::move(made_);
   }
 
@@ -256,13 +276,14 @@ class Writer {
     std::string last = format(", {}", direction);
     if (one.type == "Weld") last.clear();
     if (one.type == "Screw") last = format(", {}, {}", NumberText(one.pitch), direction);
+    const std::string what =
+        one.is_flywheel ? "rotor" : "body " + QuoteCpp(model_.bodies[one.child].name);
     return format(
-        "  // body {} on joint {}\n"
+        "  // {} on joint {}\n"
         "  body.push_back(MobilizedBody::{}(\n      {}, {},\n      Rigid({}, {}),\n"
         "      {}{}));\n",
-        QuoteCpp(model_.bodies[one.child].name), QuoteCpp(joint.name), one.type,
-        BodyText(one.parent), FrameText(one.on_parent), NumberText(one.mass), Numbers(one.inertia),
-        FrameText(one.on_child), last);
+        what, QuoteCpp(joint.name), one.type, BodyText(one.parent), FrameText(one.on_parent),
+        NumberText(one.mass), Numbers(one.inertia), FrameText(one.on_child), last);
   }
 
   std::string Text(const SimbodyConstraint& one) const {
@@ -283,6 +304,19 @@ class Writer {
         arg("axis", Axis(joint.F, one.axis_on_F)), arg("other", Axis(joint.M, one.axis_on_M)),
         arg("length", NumberText(joint.parameter)));
     return format("  // joint {} closes a loop\n  Constraint::{};\n", QuoteCpp(joint.name), text);
+  }
+
+  std::string CouplerText(std::size_t index) const {
+    const SimbodyCoupler& one = parts_.couplers[index];
+    std::string terms;
+    for (const auto& [body, factor] : one.terms) {
+      terms +=
+          format("{}{{{}, {}}}", terms.empty() ? "" : ", ", BodyText(body), NumberText(factor));
+    }
+    const std::string what = index < model_.couplings.size()
+                                 ? "coupling " + QuoteCpp(model_.couplings[index].name)
+                                 : "a rotor and its joint";
+    return format("  // {}\n  Couple({{{}}}, {});\n", what, terms, NumberText(one.constant));
   }
 
   std::string Text(const SimbodyForce& one) const {
@@ -321,6 +355,7 @@ class Writer {
   std::string Names() const {
     std::string joints, bodies, points;
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
+      if (one.is_flywheel) continue;
       const Joint& joint = model_.tree[one.joint];
       joints += format("    {{{}, {}, {}}},\n", Member("name", joint.name), number_[one.child],
                        NumberText(one.sign));
@@ -354,6 +389,13 @@ class Writer {
           format("joint \"{}\" is a {} with coordinates of the opposite sign; what is printed has "
                  "the user's.",
                  model_.tree[one.joint].name, one.type));
+    }
+    for (const SimbodyMobilizer& one : parts_.mobilizers) {
+      if (!one.is_flywheel) continue;
+      Say(
+          format("rotor_inertia of joint \"{}\" is a flywheel on Ground, whose angle is the "
+                 "coordinate of the joint.",
+                 model_.tree[one.joint].name));
     }
     for (const Joint& joint : model_.cut) {
       if (joint.kind == "free") continue;

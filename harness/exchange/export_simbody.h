@@ -18,7 +18,8 @@ namespace loopbench::exchange {
 struct SimbodyMobilizer {
   std::string type;                    ///< "Pin": MobilizedBody::Pin
   std::size_t joint = 0;               ///< index into Model::tree
-  int parent = 0, child = 0;           ///< bodies of the model
+  bool is_flywheel = false;            ///< the joint's rotor, see SimbodyParts
+  int parent = 0, child = 0;           ///< bodies of the model, then flywheels
   Frame on_parent, on_child;           ///< inboard and outboard frame
   bool reverse = false;                ///< MobilizedBody::Reverse
   double pitch = 0.0;                  ///< pitch of a Screw [m/rad]
@@ -43,6 +44,12 @@ struct SimbodyConstraint {
   int axis_on_F = 0, axis_on_M = 0;  ///< x, y, z
 };
 
+/// The sum of factor times first coordinate over mobilizers, plus `constant`, is zero.
+struct SimbodyCoupler {
+  std::vector<std::pair<int, double>> terms;  ///< children of the mobilizers, factors
+  double constant = 0.0;
+};
+
 enum class SimbodyForceType {
   kMobilityConstantForce,  ///< first mobilizer: effort
   kMobilityLinearSpring,   ///< stiffness, rest
@@ -60,10 +67,13 @@ struct SimbodyForce {
   std::array<double, 2> numbers = {};
 };
 
+/// Simbody has no inertia of a coordinate. A rotor is therefore a flywheel on a pin of Ground, with
+/// its centre of mass on the pin, whose angle a coupler keeps equal to the joint's coordinate.
 struct SimbodyParts {
-  std::vector<SimbodyMobilizer> mobilizers;  ///< in the order of Model::tree
+  std::vector<SimbodyMobilizer> mobilizers;  ///< in the order of Model::tree, then flywheels
   std::vector<SimbodyConstraint> constraints;
-  std::vector<SimbodyForce> forces;  ///< without gravity
+  std::vector<SimbodyCoupler> couplers;  ///< in the order of Model::couplings, then of flywheels
+  std::vector<SimbodyForce> forces;      ///< without gravity
 };
 
 /// Throws Unsupported for unsupported parts: Model::missing, helical cut joints, forces in body

@@ -1,4 +1,4 @@
-// <include> and <attach> of MJCF: elements of other files.
+// <include> and <attach> of MJCF: elements of other files, copies of elements.
 #include <fmt/format.h>
 
 #include <set>
@@ -14,6 +14,28 @@ namespace fs = std::filesystem;
 namespace {
 
 using xml::Element;
+
+/// Attributes that name another element, and its kind.
+constexpr std::pair<const char*, const char*> kReferences[] = {
+    {"body", "body"},     {"body1", "body"},         {"body2", "body"},
+    {"joint", "joint"},   {"joint1", "joint"},       {"joint2", "joint"},
+    {"site", "site"},     {"site1", "site"},         {"site2", "site"},
+    {"geom", "geom"},     {"geom1", "geom"},         {"geom2", "geom"},
+    {"tendon", "tendon"}, {"tendon1", "tendon"},     {"tendon2", "tendon"},
+    {"refsite", "site"},  {"cranksite", "site"},     {"slidersite", "site"},
+    {"sidesite", "site"}, {"jointinparent", "joint"}};
+
+/// Returns the value of an attribute without surrounding blanks, or "".
+std::string ValueOf(const Element* element, const char* key) {
+  const char* given = element->Attribute(key);
+  return given != nullptr ? std::string(xml::Trimmed(given)) : "";
+}
+
+/// Returns kind and name of an element, which identify it; "" without a name.
+std::string KindAndName(const Element* element, const std::string& prefix = "") {
+  const std::string name = ValueOf(element, "name"), tag = element->Name();
+  return name.empty() ? "" : (tag == "freejoint" ? "joint" : tag) + " " + prefix + name;
+}
 
 /// Resolves the <include> and <attach> elements of MJCF.
 class Includer {
@@ -104,7 +126,9 @@ class Includer {
 
   void Attach(Element* place, Element* root, const fs::path& folder) {
     const XmlElement attach(document_, place);
-    const XmlValue model = attach.Required("model", "the name of a <model> in <asset>");
+    const auto given_model = attach.Attribute("model");
+    if (!given_model) return AttachCopy(attach, place, root);
+    const XmlValue& model = *given_model;
     std::optional<XmlValue> file;
     for (const XmlElement& given : XmlElement(document_, root).InSections("asset", "model")) {
       const XmlValue path = given.Required("file", "a MJCF file");
@@ -152,12 +176,7 @@ class Includer {
     }
     const auto prefix = attach.Attribute("prefix");
     const std::string main = Rename(other, prefix ? prefix->text() : "", shown.parent_path());
-    Element* frame = other->GetDocument()->NewElement("frame");
-    frame->SetAttribute("childclass", main.c_str());
-    Element* attached = other->GetDocument()->NewElement("attached");
-    document_->added[frame] = contents;
-    document_->added[attached] = {frame};
-    document_->included.emplace(place, attached);
+    Element* frame = Insert(place, main, contents);
     if (part) DropOutside(other, frame);
     for (const char* tag : {"default", "asset", "contact", "tendon", "equality", "actuator",
                             "deformable", "extension"}) {
@@ -165,15 +184,155 @@ class Includer {
     }
   }
 
+  /// Inserts elements in place of another one, in a frame with this class. Returns the frame.
+  Element* Insert(Element* place, const std::string& childclass,
+                  const std::vector<Element*>& contents) {
+    Element* frame = place->GetDocument()->NewElement("frame");
+    frame->SetAttribute("childclass", childclass.c_str());
+    Element* attached = place->GetDocument()->NewElement("attached");
+    document_->added[frame] = contents;
+    document_->added[attached] = {frame};
+    document_->included.emplace(place, attached);
+    return frame;
+  }
+
+  /// Inserts a copy of a body or frame of the model itself. As in MuJoCo, the original is complete
+  /// before `place`, and its default classes apply to the copy too.
+  void AttachCopy(const XmlElement& attach, Element* place, Element* root) {
+    auto part = attach.Attribute("body");
+    if (!part) part = attach.Attribute("frame");
+    if (!part) {
+      attach.Fail("no \"model\", \"body\" or \"frame\"",
+                  "a <model> of <asset>, or a body or frame of this model");
+    }
+    const std::string kind = part->attribute(), name = part->Name();
+    const XmlValue prefix = attach.Required("prefix", "the beginning of the names of the copy");
+    std::vector<Placed> all;
+    for (Element* world : Named(root, "worldbody")) AddPlaced(world, -1, &all);
+    visited_ += all.size();
+    const auto end = std::ranges::find(all, place, &Placed::element);
+    const auto original = std::find_if(all.begin(), end, [&](const Placed& one) {
+      return one.element->Name() == kind && ValueOf(one.element, "name") == name;
+    });
+    if (original == end) part->Fail(fmt::format("the name of a {} before this <attach>", kind));
+    std::set<const Element*> around;  // the place
+    for (int i = end->parent; i >= 0; i = all[i].parent) around.insert(all[i].element);
+    if (around.contains(original->element)) {
+      part->Fail(fmt::format("no cycle: this {} contains the <attach>", kind));
+    }
+    std::string childclass;
+    for (int i = original->parent; i >= 0; i = all[i].parent) {
+      const Element* outer = all[i].element;
+      if (childclass.empty()) childclass = ValueOf(outer, "childclass");
+      if (std::string_view(outer->Name()) == "replicate" && !around.contains(outer)) {
+        part->Fail(fmt::format("a {} that is not in a <replicate>", kind));
+      }
+    }
+    std::vector<Element*> parts = {original->element};
+    AddWithin(original->element, "", &parts);
+    std::set<std::string> inside, made;
+    for (const Element* one : parts) {
+      inside.insert(KindAndName(one));
+      made.insert(KindAndName(one, prefix.text()));
+    }
+    for (const Placed& one : all) {
+      if (!ValueOf(one.element, "name").starts_with(prefix.text())) continue;
+      const std::string taken = KindAndName(one.element);
+      if (!taken.empty() && made.contains(taken)) {
+        prefix.Fail(fmt::format("one that makes new names: there is a {}", taken));
+      }
+    }
+    Insert(place, childclass.empty() ? "main" : childclass,
+           {Copy(original->element, prefix.text(), root->GetDocument(), attach)});
+    CopyReferring(root, &inside, prefix.text(), attach);
+  }
+
+  struct Placed {
+    Element* element;
+    int parent;  ///< index of the element around it
+  };
+  /// Adds an element and its descendants in file order.
+  void AddPlaced(Element* element, int parent, std::vector<Placed>* found) const {
+    const int index = static_cast<int>(found->size());
+    found->push_back({element, parent});
+    for (Element* child : document_->ChildrenOf(element)) AddPlaced(child, index, found);
+  }
+
+  /// Copies the tendons, constraints and actuators that refer to `inside` only, and adds their
+  /// names there. As in MuJoCo, the world is outside.
+  void CopyReferring(Element* root, std::set<std::string>* inside, const std::string& prefix,
+                     const XmlElement& attach) {
+    std::vector<Element*> sections;
+    for (const char* tag : {"tendon", "equality", "actuator"}) {
+      for (Element* section : Named(root, tag)) {
+        for (Element* one : document_->ChildrenOf(section)) {
+          ++visited_;
+          if (NumReferences(one, *inside) <= 0) continue;
+          if (const std::string name = ValueOf(one, "name"); !name.empty()) {
+            inside->insert(std::string(tag) + " " + name);
+          }
+          sections.push_back(root->GetDocument()->NewElement(tag));
+          sections.back()->InsertEndChild(Copy(one, prefix, root->GetDocument(), attach));
+        }
+      }
+    }
+    std::ranges::copy(sections, std::back_inserter(document_->added[root]));
+    constexpr std::size_t kMostVisited = 10000000;
+    if (visited_ <= kMostVisited) return;
+    attach.Fail(fmt::format("more than {} elements to search for copies", kMostVisited), "fewer");
+  }
+
+  /// Returns a copy of an element and its contents, with prefixed names.
+  Element* Copy(Element* element, const std::string& prefix, tinyxml2::XMLDocument* document,
+                const XmlElement& attach, int depth = 1) {
+    constexpr std::size_t kMostCopied = 100000;
+    if (++copied_ > kMostCopied) {
+      attach.Fail(fmt::format("more than {} elements of copies", kMostCopied), "fewer");
+    }
+    if (depth > TINYXML2_MAX_ELEMENT_DEPTH) {
+      attach.Fail(fmt::format("a copy with more than {} elements within each other",
+                              TINYXML2_MAX_ELEMENT_DEPTH),
+                  "fewer");
+    }
+    Element* copy = element->ShallowClone(document)->ToElement();
+    copy->SetUserData(xml::OriginalOf(element));
+    Prefix(copy, "name", prefix);
+    for (const auto& [key, kind] : kReferences) Prefix(copy, key, prefix);
+    for (Element* child : document_->ChildrenOf(element)) {
+      copy->InsertEndChild(Copy(child, prefix, document, attach, depth + 1));
+    }
+    return copy;
+  }
+
+  void Prefix(Element* element, const char* key, const std::string& prefix) const {
+    const std::string name = ValueOf(element, key);
+    const bool is_world = std::string_view(key).starts_with("body") && name == "world";
+    if (name.empty() || is_world) return;
+    element->SetAttribute(key, (prefix + name).c_str());
+  }
+
+  /// Returns the number of references of an element and its contents into `inside`, or -1 if some
+  /// are to other elements.
+  int NumReferences(Element* element, const std::set<std::string>& inside) const {
+    std::vector<Element*> own = {element};
+    AddWithin(element, "", &own);
+    int count = 0;
+    for (const Element* one : own) {
+      for (const auto& [key, kind] : kReferences) {
+        const std::string name = ValueOf(one, key);
+        if (name.empty()) continue;
+        if (!inside.contains(std::string(kind) + " " + name)) return -1;
+        ++count;
+      }
+    }
+    return count;
+  }
+
   /// Adds a prefix to all names of a model, and paths to its meshes. Returns the name of its
   /// default class, which no class of other models is.
   std::string Rename(Element* root, const std::string& prefix, const fs::path& folder) {
-    constexpr const char* kNames[] = {
-        "name",          "class",    "childclass", "body",    "body1",     "body2",
-        "joint",         "joint1",   "joint2",     "site",    "site1",     "site2",
-        "geom",          "geom1",    "geom2",      "tendon",  "mesh",      "tendon1",
-        "tendon2",       "hfield",   "actuator",   "refsite", "cranksite", "slidersite",
-        "jointinparent", "sidesite", "material",   "texture", "target"};
+    constexpr const char* kNames[] = {"name",     "mesh",    "hfield", "actuator",
+                                      "material", "texture", "target"};
     const std::string main =
         fmt::format("{}main ({})", prefix, document_->attached_defaults.size());
     std::set<std::string> names_of_main = {"main"};
@@ -207,50 +366,35 @@ class Includer {
     std::vector<Element*> all;
     AddWithin(root, "", &all);
     for (Element* one : all) {
-      for (const char* key : kNames) {
-        const char* given = one->Attribute(key);
-        if (given == nullptr) continue;
-        const std::string name(xml::Trimmed(given)), attribute = key;
-        if (name.empty() || (attribute.starts_with("body") && name == "world")) continue;
-        const bool is_main = attribute.ends_with("class") && names_of_main.contains(name);
-        one->SetAttribute(key, (is_main ? main : prefix + name).c_str());
+      for (const char* key : kNames) Prefix(one, key, prefix);
+      for (const auto& [key, kind] : kReferences) Prefix(one, key, prefix);
+      for (const char* key : {"class", "childclass"}) {
+        const std::string name = ValueOf(one, key);
+        if (!name.empty() && names_of_main.contains(name)) {
+          one->SetAttribute(key, main.c_str());
+        } else {
+          Prefix(one, key, prefix);
+        }
       }
     }
     document_->attached_defaults.insert(defaults.begin(), defaults.end());
     return main;
   }
 
-  /// Deletes tendons, constraints and actuators of a model that refer to parts outside `frame`.
+  /// Hides tendons, constraints and actuators of a model that refer to parts outside `frame`.
   void DropOutside(Element* root, Element* frame) {
-    std::set<std::string> inside;  // kind and name
+    std::set<std::string> inside = {"body world"};
     std::vector<Element*> parts;
-    const auto note = [&](Element* one, const std::string& kind) {
-      if (const char* name = one->Attribute("name")) inside.insert(kind + " " + name);
-    };
     AddWithin(frame, "", &parts);
-    for (Element* one : parts) {
-      note(one, std::string_view(one->Name()) == "freejoint" ? "joint" : one->Name());
-    }
-    const auto is_inside = [&](Element* one) {
-      for (const char* kind : {"body", "joint", "site", "geom", "tendon"}) {
-        for (const std::string& key :
-             {kind + std::string(), kind + std::string("1"), kind + std::string("2")}) {
-          const char* name = one->Attribute(key.c_str());
-          if (name == nullptr || std::string_view(name) == "world") continue;
-          if (!inside.contains(std::string(kind) + " " + name)) return false;
-        }
-      }
-      return true;
-    };
+    for (const Element* one : parts) inside.insert(KindAndName(one));
+    Element* none = root->GetDocument()->NewElement("none");
     for (const char* tag : {"tendon", "equality", "actuator"}) {
       for (Element* section : Named(root, tag)) {
         for (Element* one : document_->ChildrenOf(section)) {
-          std::vector<Element*> own = {one};
-          AddWithin(one, "", &own);
-          if (std::ranges::all_of(own, is_inside)) {
-            note(one, tag);
+          if (NumReferences(one, inside) >= 0) {
+            inside.insert(std::string(tag) + " " + ValueOf(one, "name"));
           } else {
-            one->Parent()->DeleteChild(one);
+            document_->included.emplace(one, none);  // copies refer to it
           }
         }
       }
@@ -261,6 +405,7 @@ class Includer {
   std::vector<fs::path> open_;  ///< the files around the element, the main file first
   std::set<fs::path> known_;    ///< of the model that is read
   std::uintmax_t bytes_ = 0;
+  std::size_t copied_ = 0, visited_ = 0;  ///< elements, for all copies
 };
 
 }  // namespace

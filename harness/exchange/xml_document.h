@@ -30,6 +30,13 @@ inline std::vector<Element*> ChildrenIn(Element* element) {
   return children;
 }
 
+/// Returns the element of a file that an element copies, or the element itself. The user data of a
+/// copy points to its original.
+inline Element* OriginalOf(Element* element) {
+  void* original = element->GetUserData();
+  return original != nullptr ? static_cast<Element*>(original) : element;
+}
+
 }  // namespace xml
 
 /// Parsed files; `read` contains elements and attributes.

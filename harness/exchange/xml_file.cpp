@@ -172,9 +172,9 @@ XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, Element* element)
 }
 
 std::string XmlElement::tag() const { return element_->Name(); }
-int XmlElement::line() const { return element_->GetLineNum(); }
+int XmlElement::line() const { return xml::OriginalOf(element_)->GetLineNum(); }
 const std::string& XmlElement::file() const {
-  return *static_cast<const std::string*>(element_->GetDocument()->GetUserData());
+  return *static_cast<const std::string*>(xml::OriginalOf(element_)->GetDocument()->GetUserData());
 }
 
 bool XmlElement::is_attached_default() const {

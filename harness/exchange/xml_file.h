@@ -143,10 +143,12 @@ class XmlFile {
   XmlFile(std::string_view text, const std::string& file,
           const std::optional<std::filesystem::path>& path = {});
 
-  /// Resolves the elements of MJCF that stand for other files, at most kMaxConfigBytes in all.
+  /// Resolves the elements of MJCF that stand for other files, at most kMaxConfigBytes in all, or
+  /// for copies.
   ///   <include file="...">: the children of the root element of that file, which is read once.
   ///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
   ///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.
+  ///   Without `model`: a copy of a body of the file itself, then of tendons and so on.
   void Include();
 
   XmlElement root() const;

@@ -41,7 +41,8 @@ MobilizedBody Mobilize(const exchange::SimbodyMobilizer& one, MobilizedBody& par
 void SimbodyModel::Add(const exchange::SimbodyMobilizer& mobilizer, const exchange::Joint& joint) {
   MobilizedBody body = Mobilize(mobilizer, BodyAt(mobilizer.parent));
   mobilized_[static_cast<std::size_t>(mobilizer.child)] = body.getMobilizedBodyIndex();
-  mobilizers.push_back({body, joint.q, joint.num_q, joint.u, joint.num_u, mobilizer.sign});
+  mobilizers.insert(mobilizer.is_flywheel ? mobilizers.begin() : mobilizers.end(),
+                    {body, joint.q, joint.num_q, joint.u, joint.num_u, mobilizer.sign});
 }
 
 void SimbodyModel::Add(const exchange::SimbodyConstraint& constraint,
@@ -73,6 +74,17 @@ void SimbodyModel::Add(const exchange::SimbodyConstraint& constraint,
       Constraint::Rod(P, F.p(), Q, M.p(), joint.parameter);
       break;
   }
+}
+
+void SimbodyModel::Add(const exchange::SimbodyCoupler& coupler) {
+  Array_<MobilizedBodyIndex> bodies;
+  Vector coefficients(static_cast<int>(coupler.terms.size()) + 1, coupler.constant);
+  for (const auto& [body, factor] : coupler.terms) {
+    coefficients[static_cast<int>(bodies.size())] = factor;
+    bodies.push_back(mobilized_[static_cast<std::size_t>(body)]);
+  }
+  const Array_<MobilizerQIndex> first(bodies.size(), MobilizerQIndex(0));
+  Constraint::CoordinateCoupler(matter, new Function::Linear(coefficients), bodies, first);
 }
 
 void SimbodyModel::Add(const exchange::SimbodyForce& force) {
@@ -107,9 +119,10 @@ void SimbodyModel::Add(const exchange::SimbodyForce& force) {
 
 SimbodyModel::SimbodyModel(const exchange::Model& model) {
   const exchange::SimbodyParts parts = exchange::MakeSimbodyParts(model);
-  mobilized_.assign(model.bodies.size(), MobilizedBodyIndex(0));
+  mobilized_.assign(parts.mobilizers.size() + 1, MobilizedBodyIndex(0));
   for (const auto& one : parts.mobilizers) Add(one, model.tree[one.joint]);
   for (const auto& one : parts.constraints) Add(one, model.cut[one.joint]);
+  for (const auto& one : parts.couplers) Add(one);
   Force::Gravity(forces, matter, ToVec3(model.gravity));
   for (const auto& one : parts.forces) Add(one);
 }

@@ -20,7 +20,7 @@ struct SimbodyModel {
   SimTK::MultibodySystem system;
   SimTK::SimbodyMatterSubsystem matter{system};
   SimTK::GeneralForceSubsystem forces{system};
-  std::vector<Mobilizer> mobilizers;  ///< in the order of Model::tree
+  std::vector<Mobilizer> mobilizers;  ///< flywheels, then in the order of Model::tree
 
   explicit SimbodyModel(const exchange::Model& model);
   SimbodyModel(const SimbodyModel&) = delete;
@@ -29,12 +29,13 @@ struct SimbodyModel {
  private:
   void Add(const exchange::SimbodyMobilizer& mobilizer, const exchange::Joint& joint);
   void Add(const exchange::SimbodyConstraint& constraint, const exchange::Joint& joint);
+  void Add(const exchange::SimbodyCoupler& coupler);
   void Add(const exchange::SimbodyForce& force);
   SimTK::MobilizedBody& BodyAt(int body) {
     return matter.updMobilizedBody(mobilized_[static_cast<std::size_t>(body)]);
   }
 
-  std::vector<SimTK::MobilizedBodyIndex> mobilized_;  ///< by index of Model::bodies
+  std::vector<SimTK::MobilizedBodyIndex> mobilized_;  ///< by index of Model::bodies, then flywheels
 };
 
 }  // namespace loopbench::peers

@@ -10,8 +10,8 @@
 namespace loopbench::peers {
 
 /// Makes the program: tree joints become mobilizers with the same coordinates and speeds, cut
-/// joints become constraints, forces become Simbody's own elements. Throws Unsupported for a
-/// helical cut joint.
+/// joints and couplings become constraints, rotors become flywheels, forces become Simbody's own
+/// elements. Throws Unsupported for a helical cut joint.
 ///
 /// RungeKuttaMersonIntegrator runs with `accuracy` = tolerance (|W yerr|_RMS, its own weights) and
 /// a tenth of it as constraint tolerance, Simbody's default. Positions, speeds and the error

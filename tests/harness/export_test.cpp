@@ -101,7 +101,7 @@ TEST(Export, NamesAllThatAFormatDoesNotHave) {
   EXPECT_EQ(Missing(mechanism, simbody), expected);
 }
 
-TEST(Export, CouplingsAreConstraintsOfMjcf) {
+TEST(Export, CouplingsAndRotorsAreParts) {
   MechanismDescription mechanism = Shipped("geared-five-bar");
   const ExportFormat &mjcf = ExportFormats().front(), &simbody = ExportFormats().back();
   // 40 A + 20 E is constant, and coordinates are counted from the start
@@ -109,14 +109,27 @@ TEST(Export, CouplingsAreConstraintsOfMjcf) {
                 .text.find("<joint name=\"gears\" joint1=\"A\" joint2=\"E\" polycoef=\"0.0 -0.5 "
                            "0.0 0.0 0.0\"/>"),
             std::string::npos);
-  EXPECT_EQ(Missing(mechanism, simbody), std::vector<std::string>{"coupling \"gears\""});
+  EXPECT_NE(exchange::Export(mechanism, simbody)
+                .text.find("  // coupling \"gears\"\n"
+                           "  Couple({{body[1], 40.0}, {body[2], 20.0}}, 0.0);\n"),
+            std::string::npos);
+  mechanism.joints[0].rotor_inertia = 0.05;
+  const ExportedFile rotor = exchange::Export(mechanism, simbody);
+  EXPECT_NE(rotor.text.find("  Couple({{body[5], 1.0}, {body[1], -1.0}}, 0.0);\n"),
+            std::string::npos);
+  EXPECT_TRUE(Says(rotor.notes, "rotor_inertia of joint \"A\" is a flywheel on Ground"));
   mechanism.couplings[0].parts.push_back({3, 5.0});
   const std::string three = exchange::Export(mechanism, mjcf).text;
   EXPECT_NE(three.find("<joint joint=\"D\" coef=\"5.0\"/>"), std::string::npos);
   EXPECT_NE(three.find("<tendon name=\"gears\" tendon1=\"gears\"/>"), std::string::npos);
   mechanism.couplings[0].parts[2].joint = 4;
-  EXPECT_EQ(Missing(mechanism, mjcf),
-            std::vector<std::string>{"coupling \"gears\" of joint \"C\", which closes a loop"});
+  mechanism.joints[4].rotor_inertia = 0.05;
+  for (const ExportFormat& format : ExportFormats()) {
+    EXPECT_EQ(Missing(mechanism, format),
+              (std::vector<std::string>{"rotor of joint \"C\", which closes a loop",
+                                        "coupling \"gears\" of joint \"C\", which closes a "
+                                        "loop"}));
+  }
 }
 
 TEST(Export, NamesBodiesThatOtherProgramsRefuse) {

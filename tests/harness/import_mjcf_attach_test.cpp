@@ -1,4 +1,4 @@
-// <attach> of MJCF: models of other files in a body, with prefixed names.
+// <attach> of MJCF: models of other files, and copies of bodies, with prefixed names.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -137,6 +137,113 @@ TEST_F(ImportMjcfAttach, PartsThatReferToTheRestOfAModelStayThere) {
   EXPECT_TRUE(imported.description.couplings.empty());
 }
 
+TEST_F(ImportMjcfAttach, CopiesAreTheSameAsWrittenOut) {
+  // classes apply as where the original is: soft by childclass, and arm, the main class
+  const std::string arm = "class=\"arm\"", soft = "class=\"soft\"";
+  const auto main = [&](const std::string& copy, const std::string& rest) {
+    return "<mujoco model=\"m\"><compiler angle=\"radian\"/>" + kDefaults +
+           "<worldbody><body name=\"post\" childclass=\"soft\">" + kMass +
+           "<joint name=\"p\"/><frame pos=\"0 0 9\">" + Arm("", "", arm) +
+           "</frame></body><body name=\"cart\" pos=\"1 0 0\">" + kMass +
+           "<joint name=\"c\"/><frame pos=\"0 1 0\">" + copy + "</frame></body></worldbody>" +
+           rest + "</mujoco>";
+  };
+  const auto parts = [](const std::string& p) {
+    const std::string text = ArmParts(p);
+    return text.substr(0, text.find("<keyframe>"));
+  };
+  // not copied: a reference to p; and to the world, as in MuJoCo
+  const std::string others =
+      "<equality><joint joint1=\"p\" joint2=\"j\"/>"
+      "<connect body1=\"tip\" body2=\"world\" anchor=\"0 0 0\"/></equality>";
+  Write("main.xml", main("<attach body=\"base\" prefix=\"l_\"/>", parts("") + others));
+  const std::string whole = main(Arm("l_", soft, arm), parts("") + others + parts("l_"));
+  EXPECT_EQ(TextOf(Read()), TextOf(ImportText(whole, "file.xml")));
+  const MechanismDescription read = Read().description;
+  ASSERT_EQ(read.bodies.size(), 7u);
+  EXPECT_EQ(read.bodies[6].name, "l_tip");
+  EXPECT_EQ(read.bodies[6].mass, 2.0);
+  EXPECT_EQ(read.couplings.size(), 3u);
+}
+
+TEST_F(ImportMjcfAttach, CopiesContainCopies) {
+  const std::string hinge = kMass + "<joint name=\"j\" frictionloss=\"1\"/>";
+  Write("main.xml", "<mujoco><worldbody>\n<frame name=\"f\" pos=\"0 0 2\"><body name=\"a\">" +
+                        hinge + "</body></frame><body name=\"b\">" + kMass +
+                        "<joint name=\"k\"/><attach frame=\"f\" prefix=\"x_\"/></body>\n"
+                        "<attach body=\"b\" prefix=\"y_\"/></worldbody></mujoco>");
+  const Imported imported = Read();
+  std::vector<std::string> names;
+  for (const JointDescription& joint : imported.description.joints) names.push_back(joint.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"j", "k", "x_j", "y_k", "y_x_j"}));
+  EXPECT_EQ(imported.description.bodies[5].name, "y_x_a");
+  EXPECT_EQ(imported.description.joints[4].from.position.z(), 2.0);
+  // at the line of the original
+  EXPECT_TRUE(std::ranges::any_of(imported.notes, [](const ImportNote& note) {
+    return note.element.find("y_x_j") != std::string::npos && note.line == 2;
+  }));
+}
+
+TEST_F(ImportMjcfAttach, CopiesAreAttachedToo) {
+  Write("arm.xml",
+        "<mujoco><worldbody><body name=\"a\">" + kMass +
+            "<joint name=\"j\"/></body><body name=\"b\">" + kMass +
+            "<joint name=\"k\"/><attach body=\"a\" prefix=\"x_\"/></body></worldbody>"
+            "<actuator><damper joint=\"j\" kv=\"2\" ctrlrange=\"0 1\"/></actuator></mujoco>");
+  Write("main.xml",
+        "<mujoco><asset><model name=\"arm\" file=\"arm.xml\"/></asset><worldbody>"
+        "<attach model=\"arm\" body=\"b\" prefix=\"m_\"/></worldbody><keyframe><key "
+        "ctrl=\"1\"/></keyframe></mujoco>");
+  const Imported imported = Read();
+  ASSERT_EQ(imported.description.joints.size(), 2u);
+  EXPECT_EQ(imported.description.joints[1].name, "m_x_j");
+  const auto dampers = ForcesOf<JointDamper>(imported);
+  ASSERT_EQ(dampers.size(), 1u);
+  EXPECT_EQ(dampers[0].joint, 1);
+  EXPECT_EQ(dampers[0].damping, 2.0);
+}
+
+TEST_F(ImportMjcfAttach, FaultsOfCopiesAreNamed) {
+  const auto world = [&](const std::string& text) {
+    Write("main.xml", "<mujoco><worldbody>\n" + text + "</worldbody></mujoco>");
+  };
+  const std::string arm = Arm("", "", "");
+  world(arm + "<attach body=\"no\" prefix=\"p\"/>");
+  ExpectMessage({"<attach> body: found \"no\"", "the name of a body before this <attach>"});
+  world("<attach body=\"base\" prefix=\"p\"/>" + arm);
+  ExpectMessage({"main.xml:2: <attach> body: found \"base\"", "before this <attach>"});
+  world(arm + "<attach body=\"base\"/>");
+  ExpectMessage({"<attach>: found no \"prefix\""});
+  world(arm + "<attach body=\"base\" prefix=\"\"/>");
+  ExpectMessage({"<attach> prefix: found \"\"", "there is a body base"});
+  world(arm + "<body name=\"x\"><site name=\"ps\"/></body><attach body=\"base\" prefix=\"p\"/>");
+  ExpectMessage({"<attach> prefix: found \"p\"", "there is a site ps"});
+  world("<body name=\"a\"><body name=\"b\"><attach body=\"a\" prefix=\"p\"/></body></body>");
+  ExpectMessage({"<attach> body: found \"a\"", "no cycle: this body contains the <attach>"});
+  world("<frame name=\"a\"><attach frame=\"a\" prefix=\"p\"/></frame>");
+  ExpectMessage({"<attach> frame: found \"a\"", "no cycle: this frame contains the <attach>"});
+  world("<replicate count=\"2\">" + arm + "</replicate><attach body=\"tip\" prefix=\"p\"/>");
+  ExpectMessage({"a body that is not in a <replicate>"});
+  // each body contains the previous one twice
+  std::string bodies = "<body name=\"b0\"/>";
+  for (int i = 1; i < 30; ++i) {
+    bodies += fmt::format(
+        "<body name=\"b{0}\"><attach body=\"b{1}\" prefix=\"x{0}\"/><attach body=\"b{1}\" "
+        "prefix=\"y{0}\"/></body>",
+        i, i - 1);
+  }
+  world(bodies);
+  ExpectMessage({"<attach>: found more than 100000 elements of copies"});
+  // each body is one deeper than the previous one
+  bodies = "<body name=\"b0\"/>";
+  for (int i = 1; i < 300; ++i) {
+    bodies +=
+        fmt::format("<body name=\"b{0}\"><attach body=\"b{1}\" prefix=\"x\"/></body>", i, i - 1);
+  }
+  world(bodies);
+  ExpectMessage({"<attach>: found a copy with more than", "elements within each other"});
+}
+
 TEST_F(ImportMjcfAttach, MeshesAreFoundBesideTheirModel) {
   fs::create_directories(folder_.path() / "model/parts/meshes");
   // a cube of 1 m
@@ -166,7 +273,8 @@ TEST_F(ImportMjcfAttach, FaultsAreNamed) {
   };
   Write("a.xml", "<mujoco><worldbody>" + Arm("", "", "") + "</worldbody></mujoco>");
   attach("prefix=\"p\"");
-  ExpectMessage({"main.xml:2: <attach>: found no \"model\"", "the name of a <model> in <asset>"});
+  ExpectMessage({"main.xml:2: <attach>: found no \"model\", \"body\" or \"frame\"",
+                 "a <model> of <asset>, or a body"});
   attach("model=\"b\"");
   ExpectMessage({"main.xml:2: <attach> model: found \"b\"", "the name of a <model> in <asset>"});
   attach("model=\"a\" body=\"no\"");

@@ -5,6 +5,7 @@
 #include "harness/run/case_identity.h"
 #include "harness/run/peers.h"
 #include "mechanism/start/assembly.h"
+#include "tests/peers/gripper.h"
 #include "tests/peers/registered.h"
 #include "tests/peers/sensitivity.h"
 #include "tests/reference/cases.h"
@@ -77,6 +78,13 @@ TEST_P(ShippedAccelerations, AreSimbodys) {
 
 INSTANTIATE_TEST_SUITE_P(All, ShippedAccelerations, testing::ValuesIn(reference::ShippedNames()),
                          [](const auto& name) { return reference::WithoutDashes(name.param); });
+
+TEST(CoupledAccelerations, OfGrippersAreSimbodys) {
+  for (const double t : {0.0, 0.2}) {
+    Compare<Spatial>(peers_test::Gripper(), t);
+    Compare<Spatial>(peers_test::GripperWithRotors(), t);
+  }
+}
 
 }  // namespace peers_accelerations_test
 }  // namespace loopbench::harness

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "harness/config/formulations.h"
 #include "harness/run/peers.h"
 #include "tests/contract/sample.h"
 
@@ -72,6 +73,48 @@ std::optional<AccelerationError> PeerError(const std::string& name,
   const VectorX<double> udot =
       Eigen::Map<VectorX<double>>(ydot.data() + state.q.size(), state.u.size());
   return AccelerationError{RelativeError(udot, sample.udot(Coordinates::kJoint)), sample.Bound()};
+}
+
+/// Compares trees with a rotor on each joint of one coordinate. Returns the number of trees with
+/// rotors that change accelerations.
+template <class Space>
+int CompareRotors(const std::string& name, SpaceKind space) {
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    MechanismDescription tree = AnyMechanism(6, 0, 0, space, seed);
+    KeepExpressible(tree);
+    double inertia = 0.3;
+    for (JointDescription& joint : tree.joints) {
+      if (NumValues(joint.type, space, false) == 1) joint.rotor_inertia = inertia *= 1.3;
+    }
+    std::unique_ptr<harness::Peer> peer;
+    try {
+      peer = harness::MakePeer(name, tree);
+    } catch (const harness::Inexpressible&) {
+      continue;  // helical
+    }
+    const Sample<Space> sample(tree, seed);
+    const State& state = sample.state(Coordinates::kJoint);
+    const Mechanism<Space, double> mechanism(tree, Coordinates::kJoint);
+    const auto system = harness::MakeFormulation<Space>("odca", mechanism, {});
+    VectorX<double> udot;
+    EXPECT_EQ(system->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
+    std::vector<double> y(state.q.begin(), state.q.end());
+    y.insert(y.end(), state.u.begin(), state.u.end());
+    std::vector<double> ydot(y.size());
+    EXPECT_EQ(peer->Derivative(0.0, y, ydot), Outcome::kFinished);
+    const VectorX<double> theirs =
+        Eigen::Map<VectorX<double>>(ydot.data() + state.q.size(), state.u.size());
+    // accelerations without rotors: a peer that adds rotors by constraints changes these
+    const VectorX<double> without = sample.udot(Coordinates::kJoint).template cast<double>();
+    const double change = without.cwiseAbs().maxCoeff() / udot.cwiseAbs().maxCoeff();
+    EXPECT_LE(RelativeError(theirs, udot.template cast<Real>()),
+              sample.Bound() * std::max(1.0, change))
+        << tree.name;
+    // some trees have no joint with one coordinate
+    if (RelativeError(theirs, sample.udot(Coordinates::kJoint)) > 1e-3) ++compared;
+  }
+  return compared;
 }
 
 }  // namespace loopbench::testing

@@ -3,9 +3,9 @@
 
 #include <map>
 
-#include "harness/exchange/import.h"
 #include "mechanism/start/assembly.h"
 #include "tests/peers/expressible.h"
+#include "tests/peers/gripper.h"
 #include "tests/peers/registered.h"
 #include "tests/reference/cases.h"
 
@@ -42,46 +42,10 @@ TEST(MujocoTrees, InSpaceHaveTheOraclesAccelerations) {
   EXPECT_GE(CompareTrees<Spatial>(SpaceKind::kSpatial), 20);  // others have helical joints
 }
 
-/// Trees with a rotor on each joint of one coordinate, `armature` for MuJoCo; how many of them
-/// have rotors that change accelerations.
-template <class Space>
-int CompareRotors(SpaceKind space) {
-  int compared = 0;
-  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
-    MechanismDescription tree = AnyMechanism(6, 0, 0, space, seed);
-    KeepExpressible(tree);
-    double inertia = 0.3;
-    for (JointDescription& joint : tree.joints) {
-      if (NumValues(joint.type, space, false) == 1) joint.rotor_inertia = inertia *= 1.3;
-    }
-    std::unique_ptr<harness::Peer> peer;
-    try {
-      peer = harness::MakePeer("peer/mujoco", tree);
-    } catch (const harness::Inexpressible&) {
-      continue;  // helical
-    }
-    const Sample<Space> sample(tree, seed);
-    const State& state = sample.state(Coordinates::kJoint);
-    const Mechanism<Space, double> mechanism(tree, Coordinates::kJoint);
-    const auto system = harness::MakeFormulation<Space>("odca", mechanism, {});
-    VectorX<double> udot;
-    EXPECT_EQ(system->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
-    std::vector<double> y(state.q.begin(), state.q.end());
-    y.insert(y.end(), state.u.begin(), state.u.end());
-    std::vector<double> ydot(y.size());
-    EXPECT_EQ(peer->Derivative(0.0, y, ydot), Outcome::kFinished);
-    const VectorX<double> theirs =
-        Eigen::Map<VectorX<double>>(ydot.data() + state.q.size(), state.u.size());
-    EXPECT_LE(RelativeError(theirs, udot.template cast<Real>()), sample.Bound()) << tree.name;
-    // some trees have no joint with one coordinate
-    if (RelativeError(theirs, sample.udot(Coordinates::kJoint)) > 1e-3) ++compared;
-  }
-  return compared;
-}
-
 TEST(MujocoTrees, WithRotorsHaveOurAccelerations) {
-  EXPECT_GE(CompareRotors<Planar>(SpaceKind::kPlanar), 20);
-  EXPECT_GE(CompareRotors<Spatial>(SpaceKind::kSpatial), 5);  // others have helical joints
+  EXPECT_GE(CompareRotors<Planar>("peer/mujoco", SpaceKind::kPlanar), 20);
+  // others have helical joints
+  EXPECT_GE(CompareRotors<Spatial>("peer/mujoco", SpaceKind::kSpatial), 5);
 }
 
 /// Largest difference to O-DCA's accelerations, over the largest of these, at the four-bar's start
@@ -174,27 +138,9 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedMujoco,
                            return harness::reference::WithoutDashes(name.param);
                          });
 
-/// A palm on a turning wrist with two fingers, of which the second follows the first.
-constexpr const char* kGripper = R"(<robot name="gripper"><link name="world"/>
-<link name="palm"><inertial><mass value="1"/>
-  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="left"><inertial><origin xyz="0.05 0 0"/><mass value="0.2"/>
-  <inertia ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="right"><inertial><origin xyz="0.05 0 0"/><mass value="0.2"/>
-  <inertia ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="wrist" type="continuous"><parent link="world"/><child link="palm"/>
-  <axis xyz="0 1 0"/></joint>
-<joint name="l" type="continuous"><origin xyz="0 0.02 0"/><parent link="palm"/><child link="left"/>
-  <axis xyz="0 0 1"/></joint>
-<joint name="r" type="continuous"><origin xyz="0 -0.02 0"/><parent link="palm"/>
-  <child link="right"/><axis xyz="0 0 1"/><mimic joint="l" multiplier="-0.8" offset="0.1"/></joint>
-</robot>)";
-
 TEST(MujocoCouplings, AGripperThatMimicsMovesLikeOurs) {
-  harness::MechanismFile file{harness::ImportText(kGripper, "gripper.urdf").description};
+  harness::MechanismFile file{harness::peers_test::Gripper()};
   file.canonical = file.description.name;
-  file.description.initial.speeds = {{0, {1.0}}, {1, {2.0}}};
-  ASSERT_EQ(file.description.couplings.size(), 1u);
   // as above: a tenth by a hundredth of the tolerance
   const double error = EndError(file, 1e-6, 0.5);
   EXPECT_LE(EndError(file, 1e-8, 0.5), 0.2 * error + 1e-10);

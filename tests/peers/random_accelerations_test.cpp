@@ -52,5 +52,10 @@ TEST(RandomAccelerations, OfClosuresWithReleasedDirectionsAreSimbodys) {
   }
 }
 
+TEST(RandomAccelerations, WithRotorsAreSimbodys) {
+  EXPECT_GE(CompareRotors<Planar>("peer/simbody", SpaceKind::kPlanar), 20);
+  EXPECT_GE(CompareRotors<Spatial>("peer/simbody", SpaceKind::kSpatial), 20);
+}
+
 }  // namespace
 }  // namespace loopbench::testing

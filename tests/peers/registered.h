@@ -12,7 +12,6 @@ inline const bool kRegistered = (peers::RegisterPeers(), true);
 
 /// Shipped mechanisms that Simbody cannot express here, with the message.
 inline const std::map<std::string, std::string> kInexpressible = {
-    {"geared-five-bar", "peer/simbody does not have: coupling \"gears\""},
     {"driven-four-bar", "peer/simbody does not have: joint \"OA\": a prescribed motion"},
     {"screw-jack",
      "peer/simbody does not have: joint_torque along joint \"bearing\", which depends on time"}};

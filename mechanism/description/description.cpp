@@ -1,6 +1,7 @@
 #include "mechanism/description/description.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 namespace loopbench {

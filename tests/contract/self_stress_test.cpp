@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+#include <set>
+
 #include "lagrange/lagrange.h"
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/system.h"
@@ -171,6 +174,55 @@ INSTANTIATE_TEST_SUITE_P(
       std::erase(name, '-');
       return name + (one.param.coordinates == Coordinates::kJoint ? "Joint" : "Absolute");
     });
+
+/// One system goes through a turn both ways, so that rows move between joints and back. At 0 and pi
+/// the rows of the joint that closes the loop of two cranks depend on each other.
+TEST(MovingRows, HaveTheRightAccelerationsInAllPositions) {
+  const MechanismDescription given = Shipped("../experiments/overconstrained/plate-on-cranks");
+  const MechanismDescription description = Release(given, FindRedundancy(given));
+  // the plate does not turn, so each crank moves as a pendulum
+  constexpr double kPendulum = 9.81 * (3 * 0.2 + 2 * 0.4) / (3 * 0.06 + 2 * 0.16);
+  const auto check = [&]<class Maker>(const Maker& make, Coordinates set, SolverKind kind) {
+    const Mechanism<Planar, double> mechanism(description, set), joints(given, Coordinates::kJoint);
+    ASSERT_EQ(mechanism.num_moving_rows(), 1);
+    const Start<double> start = Assemble<Planar>(description, mechanism);
+    FormulationOptions options;
+    options.solver = kind;
+    const std::unique_ptr<System<Planar, double>> system = make(mechanism, options);
+    ASSERT_EQ(system->Start(0.0, start.q, start.u), Outcome::kFinished);
+    Kinematics<Planar, double> at(joints), there(mechanism);
+    std::set<std::vector<int>> choices;
+    std::vector<double> y(static_cast<std::size_t>(system->size())), ydot = y;
+    for (int k = 0; k <= 240; ++k) {
+      const double angle = std::numbers::pi / 60.0 * (k <= 120 ? k : 240 - k);
+      VectorX<double> q(4), u(4);
+      q << angle, angle, angle, -angle;
+      u << 1.3, 1.3, 1.3, -1.3;
+      at.UpdatePosition(q);
+      at.UpdateVelocity(u);
+      q = at.CoordinatesIn(mechanism);
+      there.UpdatePosition(q);
+      system->ToState(q, at.SpeedsIn(there), y);
+      ASSERT_EQ(system->Examine(0.0, y, ydot), Outcome::kFinished) << angle;
+      // round-off times the condition of the rows, whose coefficients are at most ten
+      EXPECT_NEAR(system->udot()[0], -kPendulum * std::cos(angle), 1e-11) << angle;
+      std::vector<int> choice;
+      for (const MovingRow& row : system->kinematics().moving_rows()) choice.push_back(row.joint);
+      choices.insert(choice);
+      system->BeginStep(0.0, y);
+    }
+    EXPECT_EQ(choices.size(), 2u) << "either joint that closes a loop has the moving row";
+  };
+  for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    for (const SolverKind kind : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
+      check([](const auto& m, const auto& o) { return MakeSystem<odca::Odca>(m, o); }, set, kind);
+      check([](const auto& m, const auto& o) { return MakeSystem<lagrange::Lagrange>(m, o); }, set,
+            kind);
+      check([](const auto& m, const auto& o) { return MakeSystem<reduction::Reduction>(m, o); },
+            set, kind);
+    }
+  }
+}
 
 }  // namespace
 }  // namespace loopbench

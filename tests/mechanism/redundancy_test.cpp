@@ -77,6 +77,23 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+TEST(RedundancyTest, RowsMoveWhereNoJointKeepsItsNumber) {
+  const Redundancy plate = FindRedundancy(Shipped("../experiments/overconstrained/plate-on-cranks"));
+  EXPECT_EQ(plate.rows, 4);
+  EXPECT_EQ(plate.rank, 3);
+  const auto moving = [](const Redundancy& found) {
+    int count = 0;
+    for (const Released& out : found.released) count += static_cast<int>(out.moving.size());
+    return count;
+  };
+  EXPECT_EQ(Count(plate.released), 2);
+  EXPECT_EQ(moving(plate), 1);
+  // pivots in line: both loops are singular in the same positions
+  for (const char* name : {"three-cranks", "locomotive"}) {
+    EXPECT_EQ(moving(FindRedundancy(Shipped(name))), 0) << name;
+  }
+}
+
 TEST(RedundancyTest, ASingularStartIsNoRedundancy) {
   for (const char* name : {"parallelogram-singular-start", "toggle-singular-start"}) {
     const Redundancy found = FindRedundancy(Shipped(name));

@@ -355,7 +355,8 @@ Fields<Joint> MakeJointFields() {
        "an object with keys \"body\", \"at\", \"rotation\""},
       {"", By(Json::object(), CheckSides)},
       {"axis", By(VectorSchema(), ReadAxis, WriteAxis),
-       "Axis, not zero. Default: x for prismatic and pin-in-slot joints, otherwise z."}};
+       "Axis, not zero. Default: x for prismatic, pin-in-slot and point-on-line joints, otherwise "
+       "z."}};
   AddParameters(&rows);
   rows.push_back({"motion", By(motions, ReadMotions, WriteMotions),
                   "Prescribed coordinates as functions of time [rad or m]: one function for a "

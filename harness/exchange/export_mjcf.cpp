@@ -79,7 +79,11 @@ const std::vector<PartKind>* PartsOf(const Joint& joint) {
       {"universal", {{'h', 0, 0}, {'h', 1, 1}}},
       {"spherical", {{'b', 0, 0}}},
       {"planar", {{'s', 0, 1}, {'s', 1, 2}, {'h', 2, 0}}},
-      {"free", {{'s', 0, 4}, {'s', 1, 5}, {'s', 2, 6}, {'b', 0, 0}}}};
+      {"free", {{'s', 0, 4}, {'s', 1, 5}, {'s', 2, 6}, {'b', 0, 0}}},
+      {"translation", {{'s', 0, 0}, {'s', 1, 1}, {'s', 2, 2}}},
+      {"schoenflies", {{'s', 0, 1}, {'s', 1, 2}, {'s', 2, 3}, {'h', 2, 0}}},
+      {"point-on-line", {{'s', 0, 4}, {'b', 0, 0}}},
+      {"point-in-plane", {{'s', 0, 4}, {'s', 1, 5}, {'b', 0, 0}}}};
   const bool in_plane = joint.kind == "free" && joint.coordinates.size() == 3;
   const auto found = kParts.find(in_plane ? "planar" : joint.kind);
   return found == kParts.end() ? nullptr : &found->second;

@@ -34,10 +34,10 @@ using Type = SimbodyConstraintType;
 /// Returns the class of a tree joint; "" if unsupported.
 std::string MobilizerOf(const Joint& joint) {
   static const std::map<std::string, std::string> kMobilizers = {
-      {"revolute", "Pin"},           {"prismatic", "Slider"}, {"weld", "Weld"},
-      {"cylindrical", "Cylinder"},   {"spherical", "Ball"},   {"universal", "Universal"},
-      {"planar", "Planar"},          {"free", "Free"},        {"helical", "Screw"},
-      {"pin-in-slot", "BendStretch"}};
+      {"translation", "Translation"}, {"prismatic", "Slider"}, {"revolute", "Pin"},
+      {"pin-in-slot", "BendStretch"}, {"planar", "Planar"},    {"weld", "Weld"},
+      {"spherical", "Ball"},          {"free", "Free"},        {"universal", "Universal"},
+      {"cylindrical", "Cylinder"},    {"helical", "Screw"}};
   if (joint.kind == "free" && joint.coordinates.size() == 3) return "Planar";
   const auto found = kMobilizers.find(joint.kind);
   return found == kMobilizers.end() ? "" : found->second;
@@ -61,18 +61,22 @@ struct Closure {
 const std::map<std::string, Closure>& Closures() {
   const Row ball = {Type::kBall}, on_x = {Type::kPointOnLine, kX}, on_z = {Type::kPointOnLine, kZ};
   const Row across_y = {Type::kPointInPlane, kY}, across_z = {Type::kPointInPlane, kZ};
-  const Row angle = {Type::kConstantAngle, kX, kY};
+  const Row angle = {Type::kConstantAngle, kX, kY}, orientation = {Type::kConstantOrientation};
   // keep z of F and z of M parallel
   const Row x = {Type::kConstantAngle, kZ, kX}, y = {Type::kConstantAngle, kZ, kY};
   static const std::map<std::string, Closure> kClosures = {
       {"revolute", {{on_z}, {ball, x, y}}},
-      {"prismatic", {{across_y, angle}, {on_x, {Type::kConstantOrientation}}}},
+      {"prismatic", {{across_y, angle}, {on_x, orientation}}},
       {"weld", {{on_z, angle}, {{Type::kWeld}}}},
       {"pin-in-slot", {{across_y}, {on_x, x, y}}},
       {"cylindrical", {{}, {on_z, x, y}}},
       {"spherical", {{}, {ball}}},
       {"planar", {{}, {across_z, x, y}}},
-      {"universal", {{}, {ball, angle}}}};
+      {"universal", {{}, {ball, angle}}},
+      {"translation", {{}, {orientation}}},
+      {"schoenflies", {{}, {x, y}}},
+      {"point-on-line", {{}, {on_x}}},
+      {"point-in-plane", {{}, {across_z}}}};
   return kClosures;
 }
 

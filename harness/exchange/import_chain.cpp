@@ -112,12 +112,33 @@ std::optional<ComposedJoint> JointOf(const std::vector<SerialJoint>& joints,
       return ComposedJoint{JointType::kPlanar, {Axes(a, z), hinges[0].position}};
     }
   }
+  const bool spans = slides.size() == 3 && Independent(slides);
+  if (spans && joints.size() == 3) {
+    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
+    return ComposedJoint{JointType::kTranslation, {Axes(a, a.cross(b)), Vector3d::Zero()}};
+  }
+  if (spans && joints.size() == 4 && hinges.size() == 1) {
+    return ComposedJoint{JointType::kSchoenflies, {TurnOfZ(hinges[0].axis), hinges[0].position}};
+  }
   std::optional<Vector3d> centre;
   if (balls.size() == 1 && hinges.empty()) centre = balls[0].position;
   if (balls.empty() && hinges.size() == 3 && Independent(hinges)) centre = MeetingPoint(hinges);
   if (centre && slides.empty()) return ComposedJoint{JointType::kSpherical, Placement(*centre)};
-  if (centre && slides.size() == 3 && Independent(slides)) {
-    return ComposedJoint{JointType::kFree, Placement(*centre)};
+  if (centre && spans) return ComposedJoint{JointType::kFree, Placement(*centre)};
+  // the line or plane is on the parent when the slides come first, on the child when they come last
+  const bool from_is_child = joints.front().kind != SerialKind::kSlide;
+  const bool is_mixed = !std::ranges::is_partitioned(joints, [&](const SerialJoint& joint) {
+    return (joint.kind == SerialKind::kSlide) != from_is_child;
+  });
+  if (!centre || is_mixed) return std::nullopt;
+  const Vector3d& x = slides[0].axis;
+  if (slides.size() == 1) {
+    const Vector3d other = std::abs(x.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
+    return ComposedJoint{JointType::kPointOnLine, {Axes(x, other), *centre}, from_is_child};
+  }
+  if (slides.size() == 2 && !Parallel(x, slides[1].axis)) {
+    const Vector3d z = x.cross(slides[1].axis);
+    return ComposedJoint{JointType::kPointInPlane, {Axes(x, z), *centre}, from_is_child};
   }
   return std::nullopt;
 }

@@ -139,7 +139,8 @@ struct ComposedJoint {
 };
 
 inline constexpr const char* kAxesOfOneJoint =
-    "axes of a universal, cylindrical, planar, spherical or free joint or a pin in a slot";
+    "axes of a universal, cylindrical, planar, spherical, translation, schoenflies, point-on-line, "
+    "point-in-plane or free joint or a pin in a slot";
 
 /// Returns the joint that a series forms, if there is one.
 std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints);

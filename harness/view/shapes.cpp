@@ -285,6 +285,20 @@ class JointSymbol {
       case JointType::kHelical:
         Screw();
         break;
+      case JointType::kSchoenflies:
+        Axle(to(), places_.M, ShapeStyle::kSolid, 2.2, 0.3);
+        [[fallthrough]];
+      case JointType::kTranslation:
+        pen_.Box(ShapeStyle::kJoint, to(), places_.M, {1.3, 1.3, 1.3});
+        break;
+      case JointType::kPointOnLine:
+        Guide(0, ShapeStyle::kGuide, 0.3, 4.0);
+        pen_.Add(ShapeKind::kDisc, ShapeStyle::kSolid, {On(to(), places_.M)}, 0.65);
+        break;
+      case JointType::kPointInPlane:
+        pen_.Box(ShapeStyle::kGuide, from(), places_.F, {4.0, 4.0, 0.1});
+        pen_.Add(ShapeKind::kDisc, ShapeStyle::kSolid, {On(to(), places_.M)}, 0.65);
+        break;
       default:
         pen_.Add(ShapeKind::kArea, ShapeStyle::kJoint,
                  pen_.On(to(), places_.M, {{1.2, 0, 0}, {0, 1.2, 0}, {-1.2, 0, 0}, {0, -1.2, 0}}));

@@ -64,6 +64,21 @@ std::deque<JointTraits> BuiltIn() {
                   .axes = {"z", "z"},
                   .cut_last = true,
                   .parameter = {"pitch", "the advance along the axis per angle [m/rad]", "m/rad"}},
+      JointTraits{.name = "translation", .coordinates = "x, y, z", .axes = {"xyz", "xyz"}},
+      JointTraits{.name = "schoenflies",
+                  .own_axis = 'z',
+                  .coordinates = "angle, x, y, z",
+                  .axes = {"z", "z"}},
+      JointTraits{.name = "point-on-line",
+                  .own_axis = 'x',
+                  .coordinates = "qw, qx, qy, qz, x",
+                  .speeds = "wx, wy, wz, x",
+                  .axes = {"x", ""}},
+      JointTraits{.name = "point-in-plane",
+                  .own_axis = 'z',
+                  .coordinates = "qw, qx, qy, qz, x, y",
+                  .speeds = "wx, wy, wz, x, y",
+                  .axes = {"z", ""}},
   };
 }
 

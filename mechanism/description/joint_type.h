@@ -24,6 +24,10 @@ enum class JointType {
   kPlanar,
   kUniversal,
   kHelical,
+  kTranslation,
+  kSchoenflies,
+  kPointOnLine,
+  kPointInPlane,
 };
 
 /// Words "from" and "to": of frame F and of frame M.

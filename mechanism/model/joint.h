@@ -20,17 +20,21 @@
 // order in a rotation violation in space).
 //
 // Coordinates, in F axes:
-//   revolute      angle about z
-//   prismatic     shift along x
-//   weld          none
-//   free          plane: angle, x, y; space: quaternion w x y z, then x, y, z
-//   pin-in-slot   angle about z, shift along x
-//   rod           none; the distance of Mo from Fo is constant, and D is along it
-//   cylindrical   angle about z, shift along z
-//   spherical     quaternion w x y z
-//   planar        angle about z, x, y
-//   universal     angle about x, then about the turned y
-//   helical       angle about z, along which it shifts by `pitch` times the angle
+//   revolute        angle about z
+//   prismatic       shift along x
+//   weld            none
+//   free            plane: angle, x, y; space: quaternion w x y z, then x, y, z
+//   pin-in-slot     angle about z, shift along x
+//   rod             none; the distance of Mo from Fo is constant, and D is along it
+//   cylindrical     angle about z, shift along z
+//   spherical       quaternion w x y z
+//   planar          angle about z, x, y
+//   universal       angle about x, then about the turned y
+//   helical         angle about z, along which it shifts by `pitch` times the angle
+//   translation     x, y, z
+//   schoenflies     angle about z, x, y, z
+//   point-on-line   quaternion w x y z, shift along x
+//   point-in-plane  quaternion w x y z, x, y
 // Speeds are their rates; with a quaternion, the angular velocity. A quaternion is normalised on
 // use, so its length carries no information.
 #pragma once

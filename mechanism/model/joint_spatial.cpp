@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -98,135 +99,43 @@ struct Kinds {
             Linear<Spatial, S>::Zero()};
   }
 
-  static JointKind<Spatial, S> Revolute() {
-    return {.num_q = 1,
-            .num_u = 1,
-            .axes = {2, 0, 1, 3, 4, 5},
-            .rotation_invariant = false,
-            .transform =
-                [](const S* q, P& X, S) {
-                  TurnAboutZ(q[0], X);
-                  X.p.setZero();
-                },
-            .coordinates = [](const P& X, S* q, S) { q[0] = AngleAboutZ(X); },
-            .rates = SameRates<S, 1>,
-            .exact_basis = TiltBasis<2, 0, 1, 3, 4, 5>,
-            .exact_bias = TiltBias,
-            .exact_basis_rate = TiltRate<2, 0, 1, 3, 4, 5>};
-  }
-  static JointKind<Spatial, S> Prismatic() {
-    return {.num_q = 1,
-            .num_u = 1,
-            .axes = {3, 0, 1, 2, 4, 5},
-            .rotation_invariant = false,
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.R.setIdentity();
-                  X.p = {q[0], S(0), S(0)};
-                },
-            .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
-            .rates = SameRates<S, 1>};
-  }
-  static JointKind<Spatial, S> Weld() {
-    return {.num_q = 0,
-            .num_u = 0,
-            .axes = {0, 1, 2, 3, 4, 5},
-            .rotation_invariant = true,
-            .transform = [](const S*, P& X, S) { X = P(); },
-            .coordinates = [](const P&, S*, S) {},
-            .rates = SameRates<S, 0>};
-  }
-  static JointKind<Spatial, S> Free() {
-    return {.num_q = 7,
-            .num_u = 6,
-            .axes = {0, 1, 2, 3, 4, 5},
-            .rotation_invariant = false,
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.R = FromQuaternion(q);
-                  X.p = {q[4], q[5], q[6]};
-                },
-            .coordinates =
-                [](const P& X, S* q, S) {
-                  ToQuaternion(X.R, q);
-                  for (int i = 0; i < 3; ++i) q[4 + i] = X.p[i];
-                },
-            .rates =
-                [](const S* q, const S* u, S* qdot) {
-                  QuaternionRates(q, u, qdot);
-                  for (int i = 0; i < 3; ++i) qdot[4 + i] = u[3 + i];
-                }};
-  }
-  static JointKind<Spatial, S> PinInSlot() {
-    return {.num_q = 2,
-            .num_u = 2,
-            .axes = {2, 3, 0, 1, 4, 5},
-            .transform =
-                [](const S* q, P& X, S) {
-                  TurnAboutZ(q[0], X);
-                  X.p = {q[1], S(0), S(0)};
-                },
-            .coordinates =
-                [](const P& X, S* q, S) {
-                  q[0] = AngleAboutZ(X);
-                  q[1] = X.p[0];
-                },
-            .rates = SameRates<S, 2>,
-            .exact_basis = TiltBasis<2, 3, 0, 1, 4, 5>,
-            .exact_bias = TiltBias,
-            .exact_basis_rate = TiltRate<2, 3, 0, 1, 4, 5>};
-  }
-  static JointKind<Spatial, S> Cylindrical() {
-    return {.num_q = 2,
-            .num_u = 2,
-            .axes = {2, 5, 0, 1, 3, 4},
-            .transform =
-                [](const S* q, P& X, S) {
-                  TurnAboutZ(q[0], X);
-                  X.p = {S(0), S(0), q[1]};
-                },
-            .coordinates =
-                [](const P& X, S* q, S) {
-                  q[0] = AngleAboutZ(X);
-                  q[1] = X.p[2];
-                },
-            .rates = SameRates<S, 2>,
-            .exact_basis = TiltBasis<2, 5, 0, 1, 3, 4>,
-            .exact_bias = TiltBias,
-            .exact_basis_rate = TiltRate<2, 5, 0, 1, 3, 4>};
-  }
-  /// The paper's example: H = [1; 0], D = [0; 1] in blocks of three (8).
-  static JointKind<Spatial, S> Spherical() {
-    return {.num_q = 4,
-            .num_u = 3,
-            .axes = {0, 1, 2, 3, 4, 5},
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.R = FromQuaternion(q);
-                  X.p.setZero();
-                },
-            .coordinates = [](const P& X, S* q, S) { ToQuaternion(X.R, q); },
-            .rates = QuaternionRates};
-  }
-  static JointKind<Spatial, S> InPlane() {
-    return {.num_q = 3,
-            .num_u = 3,
-            .axes = {2, 3, 4, 0, 1, 5},
-            .transform =
-                [](const S* q, P& X, S) {
-                  TurnAboutZ(q[0], X);
-                  X.p = {q[1], q[2], S(0)};
-                },
-            .coordinates =
-                [](const P& X, S* q, S) {
-                  q[0] = AngleAboutZ(X);
-                  q[1] = X.p[0];
-                  q[2] = X.p[1];
-                },
-            .rates = SameRates<S, 3>,
-            .exact_basis = TiltBasis<2, 3, 4, 0, 1, 5>,
-            .exact_bias = TiltBias,
-            .exact_basis_rate = TiltRate<2, 3, 4, 0, 1, 5>};
+  /// The kind whose free directions are the first `kNumU` of these axes of F: turns (none, about z,
+  /// or all), then shifts. A spherical joint is the paper's example: H = [1; 0], D = [0; 1] (8).
+  template <int kNumU, int... kAxes>
+  static JointKind<Spatial, S> Along() {
+    static constexpr int kAxis[] = {kAxes...};
+    static constexpr int kTurns = static_cast<int>(
+        std::ranges::count_if(kAxis, kAxis + kNumU, [](int axis) { return axis < 3; }));
+    static constexpr int kMore = kTurns == 3 ? 1 : 0;  // a quaternion has one number more
+    static_assert(kTurns == 0 || (kTurns == 1 && kAxis[0] == 2) ||
+                  (kTurns == 3 && kAxis[0] == 0 && kAxis[1] == 1 && kAxis[2] == 2));
+    JointKind<Spatial, S> kind;
+    kind.num_q = kNumU + kMore;
+    kind.num_u = kNumU;
+    kind.axes = {kAxes...};
+    kind.rotation_invariant = kNumU == 0;
+    kind.transform = [](const S* q, P& X, S) {
+      if constexpr (kTurns == 0) X.R.setIdentity();
+      if constexpr (kTurns == 1) TurnAboutZ(q[0], X);
+      if constexpr (kTurns == 3) X.R = FromQuaternion(q);
+      X.p.setZero();
+      for (int i = kTurns; i < kNumU; ++i) X.p[kAxis[i] - 3] = q[i + kMore];
+    };
+    kind.coordinates = [](const P& X, S* q, S) {
+      if constexpr (kTurns == 1) q[0] = AngleAboutZ(X);
+      if constexpr (kTurns == 3) ToQuaternion(X.R, q);
+      for (int i = kTurns; i < kNumU; ++i) q[i + kMore] = X.p[kAxis[i] - 3];
+    };
+    kind.rates = [](const S* q, const S* u, S* qdot) {
+      if constexpr (kTurns == 3) QuaternionRates(q, u, qdot);
+      for (int i = 3 * kMore; i < kNumU; ++i) qdot[i + kMore] = u[i];
+    };
+    if constexpr (kTurns == 1) {
+      kind.exact_basis = TiltBasis<kAxes...>;
+      kind.exact_bias = TiltBias;
+      kind.exact_basis_rate = TiltRate<kAxes...>;
+    }
+    return kind;
   }
   static JointKind<Spatial, S> Universal() {
     return {.num_q = 2,
@@ -335,8 +244,21 @@ struct Kinds {
 template <class S>
 std::vector<JointKind<Spatial, S>> SpatialKinds() {
   using K = Kinds<S>;
-  return {K::Revolute(),    K::Prismatic(), K::Weld(),    K::Free(),      K::PinInSlot(), K::Rod(),
-          K::Cylindrical(), K::Spherical(), K::InPlane(), K::Universal(), K::Helical()};
+  return {K::template Along<1, 2, 0, 1, 3, 4, 5>(),  // revolute
+          K::template Along<1, 3, 0, 1, 2, 4, 5>(),  // prismatic
+          K::template Along<0, 0, 1, 2, 3, 4, 5>(),  // weld
+          K::template Along<6, 0, 1, 2, 3, 4, 5>(),  // free
+          K::template Along<2, 2, 3, 0, 1, 4, 5>(),  // pin-in-slot
+          K::Rod(),
+          K::template Along<2, 2, 5, 0, 1, 3, 4>(),  // cylindrical
+          K::template Along<3, 0, 1, 2, 3, 4, 5>(),  // spherical
+          K::template Along<3, 2, 3, 4, 0, 1, 5>(),  // planar
+          K::Universal(),
+          K::Helical(),
+          K::template Along<3, 3, 4, 5, 0, 1, 2>(),   // translation
+          K::template Along<4, 2, 3, 4, 5, 0, 1>(),   // schoenflies
+          K::template Along<4, 0, 1, 2, 3, 4, 5>(),   // point-on-line
+          K::template Along<5, 0, 1, 2, 3, 4, 5>()};  // point-in-plane
 }
 
 #define LOOPBENCH_INSTANTIATE(S) template std::vector<JointKind<Spatial, S>> SpatialKinds();

@@ -32,6 +32,7 @@ MobilizedBody Mobilize(const exchange::SimbodyMobilizer& one, MobilizedBody& par
   if (one.type == "Universal") return make(MobilizedBody::Universal());
   if (one.type == "Planar") return make(MobilizedBody::Planar());
   if (one.type == "Free") return make(MobilizedBody::Free());
+  if (one.type == "Translation") return make(MobilizedBody::Translation());
   if (one.type == "BendStretch") return make(MobilizedBody::BendStretch());
   return MobilizedBody::Screw(parent, on_parent, body, on_child, one.pitch, direction);
 }

@@ -160,6 +160,17 @@ TEST(AccelerationsTest, GraphsOfEveryJointAgreeWithTheOracle) {
   space.Finish();
 }
 
+/// Kinds that random graphs got later, too: draws of their own.
+TEST(AccelerationsTest, GraphsOfAllKindsInSpaceAgreeWithTheOracle) {
+  Family space("all kinds, space", kShare);
+  for (const auto& [loops, seed] : GraphSeeds(4)) {
+    const int motions = static_cast<int>(seed) % 3;
+    space.Hold(Sample<Spatial>(MixedGraph(loops, kSpace, seed, motions, DrawnKinds::kAll), seed),
+               true);
+  }
+  space.Finish();
+}
+
 TEST(AccelerationsTest, DrivenGraphsOfEveryJointAgreeWithTheOracle) {
   Family plane("driven, plane", kShare), space("driven, space", kShare);
   for (const auto& [loops, seed] : GraphSeeds(4)) {

@@ -16,8 +16,8 @@ namespace {
 
 TEST_P(ContractTest, AccelerationsAgreeWithTheOracle) {
   double worst = 0.0;
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    Run(Description(seed), seed, [&](auto bench) {
+  const auto hold = [&](const MechanismDescription& description, std::uint64_t seed) {
+    Run(description, seed, [&](auto bench) {
       ASSERT_EQ(bench.Examine(bench.y), Outcome::kFinished);
       const double error =
           RelativeError(bench.formulation->udot(), bench.sample.udot(GetParam().coordinates));
@@ -25,6 +25,10 @@ TEST_P(ContractTest, AccelerationsAgreeWithTheOracle) {
       EXPECT_EQ(bench.formulation->diagnostics().rank, bench.sample.answer().rank);
       worst = std::max(worst, error / bench.Bound());
     });
+  };
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    hold(Description(seed), seed);
+    if (GetParam().space == SpaceKind::kSpatial) hold(LoopOfAllKinds(seed), seed);
   }
   RecordProperty("worst_part_of_bound", std::to_string(worst));
 }

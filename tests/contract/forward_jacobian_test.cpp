@@ -256,11 +256,11 @@ INSTANTIATE_TEST_SUITE_P(All, ForwardJacobianOf, ::testing::ValuesIn(ShippedName
                            return text;
                          });
 
-/// Joints, forces and motions of every kind.
+/// Joints, forces and motions of these kinds.
 template <class Space>
-void CompareRandom(std::uint64_t seed) {
+void CompareRandom(std::uint64_t seed, DrawnKinds kinds = DrawnKinds::kUpToHelical) {
   const SpaceKind space = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
-  const MechanismDescription description = MixedGraph(2, space, seed, seed % 2 == 0 ? 2 : 0);
+  const MechanismDescription description = MixedGraph(2, space, seed, seed % 2 == 0 ? 2 : 0, kinds);
   SCOPED_TRACE(description.name);
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   const State state = ConsistentState<Space>(description, mechanism, seed);
@@ -316,6 +316,9 @@ TEST(ForwardJacobian, NeedNotKnowHowFarASpringIsWound) {
 class ForwardJacobianOfRandom : public ::testing::TestWithParam<std::uint64_t> {};
 TEST_P(ForwardJacobianOfRandom, MechanismInThePlane) { CompareRandom<Planar>(GetParam()); }
 TEST_P(ForwardJacobianOfRandom, MechanismInSpace) { CompareRandom<Spatial>(GetParam()); }
+TEST_P(ForwardJacobianOfRandom, MechanismOfAllKinds) {
+  if (GetParam() <= 4) CompareRandom<Spatial>(GetParam(), DrawnKinds::kAll);
+}
 INSTANTIATE_TEST_SUITE_P(Seeds, ForwardJacobianOfRandom, ::testing::Range<std::uint64_t>(1, 11));
 
 }  // namespace

@@ -21,11 +21,10 @@ int Grow(Builder& b, int root, int n) {
   return root;
 }
 
-/// A joint of any kind that the space has.
-JointType AnyJoint(Builder& b) {
+/// A joint of any of these kinds that the space has.
+JointType AnyJoint(Builder& b, DrawnKinds kinds) {
   for (;;) {
-    const auto type =
-        static_cast<JointType>(b.random.Below(static_cast<int>(AllJointTraits().size())));
+    const JointType type = DrawKind(b.random, kinds);
     if (b.spatial || TraitsOf(type).in_plane) return type;
   }
 }
@@ -68,6 +67,13 @@ bool LoopsAreIndependent(const MechanismDescription& description) {
 }
 
 }  // namespace
+
+JointType DrawKind(Random& random, DrawnKinds kinds) {
+  const std::size_t up_to_helical = static_cast<std::size_t>(JointType::kHelical) + 1;
+  const std::size_t all = AllJointTraits().size();
+  return static_cast<JointType>(
+      random.Below(static_cast<int>(kinds == DrawnKinds::kAll ? all : up_to_helical)));
+}
 
 MechanismDescription RandomChain(int n, SpaceKind space, std::uint64_t seed) {
   Builder b("chain-" + std::to_string(n), space, seed);
@@ -130,11 +136,12 @@ MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed)
   return b.Finish();
 }
 
-MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, int motions) {
+MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, int motions,
+                                DrawnKinds kinds) {
   Builder b("mixed-" + std::to_string(loops), space, seed);
-  const auto any = [&b] {
+  const auto any = [&] {
     for (;;) {
-      const JointType type = AnyJoint(b);
+      const JointType type = AnyJoint(b, kinds);
       if (type != JointType::kFree) return type;
     }
   };
@@ -181,11 +188,11 @@ MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint
 }
 
 MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind space,
-                                  std::uint64_t seed) {
+                                  std::uint64_t seed, DrawnKinds kinds) {
   Builder b("any-" + std::to_string(n) + "-" + std::to_string(closures), space, seed);
   for (int i = 1; i <= n; ++i) {
-    JointType type = AnyJoint(b);
-    while (type == JointType::kRod) type = AnyJoint(b);  // not in a tree
+    JointType type = AnyJoint(b, kinds);
+    while (type == JointType::kRod) type = AnyJoint(b, kinds);  // not in a tree
     const int parent = b.random.Chance(0.6) ? i - 1 : b.random.Below(i);
     const Eigen::Vector3d at_parent = b.random.Vector(0.7, b.spatial);
     const int body = b.AddBody(1.0);
@@ -194,7 +201,8 @@ MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind sp
   }
   for (int k = 0; k < closures; ++k) {
     const int to = 1 + b.random.Below(n), from = (to + 1 + b.random.Below(n)) % (n + 1);
-    b.Close(AnyJoint(b), from, to, b.random.Vector(0.7, b.spatial), b.random.Uniform(-1.0, 1.0));
+    b.Close(AnyJoint(b, kinds), from, to, b.random.Vector(0.7, b.spatial),
+            b.random.Uniform(-1.0, 1.0));
   }
   if (!b.description.initial.coordinates.empty()) b.AddMotions(motions);
   return b.Finish();

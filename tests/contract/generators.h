@@ -35,6 +35,11 @@ class Random {
   std::mt19937_64 generator_;
 };
 
+/// Kinds of joints to draw from. The mechanisms of those up to helical do not depend on kinds that
+/// are added.
+enum class DrawnKinds { kUpToHelical, kAll };
+JointType DrawKind(Random& random, DrawnKinds kinds = DrawnKinds::kUpToHelical);
+
 /// Closed chain of n >= 3 bodies between two ground points, revolute joints with random arms. In
 /// space n >= 7 has axes in all directions; fewer bodies need axes through one point to move.
 MechanismDescription RandomChain(int n, SpaceKind space, std::uint64_t seed);
@@ -55,9 +60,10 @@ MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed);
 /// closed at their tips by a revolute, prismatic or weld joint.
 MechanismDescription RandomGraph(int loops, SpaceKind space, std::uint64_t seed);
 
-/// Every kind of joint but free ones, in the tree and as closures; loops with freedom to spare.
+/// These kinds of joints but free ones, in the tree and as closures; loops with freedom to spare.
 /// Up to `motions` coordinates follow given motions.
-MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, int motions = 0);
+MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, int motions = 0,
+                                DrawnKinds kinds = DrawnKinds::kUpToHelical);
 
 /// A tree of n bodies with closing joints between random bodies: loops share most of their links.
 /// Closures are independent: draws that are over-constrained somewhere are drawn again.
@@ -66,11 +72,11 @@ MechanismDescription TightGraph(int n, int loops, SpaceKind space, std::uint64_t
 /// The same with short loops and without that care: parts are rigid or over-constrained.
 MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint64_t seed);
 
-/// Anything goes: a tree of n bodies with joints of every kind but rods, closed between random
-/// bodies by joints of every kind, rods among them; parts may be rigid, over-constrained, or the
+/// Anything goes: a tree of n bodies with joints of these kinds but rods, closed between random
+/// bodies by joints of these kinds, rods among them; parts may be rigid, over-constrained, or the
 /// whole locked. Up to `motions` coordinates follow given motions, which loops may forbid.
 MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind space,
-                                  std::uint64_t seed);
+                                  std::uint64_t seed, DrawnKinds kinds = DrawnKinds::kUpToHelical);
 
 /// A state of a mechanism: (q, u) in its own coordinates, rounded to double.
 struct State {

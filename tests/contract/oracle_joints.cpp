@@ -67,7 +67,14 @@ Sizes SizesOf(JointType type, bool spatial) {
     case JointType::kSpherical:
       return {4, 3};
     case JointType::kPlanar:
+    case JointType::kTranslation:
       return {3, 3};
+    case JointType::kSchoenflies:
+      return {4, 4};
+    case JointType::kPointOnLine:
+      return {5, 4};
+    case JointType::kPointInPlane:
+      return {6, 5};
     default:
       return {1, 1};
   }
@@ -84,7 +91,9 @@ Mismatch DriveMismatch(const JointDescription& joint, int coordinate, const JetP
     for (int i = 0; i < 3; ++i) along[i] = coordinate == 0 ? Real(i == 0) : X.R(i, 1).f;
     return {along, coordinate == 0 ? beyond(X.R(1, 1), X.R(2, 1)) : beyond(X.R(0, 0), X.R(0, 2))};
   }
-  if (joint.type == JointType::kPrismatic) return {Real6::Unit(3), X.p[0] - s};
+  if (joint.type == JointType::kPrismatic || joint.type == JointType::kTranslation) {
+    return {Real6::Unit(3 + coordinate), X.p[coordinate] - s};
+  }
   const Jet angle = beyond(X.R(0, 0), X.R(1, 0));
   if (joint.type == JointType::kHelical) {
     const Real pitch = joint.parameter;
@@ -106,12 +115,12 @@ std::vector<Mismatch> Mismatches(const JointDescription& joint, bool spatial, co
   }
   const auto add = [&c](int axis, const Jet& value) { c.push_back({Real6::Unit(axis), value}); };
   const JetVector turn = SmallTurn(X.R);
-  const bool in_plane = type == JointType::kRevolute || type == JointType::kPinInSlot ||
-                        type == JointType::kCylindrical || type == JointType::kPlanar ||
-                        type == JointType::kHelical;
+  const auto is = [type](auto... types) { return ((type == types) || ...); };
+  const bool in_plane = is(JointType::kRevolute, JointType::kPinInSlot, JointType::kCylindrical,
+                           JointType::kPlanar, JointType::kHelical, JointType::kSchoenflies);
   if (!spatial) {
     if (!in_plane) add(2, turn[2]);
-    if (type != JointType::kPrismatic && type != JointType::kPinInSlot) add(3, X.p[0]);
+    if (!is(JointType::kPrismatic, JointType::kPinInSlot)) add(3, X.p[0]);
     add(4, X.p[1]);
     return c;
   }
@@ -125,13 +134,15 @@ std::vector<Mismatch> Mismatches(const JointDescription& joint, bool spatial, co
     normal[1] = -X.R(2, 1).f;
     normal[2] = X.R(1, 1).f;
     c.push_back({normal, -X.R(0, 1)});
-  } else if (type != JointType::kSpherical) {
+  } else if (!is(JointType::kSpherical, JointType::kPointOnLine, JointType::kPointInPlane)) {
     for (int i = 0; i < 3; ++i) add(i, turn[i]);
   }
+  if (is(JointType::kTranslation, JointType::kSchoenflies)) return c;
+  const bool free_xy = is(JointType::kPlanar, JointType::kPointInPlane);
   const bool free_x =
-      type == JointType::kPrismatic || type == JointType::kPinInSlot || type == JointType::kPlanar;
+      free_xy || is(JointType::kPrismatic, JointType::kPinInSlot, JointType::kPointOnLine);
   if (!free_x) add(3, X.p[0]);
-  if (type != JointType::kPlanar) add(4, X.p[1]);
+  if (!free_xy) add(4, X.p[1]);
   if (type == JointType::kHelical) {
     const Real pitch = joint.parameter, length = std::sqrt(1 + pitch * pitch);
     Real6 along = Real6::Zero();
@@ -177,6 +188,21 @@ JetPose Transform(JointType type, bool spatial, const Jet* q, Real pitch) {
       break;
     case JointType::kUniversal:
       X.R = AboutX(q[0]) * AboutY(q[1]);
+      break;
+    case JointType::kTranslation:
+      X.p = {q[0], q[1], q[2]};
+      break;
+    case JointType::kSchoenflies:
+      X.R = AboutZ(q[0]);
+      X.p = {q[1], q[2], q[3]};
+      break;
+    case JointType::kPointOnLine:
+      X.R = FromQuaternion(q);
+      X.p[0] = q[4];
+      break;
+    case JointType::kPointInPlane:
+      X.R = FromQuaternion(q);
+      X.p = {q[4], q[5], Jet(0)};
       break;
     case JointType::kFree:
       if (spatial) {

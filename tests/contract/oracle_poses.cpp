@@ -24,7 +24,8 @@ Real33 Turn(const Real3& axis, Real angle) {
 /// Shortest rotation that takes the joint's own axis to the described one.
 Real33 Alignment(const JointDescription& joint) {
   if (joint.axis.isZero()) return Real33::Identity();
-  const bool along_x = joint.type == JointType::kPrismatic || joint.type == JointType::kPinInSlot;
+  const bool along_x = joint.type == JointType::kPrismatic || joint.type == JointType::kPinInSlot ||
+                       joint.type == JointType::kPointOnLine;
   const Real3 own = along_x ? Real3::UnitX() : Real3::UnitZ();
   const Real3 axis = joint.axis.cast<Real>().normalized();
   const Real33 K = Skew(own.cross(axis));

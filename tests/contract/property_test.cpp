@@ -205,13 +205,14 @@ void CheckConstraints(System<Space, double>& at, int user_joints, Tally& tally) 
 }
 
 template <class Space>
-void Examine(int number, Tally& tally) {
+void Examine(int number, DrawnKinds kinds, Tally& tally) {
   const std::uint64_t seed = 1000 + number;
   Random random(seed);
   const int bodies = 1 + random.Below(12), closures = random.Below(5);
   const int motions = number % 3 == 0 ? 1 + random.Below(3) : 0;
   const SpaceKind space = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
-  const MechanismDescription description = AnyMechanism(bodies, closures, motions, space, seed);
+  const MechanismDescription description =
+      AnyMechanism(bodies, closures, motions, space, seed, kinds);
   const Sample<Space> sample(description, seed);
   const Mechanism<Space, double>& joint_set = sample.mechanism(Coordinates::kJoint);
   const RealVector spectrum = ScaledSpectrum(sample);
@@ -285,9 +286,9 @@ void Examine(int number, Tally& tally) {
 }
 
 template <class Space>
-void ExamineAll(const char* name) {
+void ExamineAll(const char* name, DrawnKinds kinds = DrawnKinds::kUpToHelical) {
   Tally tally;
-  for (int i = 0; i < kSamples; ++i) Examine<Space>(i, tally);
+  for (int i = 0; i < kSamples; ++i) Examine<Space>(i, kinds, tally);
   std::string line = std::to_string(tally.samples) + " samples: " + std::to_string(tally.closed) +
                      " with loops, " + std::to_string(tally.driven) + " driven, " +
                      std::to_string(tally.ambiguous) + " ambiguous, " +
@@ -316,6 +317,10 @@ void ExamineAll(const char* name) {
 TEST(PropertyTest, MechanismsInThePlane) { ExamineAll<Planar>("plane"); }
 
 TEST(PropertyTest, MechanismsInSpace) { ExamineAll<Spatial>("space"); }
+
+TEST(PropertyTest, MechanismsOfAllKindsInSpace) {
+  ExamineAll<Spatial>("all kinds", DrawnKinds::kAll);
+}
 
 }  // namespace
 }  // namespace loopbench::testing

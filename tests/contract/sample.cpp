@@ -58,6 +58,10 @@ MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed) {
                        : RandomGraph(loops, space, seed);
 }
 
+MechanismDescription LoopOfAllKinds(std::uint64_t seed) {
+  return MixedGraph(1, SpaceKind::kSpatial, seed, seed % 2 == 0 ? 1 : 0, DrawnKinds::kAll);
+}
+
 template class Sample<Planar>;
 template class Sample<Spatial>;
 

@@ -63,4 +63,7 @@ double RelativeError(const VectorX<double>& a, const RealVector& b);
 /// with prescribed motions; independent closures, so that every column can run.
 MechanismDescription CoupledLoops(SpaceKind space, std::uint64_t seed);
 
+/// One loop in space through joints of all kinds, every second with a prescribed motion.
+MechanismDescription LoopOfAllKinds(std::uint64_t seed);
+
 }  // namespace loopbench::testing

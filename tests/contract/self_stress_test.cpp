@@ -91,7 +91,8 @@ TEST_P(ExactRows, AreDerivativesOfTheMismatchToFirstOrder) {
 INSTANTIATE_TEST_SUITE_P(Kinds, ExactRows,
                          ::testing::Values(JointType::kRevolute, JointType::kCylindrical,
                                            JointType::kPinInSlot, JointType::kPlanar,
-                                           JointType::kUniversal, JointType::kHelical),
+                                           JointType::kUniversal, JointType::kHelical,
+                                           JointType::kSchoenflies),
                          [](const auto& one) {
                            std::string name(ToString(one.param));
                            std::erase(name, '-');

@@ -122,6 +122,17 @@ INSTANTIATE_TEST_SUITE_P(
                     "z = (0 1 0)",
                     "z = (0 1 0)",
                     {0, 1, 0}},
+        AxisExample{"translation",
+                    R"(}, "to": {"body": "b"})",
+                    "x = (1 0 0), y = (0 1 0), z = (0 0 1)",
+                    "x = (1 0 0), y = (0 1 0), z = (0 0 1)",
+                    {1, 0, 0},
+                    false},
+        AxisExample{"schoenflies",
+                    R"(}, "to": {"body": "b"}, "axis": [1, 0, 0])",
+                    "z = (1 0 0)",
+                    "z = (1 0 0)",
+                    {1, 0, 0}},
         // about x of F first, then about y of M
         AxisExample{
             "universal", R"(}, "to": {"body": "b"})", "x = (1 0 0)", "y = (0 1 0)", {1, 0, 0}},

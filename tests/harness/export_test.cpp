@@ -7,7 +7,9 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/export_names.h"
+#include "harness/exchange/import.h"
 #include "mechanism/description/library.h"
+#include "mechanism/simplify/restart.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/xml_fault.h"
 
@@ -99,6 +101,52 @@ TEST(Export, NamesAllThatAFormatDoesNotHave) {
   EXPECT_EQ(Missing(mechanism, mjcf), expected);
   expected.push_back("point_force on body \"" + mechanism.bodies[1].name + "\", in its axes");
   EXPECT_EQ(Missing(mechanism, simbody), expected);
+}
+
+TEST(Export, JointsThatMjcfHasAsSeveralComeBackAsOne) {
+  const ExportFormat &mjcf = ExportFormats().front(), &simbody = ExportFormats().back();
+  for (const auto& [type, q] : {std::pair{JointType::kTranslation, std::vector{0.1, -0.2, 0.3}},
+                                {JointType::kSchoenflies, {0.5, 0.1, -0.2, 0.3}},
+                                {JointType::kPointOnLine, {0.8, 0.2, -0.4, 0.4, 0.3}},
+                                {JointType::kPointInPlane, {0.8, 0.2, -0.4, 0.4, 0.3, -0.1}}}) {
+    MechanismDescription mechanism;
+    mechanism.name = "one";
+    mechanism.space = SpaceKind::kSpatial;
+    BodyDescription& body = mechanism.bodies.emplace_back();
+    body.name = "b";
+    body.mass = 2.0;
+    body.com = {0.1, 0.2, -0.1};
+    body.inertia = Eigen::Vector3d(0.1, 0.2, 0.25).asDiagonal();
+    JointDescription joint;
+    joint.name = "j";
+    joint.type = type;
+    joint.from = {0, {0.1, 0.2, 0.3}, {0.3, -0.2, 0.5}};
+    joint.to = {1, {0.05, 0.0, 0.1}, {0.2, 0.4, -0.1}};
+    mechanism.initial.coordinates = {{0, q}};
+    mechanism.initial.held = {0};
+    const auto speeds = static_cast<std::size_t>(NumValues(type, mechanism.space, true));
+    mechanism.initial.speeds = {{0, std::vector<double>(speeds, 0.7)}};
+    for (const bool reversed : {false, true}) {
+      SCOPED_TRACE(std::string(ToString(type)) + (reversed ? ", reversed" : ""));
+      if (reversed) std::swap(joint.from, joint.to);
+      mechanism.joints = {joint};
+      const MechanismDescription back =
+          ImportText(exchange::Export(mechanism, mjcf).text, "m.xml").description;
+      EXPECT_EQ(back.joints.at(0).type, type);
+      std::string why;
+      const BodyStart ours = AssembledStart(mechanism, &why).at("b"),
+                      theirs = AssembledStart(back, &why).at("b");
+      EXPECT_EQ(why, "");
+      EXPECT_LE((ours.X.p - theirs.X.p).norm(), 1e-14);
+      EXPECT_LE((ours.X.R - theirs.X.R).norm(), 1e-14);
+      EXPECT_LE((ours.v - theirs.v).norm(), 1e-14);
+      EXPECT_LE((ours.w - theirs.w).norm(), 1e-14);
+      const std::string missing = "joint \"j\": " + std::string(ToString(type));
+      EXPECT_EQ(Missing(mechanism, simbody), type == JointType::kTranslation
+                                                 ? std::vector<std::string>()
+                                                 : std::vector{missing});
+    }
+  }
 }
 
 TEST(Export, CouplingsAndRotorsAreParts) {

@@ -1,4 +1,5 @@
 // Joints in series through links without mass: the joint that they form, its frames and its start.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -102,6 +103,38 @@ TEST(ImportChain, SeriesFormTheJointOfAnEqualBodyOfMujoco) {
        "<joint type=\"slide\" axis=\"1 0 0\"/><joint type=\"slide\" axis=\"0 1 0\"/><joint "
        "axis=\"0 0 1\"/>"},
       {{slide_x, slide_y, slide_z, kY, kX, kZ}, "", "", ""},
+      {{slide_z, slide_x, slide_y},
+       "translation",
+       "0 0 2",
+       "<joint type=\"slide\" axis=\"0 0 1\"/><joint type=\"slide\" axis=\"1 0 0\"/><joint "
+       "type=\"slide\" axis=\"0 1 0\"/>"},
+      {{slide_x, kY, slide_z, slide_y},
+       "schoenflies",
+       "0 0 2",
+       "<joint type=\"slide\" axis=\"1 0 0\"/><joint axis=\"0 1 0\"/><joint type=\"slide\" "
+       "axis=\"0 0 1\"/><joint type=\"slide\" axis=\"0 1 0\"/>"},
+      {{slide_z, kX, kY, kZ},
+       "point-on-line",
+       "0 0 1.75",
+       "<joint type=\"slide\" axis=\"0 0 1\"/><joint axis=\"1 0 0\" pos=\"0 0 0.25\"/><joint "
+       "axis=\"0 1 0\" pos=\"0 0 0.25\"/><joint axis=\"0 0 1\"/>"},
+      {{kX, kY, kZ, slide_y},
+       "point-on-line",
+       "0 0 1.75",
+       "<joint axis=\"1 0 0\" pos=\"0 0 0.25\"/><joint axis=\"0 1 0\" pos=\"0 0 0.25\"/><joint "
+       "axis=\"0 0 1\"/><joint type=\"slide\" axis=\"0 1 0\"/>"},
+      {{slide_y, slide_z, kX, kY, kZ},
+       "point-in-plane",
+       "0 0 1.75",
+       "<joint type=\"slide\" axis=\"0 1 0\"/><joint type=\"slide\" axis=\"0 0 1\"/><joint "
+       "axis=\"1 0 0\" pos=\"0 0 0.25\"/><joint axis=\"0 1 0\" pos=\"0 0 0.25\"/><joint "
+       "axis=\"0 0 1\"/>"},
+      {{kX, kY, kZ, slide_z, slide_y},
+       "point-in-plane",
+       "0 0 1.75",
+       "<joint axis=\"1 0 0\" pos=\"0 0 0.25\"/><joint axis=\"0 1 0\" pos=\"0 0 0.25\"/><joint "
+       "axis=\"0 0 1\"/><joint type=\"slide\" axis=\"0 0 1\"/><joint type=\"slide\" axis=\"0 1 "
+       "0\"/>"},
       {{slide_x, slide_y, slide_z, kY, {"rx", "continuous", "0 0 0", "1 0 0"}, kZ},
        "free",
        "0 0 1.75",
@@ -172,6 +205,130 @@ TEST(ImportChain, TheStartIsThatOfTheJointsInSeries) {
   EXPECT_NEAR(p[0], 0.5, kEps);
   EXPECT_NEAR(p[1], 1.0, kEps);
   EXPECT_NEAR(p[2], 2.0, kEps);
+}
+
+/// A joint of a series, by MuJoCo's types.
+struct Part {
+  std::string type, axis, pos;
+
+  std::string Text() const {
+    return "<joint type=\"" + type + "\" axis=\"" + axis + "\" pos=\"" + pos + "\"/>";
+  }
+  /// Its motion at a coordinate, of a ball a quaternion.
+  Eigen::Isometry3d At(const double* q) const {
+    const Vector3d a = VectorOf(axis).normalized(), p = VectorOf(pos);
+    if (type == "slide") return Eigen::Isometry3d(Eigen::Translation3d(q[0] * a));
+    const Eigen::Quaterniond turn = type == "ball" ? Eigen::Quaterniond(q[0], q[1], q[2], q[3])
+                                                   : Eigen::Quaterniond(AngleAxisd(q[0], a));
+    return Eigen::Translation3d(p) * turn.normalized() * Eigen::Translation3d(-p);
+  }
+
+ private:
+  static Vector3d VectorOf(const std::string& text) {
+    std::istringstream in(text);
+    Vector3d v;
+    in >> v.x() >> v.y() >> v.z();
+    return v;
+  }
+};
+
+/// A body with these joints and its start: pose and velocities against their motions by hand.
+void ExpectMotionsOfParts(const std::vector<Part>& parts, const std::string& type, bool reversed) {
+  std::vector<double> q, u;
+  std::string text;
+  for (const Part& part : parts) {
+    text += part.Text();
+    const double k = 1.0 + static_cast<double>(q.size());
+    if (part.type == "ball") {
+      for (const double number : {0.8, 0.2, -0.4, 0.4}) q.push_back(number);
+      for (const double number : {0.5, -0.3, 0.7}) u.push_back(number);
+    } else {
+      q.push_back(std::sin(k));
+      u.push_back(std::cos(2.0 * k));
+    }
+  }
+  const std::string start =
+      fmt::format("qpos=\"{}\" qvel=\"{}\"", fmt::join(q, " "), fmt::join(u, " "));
+  const std::string model =
+      "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"rod\" pos=\"0.1 0.2 0.3\">"
+      "<inertial pos=\"0 0 0\" mass=\"2\" diaginertia=\"1 1 1\"/>" +
+      text + "</body></worldbody><keyframe><key " + start + "/></keyframe></mujoco>";
+  const MechanismDescription description = ImportText(model, "file.xml").description;
+  SCOPED_TRACE(text);
+  ASSERT_EQ(description.joints.size(), 1u);
+  EXPECT_EQ(ToString(description.joints[0].type), type);
+  EXPECT_EQ(description.joints[0].from.body != kGround, reversed);
+  const InitialDescription& initial = description.initial;
+  const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
+  Kinematics<Spatial, double> kinematics(mechanism);
+  const std::vector<double>&given = initial.coordinates[0].values,
+        &rates = initial.speeds[0].values;
+  ASSERT_EQ(std::ssize(given), mechanism.num_q());
+  kinematics.UpdatePosition(Eigen::Map<const VectorX<double>>(given.data(), mechanism.num_q()));
+  kinematics.UpdateVelocity(Eigen::Map<const VectorX<double>>(rates.data(), mechanism.num_u()));
+
+  // balls turn with speeds in axes of the moved body
+  const auto place = [&](double t) {
+    Eigen::Isometry3d X(Eigen::Translation3d(0.1, 0.2, 0.3));
+    const double *position = q.data(), *speed = u.data();
+    for (const Part& part : parts) {
+      if (part.type == "ball") {
+        const Vector3d turn = t * Vector3d(speed);
+        const Eigen::Quaterniond moved =
+            Eigen::Quaterniond(position[0], position[1], position[2], position[3]).normalized() *
+            Eigen::Quaterniond(AngleAxisd(turn.norm(), turn.stableNormalized()));
+        const double now[] = {moved.w(), moved.x(), moved.y(), moved.z()};
+        X = X * part.At(now);
+        position += 4, speed += 3;
+      } else {
+        const double now = *position++ + t * *speed++;
+        X = X * part.At(&now);
+      }
+    }
+    return X;
+  };
+  const Eigen::Isometry3d X = place(0.0);
+  EXPECT_LE((kinematics.poses()[1].p.eigen() - X.translation()).norm(), 10 * kEps);
+  EXPECT_LE((kinematics.poses()[1].R.eigen() - X.linear()).norm(), 10 * kEps);
+  constexpr double kStep = 1e-5;  // central: truncation 1e-10, round-off eps / step = 2e-11
+  const Eigen::Isometry3d ahead = place(kStep), behind = place(-kStep);
+  const Eigen::Matrix3d W =
+      (ahead.linear() - behind.linear()) * X.linear().transpose() / (2.0 * kStep);
+  const Vector3d v = (ahead.translation() - behind.translation()) / (2.0 * kStep);
+  const Velocity<Spatial, double>& V = kinematics.motions()[1];
+  EXPECT_LE((V.linear.eigen() - v).norm(), 1e-9);
+  EXPECT_LE((V.angular.eigen() - Vector3d(W(2, 1), W(0, 2), W(1, 0))).norm(), 1e-9);
+}
+
+TEST(ImportChain, StartsHaveThePosesAndSpeedsOfTheirParts) {
+  const std::string o = "0 0 0", p = "0.2 -0.1 0.3";
+  const Part x{"slide", "1 0 0", o}, y{"slide", "0 1 0", o}, z{"slide", "0 0 1", o},
+      skew{"slide", "1 2 -2", o}, turn{"hinge", "0 0 1", p}, tilted{"hinge", "2 -1 2", p},
+      ball{"ball", "0 0 1", p};
+  const std::vector<Part> hinges = {{"hinge", "1 0 0", p}, {"hinge", "0 1 0", p}, turn};
+  ExpectMotionsOfParts({x, y, z}, "translation", false);
+  ExpectMotionsOfParts({skew, z, x}, "translation", false);
+  for (const Part& hinge : {turn, tilted}) {
+    ExpectMotionsOfParts({x, y, z, hinge}, "schoenflies", false);
+    ExpectMotionsOfParts({hinge, z, skew, y}, "schoenflies", false);
+    ExpectMotionsOfParts({x, hinge, z, y}, "schoenflies", false);
+  }
+  for (const Part& slide : {x, z, skew}) {
+    ExpectMotionsOfParts({slide, ball}, "point-on-line", false);
+    ExpectMotionsOfParts({ball, slide}, "point-on-line", true);
+    ExpectMotionsOfParts({slide, hinges[0], hinges[1], turn}, "point-on-line", false);
+    ExpectMotionsOfParts({hinges[0], hinges[1], turn, slide}, "point-on-line", true);
+    ExpectMotionsOfParts({slide, y, ball}, "point-in-plane", false);
+    ExpectMotionsOfParts({ball, y, slide}, "point-in-plane", true);
+    ExpectMotionsOfParts({y, slide, hinges[0], hinges[1], turn}, "point-in-plane", false);
+    ExpectMotionsOfParts({hinges[0], hinges[1], turn, slide, y}, "point-in-plane", true);
+  }
+  for (const std::vector<Part>& mixed : std::vector<std::vector<Part>>{
+           {x, ball, y}, {hinges[0], x, hinges[1], turn}, {x, ball, x}, {x, x, ball}, {x, y, x}}) {
+    std::string joints;
+    for (const Part& part : mixed) joints += part.Text();
+    EXPECT_THROW(Mujoco("0 0 0", joints), ConfigError) << joints;
+  }
 }
 
 /// The cross of a universal joint as the child of both joints: the second one leads back.

@@ -74,6 +74,11 @@ TEST(ImportMjcf, JointsOnOneBodyAreOneOfOurs) {
   EXPECT_EQ(TypeOfChain(a + b + c), "spherical");
   EXPECT_EQ(TypeOfChain(x + y + z + ball), "free");
   EXPECT_EQ(TypeOfChain(x + y + z + a + b + c), "free");
+  EXPECT_EQ(TypeOfChain(x + y + z), "translation");
+  EXPECT_EQ(TypeOfChain(x + c + y + z), "schoenflies");
+  EXPECT_EQ(TypeOfChain(x + ball), "point-on-line");
+  EXPECT_EQ(TypeOfChain(a + b + c + x), "point-on-line");
+  EXPECT_EQ(TypeOfChain(x + y + ball), "point-in-plane");
   EXPECT_EQ(TypeOfChain(""), "weld");
   EXPECT_EQ(TypeOfChain(x + y), "planar");  // its angle is kept
   // axes that are not perpendicular or do not meet: two joints and a link
@@ -82,9 +87,9 @@ TEST(ImportMjcf, JointsOnOneBodyAreOneOfOurs) {
   // no joint of a mechanism
   EXPECT_EQ(TypeOfChain(a + a), "");
   EXPECT_EQ(TypeOfChain(x + x), "");
-  EXPECT_EQ(TypeOfChain(x + y + z), "");
+  EXPECT_EQ(TypeOfChain(x + ball + y), "");
   EXPECT_EQ(TypeOfChain("<freejoint/>" + c), "");
-  ExpectRefusal(Model(x + y + z), {"file.xml:1", "3 joints on one body", "slide, slide, slide"});
+  ExpectRefusal(Model(x + y + x), {"file.xml:1", "3 joints on one body", "slide, slide, slide"});
 }
 
 TEST(ImportMjcf, ShapesHaveTheMassesOfSolids) {

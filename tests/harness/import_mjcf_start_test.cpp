@@ -45,6 +45,32 @@ TEST(ImportMjcf, KeysBecomeTheStartOfJointsOfOurs) {
   EXPECT_NEAR(slot.coordinates[0].values[1], -2.0, 10 * kEps);
   EXPECT_NEAR(slot.speeds[0].values[0], -0.25, kEps);
   EXPECT_NEAR(slot.speeds[0].values[1], 1.0, 10 * kEps);
+  const std::string x = "<joint type=\"slide\" axis=\"1 0 0\"/>",
+                    y = "<joint type=\"slide\" axis=\"0 1 0\"/>",
+                    z = "<joint type=\"slide\" axis=\"0 0 1\"/>", ball = "<joint type=\"ball\"/>";
+  const auto shift = Start(x + y + z, "qpos=\"1 2 3\" qvel=\"4 5 6\"");
+  EXPECT_EQ(shift.coordinates[0].values, (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(shift.speeds[0].values, (std::vector<double>{4, 5, 6}));
+  // slides after the hinge turn with it, the one before does not
+  const auto scara = Start(x + "<joint axis=\"0 0 1\"/>" + y + z,
+                           "qpos=\"5 1.5707963267948966 2 3\" qvel=\"0 1 0 4\"");
+  const double scara_q[] = {kPi / 2, 3, 0, 3}, scara_u[] = {1, 0, -2, 4};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(scara.coordinates[0].values[i], scara_q[i], 10 * kEps) << i;
+    EXPECT_NEAR(scara.speeds[0].values[i], scara_u[i], 10 * kEps) << i;
+  }
+  // half a turn about z; angular velocity in body axes, and in axes of the joint
+  const auto on_line = Start(x + ball, "qpos=\"2 0 0 0 1\" qvel=\"3 0 7 0\"");
+  EXPECT_EQ(on_line.coordinates[0].values, (std::vector<double>{0, 0, 0, 1, 2}));
+  EXPECT_EQ(on_line.speeds[0].values, (std::vector<double>{0, -7, 0, 3}));
+  // the plane is on the body: seen from there, the parent turns and shifts the other way
+  const auto in_plane = Start(ball + x + y, "qpos=\"0 0 0 1 2 4\" qvel=\"0 0 7 3 5\"");
+  const double plane_q[] = {-2, -4}, plane_u[] = {0, 0, -7};
+  EXPECT_EQ(std::abs(in_plane.coordinates[0].values[3]), 1.0);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(in_plane.coordinates[0].values[4 + i], plane_q[i]);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(in_plane.speeds[0].values[i], plane_u[i]);
+  EXPECT_EQ(in_plane.speeds[0].values[3], -3.0);
+  EXPECT_EQ(in_plane.speeds[0].values[4], -5.0);
   const auto universal =
       Start("<joint axis=\"1 0 0\"/><joint axis=\"0 1 0\"/>", "qpos=\"0.5 0.25\" qvel=\"2 3\"");
   EXPECT_NEAR(universal.coordinates[0].values[1], 0.25, kEps);

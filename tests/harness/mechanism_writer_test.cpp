@@ -20,6 +20,7 @@ namespace loopbench::harness {
 namespace mechanism_writer_test {
 
 using testing::AnyMechanism;
+using testing::DrawnKinds;
 using testing::MixedGraph;
 using testing::RandomTree;
 
@@ -153,7 +154,7 @@ TEST(MechanismWriter, RandomMechanismsReadBackTheSame) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     for (const SpaceKind space : {SpaceKind::kPlanar, SpaceKind::kSpatial}) {
       for (const MechanismDescription& random :
-           {AnyMechanism(8, 3, 3, space, seed), MixedGraph(2, space, seed, 2),
+           {AnyMechanism(8, 3, 3, space, seed, DrawnKinds::kAll), MixedGraph(2, space, seed, 2),
             RandomTree(9, space, seed)}) {
         const MechanismDescription d = AsInFiles(random);
         ExpectRoundTrip(d);
@@ -171,7 +172,7 @@ TEST(MechanismWriter, RandomMechanismsReadBackTheSame) {
     }
   }
   // otherwise something was not tested
-  EXPECT_EQ(joints.size(), 11u);
+  EXPECT_EQ(joints.size(), 15u);
   EXPECT_EQ(forces.size(), 6u);
   EXPECT_GE(functions.size(), 4u);  // polynomials, harmonics, both kinds of table
 }

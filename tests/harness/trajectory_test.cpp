@@ -235,7 +235,8 @@ TEST_F(Command, HostileNamesStayNames) {
   EXPECT_FALSE(fs::exists(folder_ / "pwned"));
 }
 
-/// A chain of one joint of every kind with coordinates, each with values that a user gives.
+/// One joint of every kind with coordinates, each with values that a user gives: a chain, and
+/// bodies by themselves.
 constexpr const char* kEveryKind =
     R"({"name": "kinds", "space": "spatial", "gravity": [0, 0, -9.81],
   "bodies": [BODIES],
@@ -249,16 +250,22 @@ constexpr const char* kEveryKind =
     {"name": "u", "type": "universal", "from": {"body": "b5"}, "to": {"body": "b6", "at": [0, 0, 0.2]}},
     {"name": "h", "type": "helical", "pitch": 0.1, "from": {"body": "b6", "at": [0, 0.2, 0]}, "to": {"body": "b7"}},
     {"name": "w", "type": "weld", "from": {"body": "b7", "at": [0.2, 0, 0]}, "to": {"body": "b8", "at": [0, 0.1, 0], "rotation": [0.3, 0.2, 0.1]}},
-    {"name": "f", "type": "free", "from": {"body": "ground"}, "to": {"body": "b9", "at": [0, 0, 0.1]}}],
+    {"name": "f", "type": "free", "from": {"body": "ground"}, "to": {"body": "b9", "at": [0, 0, 0.1]}},
+    {"name": "t", "type": "translation", "from": {"body": "ground", "rotation": [0.2, 0.1, 0.3]}, "to": {"body": "b10"}},
+    {"name": "m", "type": "schoenflies", "from": {"body": "ground"}, "to": {"body": "b11", "at": [0, 0.2, 0]}, "axis": [0, 3, 4]},
+    {"name": "l", "type": "point-on-line", "from": {"body": "ground"}, "to": {"body": "b12"}, "axis": [0, 3, 4]},
+    {"name": "n", "type": "point-in-plane", "from": {"body": "ground"}, "to": {"body": "b13"}, "axis": [0, 3, 4]}],
   "initial": {"coordinates": {"r": 7.5, "p": 0.3, "s": [0.4, 0.2], "c": [-4.0, 0.1], "b": [0.8, 0.2, 0.4, 0.4],
-      "e": [0.7, 0.1, -0.2], "u": [0.3, -0.5], "h": 9.0, "f": [0.5, 0.5, -0.5, 0.5, 1, 2, 3]},
-    "fixed": ["r", "p", "s", "c", "b", "e", "u", "h", "f"],
+      "e": [0.7, 0.1, -0.2], "u": [0.3, -0.5], "h": 9.0, "f": [0.5, 0.5, -0.5, 0.5, 1, 2, 3],
+      "t": [0.1, 0.2, 0.3], "m": [0.4, 0.1, 0.2, 0.3], "l": [0.8, 0.2, 0.4, 0.4, 0.3], "n": [0.8, -0.2, 0.4, 0.4, 0.1, 0.2]},
+    "fixed": ["r", "p", "s", "c", "b", "e", "u", "h", "f", "t", "m", "l", "n"],
     "speeds": {"r": 1.0, "p": -0.2, "s": [0.3, 0.1], "c": [0.5, -0.3], "b": [0.1, 0.2, 0.3],
-      "e": [0.4, 0.2, 0.1], "u": [0.6, -0.4], "h": -0.5, "f": [1, -2, 0.5, 0.1, 0.2, 0.3]}}})";
+      "e": [0.4, 0.2, 0.1], "u": [0.6, -0.4], "h": -0.5, "f": [1, -2, 0.5, 0.1, 0.2, 0.3],
+      "t": [0.1, -0.2, 0.3], "m": [0.5, 0.1, 0.2, 0.3], "l": [0.1, 0.2, 0.3, 0.4], "n": [0.3, 0.2, 0.1, 0.4, 0.5]}}})";
 
 std::string EveryKind() {
   std::string bodies, text = kEveryKind;
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < 14; ++i) {
     bodies += fmt::format(
         R"({}{{"name": "b{}", "mass": 1, "inertia": [0.1, 0.2, 0.15], "com": [0.05, 0.1, 0]}})",
         i == 0 ? "" : ", ", i);
@@ -310,7 +317,21 @@ TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
         {"u:angle about y speed [rad/s]", -0.4},
         {"h:angle speed [rad/s]", -0.5},
         {"f:wy [rad/s]", -2},
-        {"f:y speed [m/s]", 0.2}};
+        {"f:y speed [m/s]", 0.2},
+        {"t:x [m]", 0.1},
+        {"t:z speed [m/s]", 0.3},
+        {"m:angle [rad]", 0.4},
+        {"m:z [m]", 0.3},
+        {"m:angle speed [rad/s]", 0.5},
+        {"m:y speed [m/s]", 0.2},
+        {"l:qx [1]", 0.2},
+        {"l:x [m]", 0.3},
+        {"l:wz [rad/s]", 0.3},
+        {"l:x speed [m/s]", 0.4},
+        {"n:qx [1]", -0.2},
+        {"n:y [m]", 0.2},
+        {"n:wx [rad/s]", 0.3},
+        {"n:y speed [m/s]", 0.5}};
     for (const auto& [label, value] : given) {
       // products of ten frames, and in absolute coordinates back
       if (label[0] == 'r' && std::string(coordinates) == "absolute" && label.ends_with("[rad]")) {
@@ -324,7 +345,7 @@ TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
     EXPECT_NEAR(std::remainder(At(rows, 0, "joint:c:angle [rad]") + 4.0, 2 * M_PI), 0.0, 1e-13);
     const TrajectoryCheck check =
         CheckTrajectory(file, ReadMechanism(folder_ / "kinds.json").description);
-    EXPECT_EQ(check.joints.size(), 10u);
+    EXPECT_EQ(check.joints.size(), 14u);
     EXPECT_LE(check.shift.value, std::string(coordinates) == "joint" ? 1e-13 : 1e-7);
     for (const JointCheck& joint : check.joints) {
       if (joint.joint != "w") {
@@ -332,7 +353,7 @@ TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
       }
     }
     // Simpson's rule with h = 0.01 s: h^4 / 90 times a fourth derivative of some 1e3
-    EXPECT_EQ(check.speeds.size(), 45u);  // three of each body, fifteen of joints
+    EXPECT_EQ(check.speeds.size(), 67u);  // three of each body, 25 of joints
     for (const SpeedCheck& speed : check.speeds) EXPECT_LE(speed.apart.value, 1e-6) << speed.label;
     // gravity's potential and kinetic energy: steps at 1e-9
     EXPECT_LE(check.energy.value, 1e-5);

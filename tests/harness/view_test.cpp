@@ -82,10 +82,12 @@ double Openness(const JointDescription& joint, const Poses& poses) {
       return X.p.norm();
     case JointType::kPrismatic:
     case JointType::kPinInSlot:
+    case JointType::kPointOnLine:
       return X.p.tail<2>().norm();
     case JointType::kCylindrical:
       return X.p.head<2>().norm();
     case JointType::kPlanar:
+    case JointType::kPointInPlane:
       return std::abs(X.p.z());
     case JointType::kHelical:
       return X.p.head<2>().norm() +

@@ -144,6 +144,21 @@ TYPED_TEST(JointTest, MotionMapAndRatesAreTheDerivativeOfTheTransform) {
   }
 }
 
+/// In kinds with constant axes, only tilts need other directions off the constraint.
+TYPED_TEST(JointTest, ExactDirectionsAreThoseOfTilts) {
+  for (JointType type : Types<TypeParam>()) {
+    const auto& kind = KindOf<TypeParam, double>(type);
+    if (kind.basis != nullptr) continue;
+    const auto is_turn = [](int axis) { return axis < TypeParam::kRot; };
+    const auto turns = std::count_if(kind.axes.begin(), kind.axes.begin() + kind.num_u, is_turn);
+    const bool tilts = TypeParam::kRot == 3 && turns == 1;
+    EXPECT_EQ(kind.exact_basis != nullptr, tilts) << ToString(type);
+    EXPECT_EQ(kind.exact_bias != nullptr, tilts) << ToString(type);
+    EXPECT_EQ(kind.exact_basis_rate != nullptr, tilts) << ToString(type);
+    EXPECT_EQ(kind.has_quaternion(), TypeParam::kRot == 3 && turns == 3) << ToString(type);
+  }
+}
+
 TYPED_TEST(JointTest, FreeAndConstrainedAxesShareTheSpaceBetweenThem) {
   for (JointType type : Types<TypeParam>()) {
     const auto kind = KindWith<TypeParam, double>(type, kParameter);

@@ -34,8 +34,10 @@ TEST_P(ArmSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
     shapes.push_back({.open = n});
     shapes.push_back({.open = n, .closed = 11, .also_closed = n});
     if (n < 7) continue;  // fewer bodies have no freedom, a test of its own
-    for (const JointType cut : {JointType::kRevolute, JointType::kSpherical, JointType::kPrismatic,
-                                JointType::kCylindrical, JointType::kWeld}) {
+    for (const JointType cut :
+         {JointType::kRevolute, JointType::kSpherical, JointType::kPrismatic,
+          JointType::kCylindrical, JointType::kWeld, JointType::kTranslation,
+          JointType::kSchoenflies, JointType::kPointOnLine, JointType::kPointInPlane}) {
       shapes.push_back({.closed = n, .cut = cut});
     }
   }

@@ -52,8 +52,7 @@ inline std::vector<JointType> Kinds(Builder& b, int count, int least) {
     std::vector<JointType> kinds;
     int freedom = 0, turning = 0;
     while (static_cast<int>(kinds.size()) < count) {
-      const auto type =
-          static_cast<JointType>(b.random.Below(static_cast<int>(AllJointTraits().size())));
+      const JointType type = testing::DrawKind(b.random);
       if (type == JointType::kFree || type == JointType::kRod) continue;
       if (!b.spatial && !TraitsOf(type).in_plane) continue;
       kinds.push_back(type);

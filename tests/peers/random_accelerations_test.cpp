@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "mechanism/simplify/compile.h"
+#include "tests/contract/builder.h"
 #include "tests/peers/expressible.h"
 #include "tests/peers/registered.h"
 
@@ -35,6 +36,30 @@ TEST(RandomAccelerations, OfJointsOfEveryKindInThePlaneAreSimbodys) {
 TEST(RandomAccelerations, OfJointsOfEveryKindInSpaceAreSimbodys) {
   // but for helical joints that close a loop
   EXPECT_GE(CompareMany<Spatial>(SpaceKind::kSpatial), 100);
+}
+
+/// Loops of revolute joints and a translation, closed by kinds that mixed graphs do not draw.
+TEST(RandomAccelerations, OfClosuresByOtherKindsAreSimbodys) {
+  for (const JointType type : {JointType::kTranslation, JointType::kSchoenflies,
+                               JointType::kPointOnLine, JointType::kPointInPlane}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Builder b("closed-by-" + std::string(ToString(type)), SpaceKind::kSpatial, seed);
+      int last = 0;
+      for (int i = 0; i < 7; ++i) {
+        const int body = b.AddBody(1.0);
+        const Eigen::Vector3d at = b.Tip();
+        b.AddJoint(i == 3 ? JointType::kTranslation : JointType::kRevolute, last, at, body,
+                   b.random.Vector(0.2, true), b.random.Uniform(-2.0, 2.0));
+        last = body;
+      }
+      b.Close(type, 0, last, b.Tip(), 0.0);
+      MechanismDescription loop = b.Finish();
+      KeepExpressible(loop);
+      const auto error = PeerError<Spatial>("peer/simbody", loop, seed);
+      ASSERT_TRUE(error.has_value());
+      EXPECT_LE(error->relative, error->bound) << loop.name;
+    }
+  }
 }
 
 TEST(RandomAccelerations, OfClosuresWithReleasedDirectionsAreSimbodys) {

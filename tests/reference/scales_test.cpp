@@ -45,6 +45,14 @@ std::string UnitsOf(JointType type, SpaceKind space) {
       return "all";
     case JointType::kFree:
       return space == SpaceKind::kPlanar ? "all" : "aaalll";
+    case JointType::kTranslation:
+      return "lll";
+    case JointType::kSchoenflies:
+      return "alll";
+    case JointType::kPointOnLine:
+      return "aaal";
+    case JointType::kPointInPlane:
+      return "aaall";
     case JointType::kRod:
       break;
   }

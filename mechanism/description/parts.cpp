@@ -69,10 +69,10 @@ MechanismDescription Select(const MechanismDescription& description,
   for (std::size_t j = 0; j < joints.size(); ++j) {
     if (renumbering.joints[j] < 0) continue;
     // Add new members of a joint here; they must stay valid if its frames' bodies change.
-    const auto& [joint_name, type, from, to, axis, parameter, cut, released, moving,
-                 motions, rotor_inertia] = joints[j];
-    JointDescription joint{joint_name, type, from,     to,      axis,
-                           parameter,  cut,  released, moving,  motions, rotor_inertia};
+    const auto& [joint_name, type, from, to, axis, parameter, cut, released, moving, motions,
+                 rotor_inertia] = joints[j];
+    JointDescription joint{joint_name, type,     from,   to,      axis,         parameter,
+                           cut,        released, moving, motions, rotor_inertia};
     joint.from.body = renumbering.bodies[from.body];
     joint.to.body = renumbering.bodies[to.body];
     part.joints.push_back(joint);

@@ -340,8 +340,7 @@ S CouplingAcceleration(const Kinematics<Space, S>& kinematics, int coupling, con
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   if (mechanism.couplings()[coupling].is_moving_row) {
     const MovingRow& row = kinematics.moving_row(coupling);
-    return kinematics.direction(row).dot(
-        RelativeAcceleration<Space, S>(kinematics, row.joint, A));
+    return kinematics.direction(row).dot(RelativeAcceleration<Space, S>(kinematics, row.joint, A));
   }
   S sum = S(0);
   for (const auto& [index, ratio] : mechanism.couplings()[coupling].parts) {

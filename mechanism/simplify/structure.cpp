@@ -49,7 +49,8 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
     }
     for (int index : mechanism.constraints()) {
       const Joint<Space, double>& joint = mechanism.joints()[index];
-      if (row >= joint.row && row < joint.row + joint.num_constraints()) add(index, row - joint.row);
+      if (row >= joint.row && row < joint.row + joint.num_constraints())
+        add(index, row - joint.row);
     }
   }
   return dependent;

@@ -219,6 +219,8 @@ TEST(MovingRows, HaveTheRightAccelerationsInAllPositions) {
       check([](const auto& m, const auto& o) { return MakeSystem<odca::Odca>(m, o); }, set, kind);
       check([](const auto& m, const auto& o) { return MakeSystem<lagrange::Lagrange>(m, o); }, set,
             kind);
+      // plain reduction keeps its dependent speeds, which other rows need not determine
+      if (kind == SolverKind::kAsPublished) continue;
       check([](const auto& m, const auto& o) { return MakeSystem<reduction::Reduction>(m, o); },
             set, kind);
     }

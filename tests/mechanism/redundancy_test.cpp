@@ -78,7 +78,8 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 TEST(RedundancyTest, RowsMoveWhereNoJointKeepsItsNumber) {
-  const Redundancy plate = FindRedundancy(Shipped("../experiments/overconstrained/plate-on-cranks"));
+  const Redundancy plate =
+      FindRedundancy(Shipped("../experiments/overconstrained/plate-on-cranks"));
   EXPECT_EQ(plate.rows, 4);
   EXPECT_EQ(plate.rank, 3);
   const auto moving = [](const Redundancy& found) {

@@ -140,7 +140,8 @@ INSTANTIATE_TEST_SUITE_P(All, ShippedMujoco,
                          });
 
 TEST(MujocoCouplings, AGripperThatMimicsMovesLikeOurs) {
-  harness::MechanismFile file{harness::peers_test::Gripper()};
+  harness::MechanismFile file;
+  file.description = harness::peers_test::Gripper();
   file.canonical = file.description.name;
   // as above: a tenth by a hundredth of the tolerance
   const double error = EndError(file, 1e-6, 0.5);

@@ -126,6 +126,16 @@ class Includer {
 
   void Attach(Element* place, Element* root, const fs::path& folder) {
     const XmlElement attach(document_, place);
+    for (const auto* given = place->FirstAttribute(); given != nullptr; given = given->Next()) {
+      const std::string_view key = given->Name();
+      if (key == "model" || key == "body" || key == "frame" || key == "prefix") continue;
+      attach.Fail(fmt::format("\"{}\"", key),
+                  "\"model\", \"body\" or \"frame\", \"prefix\"; a <frame> around it moves it");
+    }
+    if (!place->NoChildren()) attach.Fail("contents", "none; a <frame> around it moves it");
+    if (attach.Attribute("body") && attach.Attribute("frame")) {
+      attach.Fail("\"body\" and \"frame\"", "one of them");
+    }
     const auto given_model = attach.Attribute("model");
     if (!given_model) return AttachCopy(attach, place, root);
     const XmlValue& model = *given_model;
@@ -242,6 +252,7 @@ class Includer {
         prefix.Fail(fmt::format("one that makes new names: there is a {}", taken));
       }
     }
+    if (made.contains("body world")) prefix.Fail("one that makes no body \"world\"");
     Insert(place, childclass.empty() ? "main" : childclass,
            {Copy(original->element, prefix.text(), root->GetDocument(), attach)});
     CopyReferring(root, &inside, prefix.text(), attach);

@@ -202,8 +202,12 @@ PictureMotion Swing(const MechanismDescription& description, Follower<Space>* fo
   const Mechanism<Space, double>& mechanism = follower->kinematics().mechanism();
   const VectorX<double> start = follower->q();
   const Poses at_start = PosesOf(description, follower->kinematics());
-  const bool is_length = follower->units()[beginning.speed] != 1.0 ||
-                         mechanism.speed_names()[beginning.speed].ends_with("shift");
+  const auto step = std::ranges::find_if(mechanism.tree(), [&](const TreeStep& one) {
+    const Joint<Space, double>& joint = mechanism.joints()[one.joint];
+    return joint.u_offset <= beginning.speed && beginning.speed < joint.u_offset + joint.num_u();
+  });
+  const int column = beginning.speed - mechanism.joints()[step->joint].u_offset;
+  const bool is_length = follower->kinematics().joints()[step->joint].H(column).angular.isZero();
   PictureMotion motion;
   motion.name = mechanism.speed_names()[static_cast<std::size_t>(beginning.speed)];
   double reach[2] = {0.0, 0.0};

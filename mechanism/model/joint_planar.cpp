@@ -9,75 +9,27 @@ template <class S>
 struct Kinds {
   using P = Pose<Planar, S>;
 
-  static JointKind<Planar, S> Revolute() {
-    return {.num_q = 1,
-            .num_u = 1,
-            .axes = {0, 1, 2},
-            .rotation_invariant = true,
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.angle = q[0];
-                  X.p.setZero();
-                },
-            .coordinates = [](const P& X, S* q, S) { q[0] = X.angle; },
-            .rates = SameRates<S, 1>};
-  }
-  static JointKind<Planar, S> Prismatic() {
-    return {.num_q = 1,
-            .num_u = 1,
-            .axes = {1, 0, 2},
-            .rotation_invariant = false,
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.angle = S(0);
-                  X.p = {q[0], S(0)};
-                },
-            .coordinates = [](const P& X, S* q, S) { q[0] = X.p[0]; },
-            .rates = SameRates<S, 1>};
-  }
-  static JointKind<Planar, S> Weld() {
-    return {.num_q = 0,
-            .num_u = 0,
-            .axes = {0, 1, 2},
-            .rotation_invariant = true,
-            .transform = [](const S*, P& X, S) { X = P(); },
-            .coordinates = [](const P&, S*, S) {},
-            .rates = SameRates<S, 0>};
-  }
-  static JointKind<Planar, S> Free() {
-    return {.num_q = 3,
-            .num_u = 3,
-            .axes = {0, 1, 2},
-            .rotation_invariant = false,
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.angle = q[0];
-                  X.p = {q[1], q[2]};
-                },
-            .coordinates =
-                [](const P& X, S* q, S) {
-                  q[0] = X.angle;
-                  q[1] = X.p[0];
-                  q[2] = X.p[1];
-                },
-            .rates = SameRates<S, 3>};
-  }
-  static JointKind<Planar, S> PinInSlot() {
-    return {.num_q = 2,
-            .num_u = 2,
-            .axes = {0, 1, 2},
-            .rotation_invariant = false,
-            .transform =
-                [](const S* q, P& X, S) {
-                  X.angle = q[0];
-                  X.p = {q[1], S(0)};
-                },
-            .coordinates =
-                [](const P& X, S* q, S) {
-                  q[0] = X.angle;
-                  q[1] = X.p[0];
-                },
-            .rates = SameRates<S, 2>};
+  /// The kind whose free directions are the first `kNumU` of these axes of F: the turn (0) or none,
+  /// then shifts.
+  template <int kNumU, int... kAxes>
+  static JointKind<Planar, S> Along() {
+    static constexpr int kAxis[] = {kAxes...};
+    static constexpr int kTurns = kNumU > 0 && kAxis[0] == 0 ? 1 : 0;
+    JointKind<Planar, S> kind;
+    kind.num_q = kind.num_u = kNumU;
+    kind.axes = {kAxes...};
+    kind.rotation_invariant = kNumU == kTurns;
+    kind.transform = [](const S* q, P& X, S) {
+      X.angle = kTurns == 1 ? q[0] : S(0);
+      X.p.setZero();
+      for (int i = kTurns; i < kNumU; ++i) X.p[kAxis[i] - 1] = q[i];
+    };
+    kind.coordinates = [](const P& X, S* q, S) {
+      if constexpr (kTurns == 1) q[0] = X.angle;
+      for (int i = kTurns; i < kNumU; ++i) q[i] = X.p[kAxis[i] - 1];
+    };
+    kind.rates = SameRates<S, kNumU>;
+    return kind;
   }
 
   static JointKind<Planar, S> Rod() {
@@ -101,7 +53,12 @@ struct Kinds {
 template <class S>
 std::vector<JointKind<Planar, S>> PlanarKinds() {
   using K = Kinds<S>;
-  return {K::Revolute(), K::Prismatic(), K::Weld(), K::Free(), K::PinInSlot(), K::Rod()};
+  return {K::template Along<1, 0, 1, 2>(),  // revolute
+          K::template Along<1, 1, 0, 2>(),  // prismatic
+          K::template Along<0, 0, 1, 2>(),  // weld
+          K::template Along<3, 0, 1, 2>(),  // free
+          K::template Along<2, 0, 1, 2>(),  // pin-in-slot
+          K::Rod()};
 }
 
 #define LOOPBENCH_INSTANTIATE(S) template std::vector<JointKind<Planar, S>> PlanarKinds();

@@ -38,7 +38,7 @@ constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
     {"mechanism/algebra",       { 2053,  22,   0},  1900},
     {"mechanism/description",   { 2134,  28,   1},  1750},
-    {"mechanism/model",         { 3052,  22,   2},  2300},
+    {"mechanism/model",         { 3009,  22,   2},  2300},
     {"mechanism/loops",         { 3245,  23,   2},  1900},
     {"mechanism/start",         { 2144,  18,   4},   700},
     {"mechanism/formulation",   { 2625,  23,   4},  1500},
@@ -67,13 +67,13 @@ constexpr Budget kBudgets[] = {
     {"harness/tables",          { 2017,  10,   5},  1500},
     {"harness/judge",           { 3685,  18,   6},  2700},
     {"harness/figures",         { 3045,  12,   7},  1900},
-    {"harness/view",            { 2390,   7,   8},  2050},
-    {"harness/exchange",        { 9425,  36,  10},  5000},
+    {"harness/view",            { 2394,   7,   8},  2050},
+    {"harness/exchange",        { 9436,  36,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 8412,  26,  29},  3600},
     {"peers",                   {  733,  12,   5},   650},
-    {"",                        {92744, 507, 242}, 62000}
+    {"",                        {92716, 507, 242}, 62000}
 };
 // clang-format on
 

@@ -275,6 +275,10 @@ TEST_F(ImportMjcfAttach, FaultsAreNamed) {
   attach("prefix=\"p\"");
   ExpectMessage({"main.xml:2: <attach>: found no \"model\", \"body\" or \"frame\"",
                  "a <model> of <asset>, or a body"});
+  attach("model=\"a\" pos=\"1 0 0\"");
+  ExpectMessage({"main.xml:2: <attach>: found \"pos\"", "a <frame> around it moves it"});
+  attach("body=\"a\" frame=\"b\" prefix=\"p\"");
+  ExpectMessage({"main.xml:2: <attach>: found \"body\" and \"frame\", expected one of them"});
   attach("model=\"b\"");
   ExpectMessage({"main.xml:2: <attach> model: found \"b\"", "the name of a <model> in <asset>"});
   attach("model=\"a\" body=\"no\"");

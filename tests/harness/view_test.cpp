@@ -169,6 +169,25 @@ TEST(View, SwingsASliderCrankAsItsTriangleSays) {
   }
 }
 
+/// Without links, the length of the mechanism is 1: shifts and angles have the same unit of speed.
+TEST(View, SwingsOfShiftsAreLengths) {
+  MechanismDescription description;
+  description.name = "shifts";
+  description.space = SpaceKind::kSpatial;
+  description.bodies.push_back(Bar("b", 1.0, 1.0, 1.0));
+  JointDescription joint;
+  joint.name = "j";
+  joint.type = JointType::kSchoenflies;
+  joint.to.body = 1;
+  description.joints = {joint};
+  const Picture picture = MakePicture(description, "");
+  ASSERT_EQ(picture.motions.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::string unit = i == 0 ? " rad;" : " m;";
+    EXPECT_NE(picture.motions[i].text.find(unit), std::string::npos) << picture.motions[i].text;
+  }
+}
+
 TEST(View, SaysHowFarLoopsAreOpenInTheFile) {
   MechanismDescription description =
       ReadMechanism(kConfigs / "mechanisms/four-bar.json").description;

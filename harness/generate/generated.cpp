@@ -211,7 +211,9 @@ void GeneratedDerivative<Space>::AddBranch() {
   // Directions released for the accuracy of the input depend on the run so far.
   for (const Released& out : system_.kinematics().released()) {
     MechanismDescription& described = subject_.description;
-    if (described.rounded) described.joints[out.joint].released = out.directions;
+    if (!described.rounded) continue;
+    described.joints[out.joint].released = out.directions;
+    described.joints[out.joint].moving = out.moving;
   }
   RecordedFunction recorded =
       RecordFunction(subject_, mode_->start, x_[0], {x_.begin() + 1, x_.end()});

@@ -170,10 +170,17 @@ Outcome System<Space, S>::FactorBranch() {
 template <class Space, class S>
 Outcome System<Space, S>::Accelerate() {
   feedback_ = &level_->Feedback(kinematics());
-  shares_ = mechanism_.is_redundant() && feedback_->size() == 0 && !level_->changes_speeds() &&
-            options_.enforcement != Enforcement::kPosition;
-  if (shares_) feedback_ = &state_.stress()->Feedback(kinematics());
-  shares_ = shares_ && !state_.stress()->is_exact();
+  shares_ = false;
+  if (mechanism_.is_redundant() && !level_->changes_speeds() &&
+      options_.enforcement != Enforcement::kPosition) {
+    const VectorX<S>& turn = state_.stress()->Feedback(kinematics());
+    shares_ = feedback_->size() == 0 && !state_.stress()->is_exact();
+    if (feedback_->size() > 0) {
+      both_ = *feedback_;
+      both_.head(turn.size()) += turn;
+    }
+    feedback_ = feedback_->size() > 0 ? &both_ : &turn;
+  }
   const bool is_free = mechanism_.num_u() > 0;
   VectorX<S>* lambda = drives_ != nullptr && integrates_work() ? &lambda_ : nullptr;
   lambda_is_current_ = lambda != nullptr || !is_free;

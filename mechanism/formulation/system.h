@@ -178,7 +178,8 @@ class System final : public Ode<S> {
   std::vector<Acceleration<Space, S>> A_;
   VectorX<S> force_, target_;             ///< f and c of the accelerations
   VectorX<S> nothing_;                    ///< zeros by row
-  const VectorX<S>* feedback_ = nullptr;  ///< of the last evaluation, the level's
+  const VectorX<S>* feedback_ = nullptr;  ///< of the last evaluation
+  VectorX<S> both_;                       ///< the level's and that of redundant constraints
   bool lambda_is_current_ = false;
   bool shares_ = false;  ///< whether released directions drift unless self_stress.h corrects udot
   /// Version of the kinematics' positions set by BeginStep(): the last stage of a step, its

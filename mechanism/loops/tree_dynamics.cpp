@@ -202,14 +202,6 @@ std::span<const Wrench<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     const Kinematics<Space, S>& kinematics, const VectorX<S>& udot, const VectorX<S>& lambda) {
   BodyAccelerations(kinematics, udot, A_bias_);
   NeededWrenches(kinematics);
-  for (int index : kinematics.mechanism().constraints()) {
-    const Joint<Space, S>& joint = kinematics.mechanism().joints()[index];
-    const JointState<Space, S>& state = kinematics.joints()[index];
-    Wrench<Space, S> F = Wrench<Space, S>::Zero();
-    for (int r = 0; r < state.rows(); ++r) F += state.D(r) * lambda[joint.row + r];
-    F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
-    F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
-  }
   const Mechanism<Space, S>& mechanism = kinematics.mechanism();
   const auto carry = [&](int index, const Wrench<Space, S>& F) {
     const Joint<Space, S>& joint = mechanism.joints()[index];
@@ -217,6 +209,14 @@ std::span<const Wrench<Space, S>> TreeDynamics<Space, S>::WrenchesLeft(
     F_[joint.to] -= ShiftForce<Space, S>(F, state.r_Q);
     F_[joint.from] += ShiftForce<Space, S>(F, state.r_P);
   };
+  for (int index : mechanism.constraints()) {
+    const JointState<Space, S>& state = kinematics.joints()[index];
+    Wrench<Space, S> F = Wrench<Space, S>::Zero();
+    for (int r = 0; r < state.rows(); ++r) {
+      F += state.D(r) * lambda[mechanism.joints()[index].row + r];
+    }
+    carry(index, F);
+  }
   for (int c = 0; mechanism.num_rows() + c < static_cast<int>(lambda.size()); ++c) {
     const S& mu = lambda[mechanism.num_rows() + c];
     if (mechanism.couplings()[c].is_moving_row) {

@@ -1,6 +1,7 @@
 #include "mechanism/simplify/redundancy.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
@@ -15,14 +16,14 @@ namespace {
 /// Positions looked at besides the start, and how far apart [rad or mechanism lengths]: a whole
 /// turn, or where the matrices are large, some way.
 constexpr double kApart = 0.15;
-int Positions(int speeds) { return speeds <= 40 ? 48 : 6; }
+constexpr int kMaxWithTurns = 40;
+int Positions(int speeds) { return speeds <= kMaxWithTurns ? 48 : 6; }
+/// Of a walk that looks for positions where rows must move: as many turns as there are freedoms.
+constexpr int kMostTurns = 8;
 
 /// Ways that show whether a position is regular [rad or lengths]. A way x opens loops that are
 /// singular by x^2 / 2, which must be far beyond the accuracy of rounded input.
 constexpr double kProbe = 0.01, kRoundedProbe = 0.05;
-
-/// Speeds of mechanisms whose rows may move between joints: walks cover a whole turn.
-constexpr int kMaxWithMoving = 40;
 
 /// Returns true if all free speeds lead to finite motions, as for constraints that are redundant at
 /// every position. Otherwise more constraints hold nearby: a ladder of windows in line has a branch
@@ -41,14 +42,21 @@ bool IsRegular(const Excursion<Space>& position, double probe) {
 }
 
 /// Walks through positions of the largest rank met; returns the one farthest from losing it.
-/// `moves`: whether the walk left its start. `rows`: at all positions with the rank of the best.
+/// `moves`: whether the walk left its start. `rows`: at these positions and more of the same rank.
 template <class Space>
 Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>& mechanism,
                       bool& moves, std::vector<Eigen::MatrixXd>& rows) {
   Excursion<Space> best = excursion;
   rows = {excursion.rows().rows};
-  for (int k = 1; k <= Positions(mechanism.num_u()) && best.rank() < mechanism.num_rows(); ++k) {
+  const int enough = Positions(mechanism.num_u());
+  const bool is_large = mechanism.num_u() > kMaxWithTurns;
+  const int all = enough * (is_large ? 1 : std::clamp(best.freedom(), 1, kMostTurns));
+  for (int k = 1; k <= all && best.rank() < mechanism.num_rows(); ++k) {
     if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < best.rank()) continue;
+    if (k > enough) {
+      if (excursion.rank() == best.rank()) rows.push_back(excursion.rows().rows);
+      continue;
+    }
     moves = true;
     if (excursion.rank() > best.rank()) rows.clear();
     rows.push_back(excursion.rows().rows);
@@ -62,33 +70,35 @@ Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>
 /// Lets rows move between joints (mechanism.h) until the quotas of joints serve at all positions.
 void AdaptQuotas(const std::vector<Eigen::MatrixXd>& rows, int rank, std::vector<Quota>& quotas) {
   // Elements of T up to ten are accepted (self_stress.h), and a walk misses the worst position.
-  constexpr double kServes = 0.2, kBetter = 1.5;
+  constexpr double kServes = 0.5, kBetter = 0.9;
   std::vector<Quota> none = quotas;
   for (Quota& quota : none) quota.keep = quota.fixed;
   std::vector<double> best;  // without quotas
   for (const Eigen::MatrixXd& at : rows) best.push_back(RowChoice(at, none, rank).least());
-  const auto serve = [&] {
-    double share = 1.0;
+  // of all positions: a worst one may be due to several quotas
+  const auto lack = [&] {
+    double sum = 0.0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      share = std::min(share, RowChoice(rows[i], quotas, rank).least() / best[i]);
+      const double share = RowChoice(rows[i], quotas, rank).least() / best[i];
+      sum += std::max(0.0, std::log(kServes / std::max(share, 1e-6)));
     }
-    return share;
+    return sum;
   };
-  for (double share = serve(); share < kServes;) {
-    double most = kBetter * share;
+  for (double now = lack(); now > 0.0;) {
+    double least = kBetter * now;
     Quota* reduced = nullptr;
     for (Quota& quota : quotas) {
       if (quota.keep <= quota.fixed) continue;
       --quota.keep;
-      if (const double other = serve(); other > most) {
-        most = other;
+      if (const double other = lack(); other < least) {
+        least = other;
         reduced = &quota;
       }
       ++quota.keep;
     }
     if (reduced == nullptr) return;
     --reduced->keep;
-    share = most;
+    now = least;
   }
 }
 
@@ -162,7 +172,7 @@ Redundancy Find(const MechanismDescription& description) {
     if (result.rank == result.rows || result.rank == mechanism.num_u()) return result;
     // rounded rows are imposed or not, so that those of the start must serve there
     const bool starts_regular = accuracy > 0.0 && first.rank() == excursion.rank();
-    if (mechanism.num_u() > kMaxWithMoving) rows.clear();
+    if (mechanism.num_u() > kMaxWithTurns) rows.clear();
     result.released = Release(starts_regular ? first : excursion, mechanism, description, rows);
     if (accuracy > 0.0) {
       result.rounding = std::max(excess, start.position_residual / mechanism.length());

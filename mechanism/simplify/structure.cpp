@@ -49,8 +49,8 @@ std::vector<RedundantDirection> FindDependent(const MechanismDescription& descri
     }
     for (int index : mechanism.constraints()) {
       const Joint<Space, double>& joint = mechanism.joints()[index];
-      if (row >= joint.row && row < joint.row + joint.num_constraints())
-        add(index, row - joint.row);
+      const int i = row - joint.row;
+      if (i >= 0 && i < joint.num_constraints()) add(index, i);
     }
   }
   return dependent;

@@ -77,24 +77,6 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
-TEST(RedundancyTest, RowsMoveWhereNoJointKeepsItsNumber) {
-  const Redundancy plate =
-      FindRedundancy(Shipped("../experiments/overconstrained/plate-on-cranks"));
-  EXPECT_EQ(plate.rows, 4);
-  EXPECT_EQ(plate.rank, 3);
-  const auto moving = [](const Redundancy& found) {
-    int count = 0;
-    for (const Released& out : found.released) count += static_cast<int>(out.moving.size());
-    return count;
-  };
-  EXPECT_EQ(Count(plate.released), 2);
-  EXPECT_EQ(moving(plate), 1);
-  // pivots in line: both loops are singular in the same positions
-  for (const char* name : {"three-cranks", "locomotive"}) {
-    EXPECT_EQ(moving(FindRedundancy(Shipped(name))), 0) << name;
-  }
-}
-
 TEST(RedundancyTest, ASingularStartIsNoRedundancy) {
   for (const char* name : {"parallelogram-singular-start", "toggle-singular-start"}) {
     const Redundancy found = FindRedundancy(Shipped(name));
@@ -131,6 +113,42 @@ void Add(MechanismDescription* d, const MechanismDescription& more, const std::s
     d->initial.coordinates.push_back({values.joint + joints, values.values});
   }
   for (const int held : more.initial.held) d->initial.held.push_back(held + joints);
+}
+
+int CountMoving(const Redundancy& found) {
+  int count = 0;
+  for (const Released& out : found.released) count += static_cast<int>(out.moving.size());
+  return count;
+}
+
+TEST(RedundancyTest, RowsMoveWhereNoJointKeepsItsNumber) {
+  const MechanismDescription plate = Shipped("../experiments/overconstrained/plate-on-cranks");
+  const Redundancy found = FindRedundancy(plate);
+  EXPECT_EQ(found.rows, 4);
+  EXPECT_EQ(found.rank, 3);
+  EXPECT_EQ(Count(found.released), 2);
+  EXPECT_EQ(CountMoving(found), 1);
+  // pivots in line: both loops are singular in the same positions
+  for (const char* name : {"three-cranks", "locomotive"}) {
+    EXPECT_EQ(CountMoving(FindRedundancy(Shipped(name))), 0) << name;
+  }
+  // a plate on a plate: no position of a walk need be near a flat loop of both
+  for (const auto& [lower, upper] : {std::pair{1.0, 0.5}, {0.3, 2.0}, {2.0, 0.2}, {-1.0, 0.9}}) {
+    MechanismDescription tower = plate, top = plate;
+    for (const auto& [one, angle] : {std::pair{&tower, lower}, {&top, upper}}) {
+      for (JointValues& values : one->initial.coordinates) {
+        values.values[0] = values.joint < 3 ? angle : -angle;
+      }
+    }
+    top.initial.held.clear();
+    Add(&tower, top, "-top");
+    for (JointDescription& joint : tower.joints) {
+      if (joint.name.starts_with("ground") && joint.name.ends_with("-top")) joint.from.body = 4;
+    }
+    const Redundancy two = FindRedundancy(tower);
+    EXPECT_EQ(two.rank, 6) << lower << " " << upper;
+    EXPECT_EQ(CountMoving(two), 2) << lower << " " << upper;
+  }
 }
 
 /// Unit bars in line in space, as long together as the pins at their ends are apart.

@@ -193,13 +193,19 @@ class Compiler {
         redundancy.rounding > 0.0
             ? "within " + NumberText(redundancy.rounding, 2) + " lengths, the accuracy of the input"
             : "at every position";
+    std::size_t moving = 0;
     for (const Released& out : redundancy.released) {
+      moving += out.moving.size();
       for (const int direction : out.directions) {
         if (out.IsMoving(direction)) continue;
         result_.report.push_back("joint \"" + description.joints[out.joint].name +
                                  "\": " + NameOfDirection(description, out, direction) +
                                  " is redundant " + where);
       }
+    }
+    if (moving > 0) {
+      result_.report.push_back(std::to_string(moving) +
+                               " of the imposed constraints may move between joints during a run");
     }
     if (redundancy.released.empty()) return;
     result_.done.redundancy = true;

@@ -62,12 +62,12 @@ def check_junit(file):
     (suite,) = suites
     cases = list(suite)
     count = lambda tag: sum(one.find(tag) is not None for one in cases)
-    counts = {"tests": len(cases), "failures": count("failure"), "skipped": count("skipped"), "errors": 0}
+    counts = {"tests": len(cases), "failures": count("failure"), "skipped": count("skipped"), "errors": count("error")}
     held = (suites.tag == "testsuites" and suite.tag == "testsuite" and cases
             and all(suite.get(key) == str(value) for key, value in counts.items())
             and all(one.tag == "testcase" and one.get("classname") and one.get("name") for one in cases)
             and all(len(one) <= 1 for one in cases)
-            and all(child.tag in ("failure", "skipped") and child.get("message") for one in cases for child in one))
+            and all(child.tag in ("failure", "skipped", "error") and child.get("message") for one in cases for child in one))
     if not held:
         fail(f"{file} is not as expected: {suite.attrib}, counted {counts}")
     return {(one.get("classname"), one.get("name")) for one in cases if one.find("failure") is not None}

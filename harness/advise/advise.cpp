@@ -106,6 +106,8 @@ class BenchIn final : public TrialBench {
     entry.limits.cpu_s = cpu_s;
     IntegratorOptions options = OptionsOf(entry, in.mechanism.stop_times());
     options.fixed_step = choice.step;
+    entry.horizon = problem_.horizon;
+    LimitSteps(entry, in.mechanism, &options);
     const auto system = MakeFormulation<Space>(choice.method, in.mechanism);
     IntegratorResult result;
     result.outcome = system->Start(0.0, in.start.q, in.start.u);

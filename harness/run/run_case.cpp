@@ -153,6 +153,36 @@ IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_t
   return options;
 }
 
+template <class Space>
+void LimitSteps(const Case& entry, const Mechanism<Space, double>& mechanism,
+                IntegratorOptions* options) {
+  if (options->fixed_step > 0.0 || options->max_step > 0.0) return;
+  if (mechanism.drives().empty()) return;
+  if (mechanism.coordinates() != Coordinates::kJoint || mechanism.num_u() == 0) return;
+  if (mechanism.num_u() > mechanism.num_equations()) return;
+  // Methods of order five take 1.5 to 2 rtol^(1/6) rad a step where coordinates turn; twice that
+  // limits no others.
+  constexpr double kTurn = 4.0;
+  constexpr int kTimes = 64;
+  Kinematics<Space, double> kinematics(mechanism);
+  double fastest = 0.0;  // rad/s, or lengths per second
+  for (int k = 0; k <= kTimes; ++k) {
+    kinematics.SetTime(entry.horizon * k / kTimes);
+    for (std::size_t d = 0; d < mechanism.drives().size(); ++d) {
+      const Drive& drive = mechanism.drives()[d];
+      const int axis = mechanism.joints()[drive.joint].kind->axes[drive.coordinate];
+      const double unit = axis < Space::kRot ? 1.0 : mechanism.length();
+      fastest = std::max(fastest, std::abs(kinematics.drives()[d].rate) / unit);
+    }
+  }
+  // ode45 has a limit of its own, a tenth of the horizon
+  const double longest = kTurn * std::pow(options->rtol, 1.0 / 6.0) / fastest;
+  if (longest < 0.1 * entry.horizon) options->max_step = longest;
+}
+
+template void LimitSteps(const Case&, const Mechanism<Planar, double>&, IntegratorOptions*);
+template void LimitSteps(const Case&, const Mechanism<Spatial, double>&, IntegratorOptions*);
+
 Record RunCase(const Experiment& experiment, const Case& entry, const Reference* reference,
                const std::filesystem::path& trajectory, int threads) {
   const ExperimentProblem& problem = experiment.problems[entry.problem];
@@ -371,6 +401,7 @@ class Runner {
     formulation->ToState(start.q, start.u, y_);
     std::vector<double> ydot(n);
     IntegratorOptions options = OptionsOf(case_, stops_);
+    if (!peer) LimitSteps(case_, mechanism_, &options);
     options.atols = AtolsOf(case_, description_, *formulation);
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
       const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);

@@ -90,6 +90,13 @@ void GiveExecution(const Method& method, const MechanismDescription& description
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.
 IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times);
 
+/// Limits steps where prescribed motions leave no freedom: joint coordinates may then be linear in
+/// time, so that step control permits any step, but the work of the drives is not. Not if the case
+/// has a longest step or fixed steps.
+template <class Space>
+void LimitSteps(const Case& entry, const Mechanism<Space, double>& mechanism,
+                IntegratorOptions* options);
+
 /// Returns the absolute tolerance of each component of a system's present state. Empty if all have
 /// the case's atol.
 template <class Space>

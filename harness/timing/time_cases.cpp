@@ -174,6 +174,7 @@ class SubjectIn final : public Subject {
         observe = [&](double, std::span<double> y) { return keep(y), StepAction::kContinue; };
       return peer_->Integrate(case_.horizon, y_, options, observe);
     }
+    LimitSteps(case_, mechanism_, &options);
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation_);
     options.atols = AtolsOf(case_, description_, *formulation_);
     const auto observe = [&](double t, std::span<double> y) {

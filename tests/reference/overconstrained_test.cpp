@@ -164,6 +164,26 @@ TEST(MovingRows, KeepEnergyAndLoopsAtAllLevels) {
   }
 }
 
+/// Joint coordinates are linear in time, but the work of the drive is not.
+TEST(MovingRows, OfADrivenPlateDoTheWorkOfItsWeight) {
+  MechanismFile mechanism =
+      ReadMechanism(kConfigs / "experiments/overconstrained/plate-on-cranks.json");
+  MechanismDescription& d = mechanism.description;
+  d.joints[0].motions = {{0, Polynomial{{1.0, 5.0}}}};
+  std::erase_if(d.initial.coordinates, [](const JointValues& one) { return one.joint == 0; });
+  d.initial.held.clear();
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Enforcement level : {Enforcement::kVelocity, Enforcement::kPosition}) {
+      constexpr double kRtol = 1e-9;
+      const Record record = RunProblem(mechanism, At(formulation, level), kRtol, 10.0);
+      EXPECT_EQ(record.Text("outcome"), "finished");
+      EXPECT_EQ(record.Text("warnings"), "");
+      // each step errs by about rtol of the work, which is of the size of the energy
+      EXPECT_LE(record.Number("energy_error_relative"), kRtol * record.Number("steps"));
+    }
+  }
+}
+
 /// The choice of rows depends on the run so far, and is part of what is generated.
 TEST(MovingRows, OfRoundedInputAreInGeneratedCodeToo) {
   MechanismFile mechanism =

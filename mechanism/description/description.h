@@ -54,7 +54,7 @@ struct JointDescription {
   /// Constrained directions, counted from 0 in the order of joint.h's D, that the joint does not
   /// impose because they are redundant (redundancy.h). Only for cut joints; never in a user's file.
   std::vector<int> released;
-  /// Those of them that moving rows impose at the start (mechanism.h).
+  /// The subset that moving rows impose at the start (mechanism.h).
   std::vector<int> moving;
   std::vector<PrescribedMotion> motions;  ///< at most one per coordinate; none with a quaternion
   /// Inertia of a rotor along the one coordinate [kg m^2, or kg]: of a drive, times the square of
@@ -121,8 +121,8 @@ struct MechanismDescription {
   bool rounded = false;
 };
 
-/// A copy in which all constrained directions are imposed; those of moving rows only if the
-/// description is rounded.
+/// A copy in which all constrained directions are imposed; if rounded, the directions imposed at the
+/// start.
 MechanismDescription Unreleased(const MechanismDescription& description);
 
 /// Returns the first error of the description as text ("" if it is valid): masses and inertias not

@@ -25,6 +25,8 @@ class RowChoice {
 
   /// The least norm that a row had left when it was taken.
   double least() const { return least_; }
+  /// Rows taken of a joint (index into the quotas).
+  int taken(std::size_t joint) const { return taken_[joint]; }
   /// Returns the rows beyond the quotas as directions of `joints` (one per quota).
   std::vector<Released> BeyondQuotas(const std::vector<int>& joints) const;
 

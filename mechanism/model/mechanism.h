@@ -84,7 +84,7 @@ struct Rotor {
 struct Released {
   int joint = 0;
   std::vector<int> directions;
-  /// Those of them that moving rows impose at present, ascending. In several overconstrained loops
+  /// The subset that moving rows impose at present, ascending. In several overconstrained loops
   /// the number of independent rows of one joint changes during a motion; solvers need it constant.
   /// So rows that must move between joints are imposed like couplings.
   std::vector<int> moving = {};

@@ -18,7 +18,7 @@ namespace {
 constexpr double kApart = 0.15;
 constexpr int kMaxWithTurns = 40;
 int Positions(int speeds) { return speeds <= kMaxWithTurns ? 48 : 6; }
-/// Of a walk that looks for positions where rows must move: as many turns as there are freedoms.
+/// To decide where rows must move, a walk takes one turn per freedom, but no more than these.
 constexpr int kMostTurns = 8;
 
 /// Ways that show whether a position is regular [rad or lengths]. A way x opens loops that are
@@ -114,17 +114,11 @@ std::vector<Released> Release(const Excursion<Space>& position,
   std::vector<Quota> quotas;
   for (std::size_t c = 0; c < constraints.size(); ++c) {
     const bool keeps_all = !description.joints[constraints[c]].motions.empty();
-    quotas.push_back({at.first[c], at.count[c], keeps_all ? at.count[c] : 0, at.count[c]});
+    const int fixed = keeps_all ? at.count[c] : 0;
+    quotas.push_back({at.first[c], at.count[c], fixed, fixed});
   }
-  for (Quota& quota : quotas) quota.keep = quota.fixed;
-  const std::vector<Released> released =
-      RowChoice(at.rows, quotas, position.rank()).BeyondQuotas(constraints);
-  // quotas of the best position; rows taken there count as moving
-  for (std::size_t c = 0; c < quotas.size(); ++c) quotas[c].keep = quotas[c].count;
-  for (const Released& out : released) {
-    const auto c = std::ranges::find(constraints, out.joint) - constraints.begin();
-    quotas[c].keep -= static_cast<int>(out.directions.size() - out.moving.size());
-  }
+  const RowChoice best(at.rows, quotas, position.rank());
+  for (std::size_t c = 0; c < quotas.size(); ++c) quotas[c].keep = best.taken(c);
   if (quotas.size() > 1) AdaptQuotas(everywhere, position.rank(), quotas);
   return RowChoice(at.rows, quotas, position.rank()).BeyondQuotas(constraints);
 }

@@ -121,8 +121,8 @@ struct MechanismDescription {
   bool rounded = false;
 };
 
-/// A copy in which all constrained directions are imposed; if rounded, the directions imposed at the
-/// start.
+/// A copy in which all constrained directions are imposed; if rounded, the directions imposed at
+/// the start.
 MechanismDescription Unreleased(const MechanismDescription& description);
 
 /// Returns the first error of the description as text ("" if it is valid): masses and inertias not

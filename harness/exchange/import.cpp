@@ -442,12 +442,10 @@ Imported ImportDraft::Finish(const std::string& format) {
   std::ranges::stable_sort(notes_, {}, [&](const ImportNote& note) {
     return std::tuple(note.file != file_.name(), note.file, note.line);
   });
-  if (has_replicas) {
-    std::set<std::tuple<std::string, int, std::string, std::string>> seen;
-    std::erase_if(notes_, [&](const ImportNote& note) {
-      return !seen.emplace(note.file, note.line, note.element, note.reason).second;
-    });
-  }
+  std::set<std::tuple<std::string, int, std::string, std::string>> seen;
+  std::erase_if(notes_, [&](const ImportNote& note) {
+    return !seen.emplace(note.file, note.line, note.element, note.reason).second;
+  });
   imported.description = std::move(description);
   imported.notes = std::move(notes_);
   return imported;

@@ -144,6 +144,7 @@ std::string ImportDraft::NameLater(const std::string& stem) {
 void ImportDraft::NameJoints() {
   for (const auto& [joint, stem] : stems_) {
     description.joints[joint].name = joints_.Take(stem);
+    found_names_.insert(description.joints[joint].name);
   }
   stems_.clear();
 }

@@ -115,7 +115,7 @@ const Entry& Named(const std::map<std::string, Entry>& entries, const XmlValue& 
   return found->second;
 }
 
-// Joints in series without mass between them (import_chain.cpp).
+// Joints in series without mass between them (import_chain.cpp, import_links.cpp).
 
 enum class SerialKind { kHinge, kSlide, kBall, kFree };
 
@@ -138,14 +138,10 @@ struct ComposedJoint {
   bool keeps_angle = false;    ///< a planar joint that only slides
 };
 
-inline constexpr const char* kAxesOfOneJoint =
-    "axes of a universal, cylindrical, planar, spherical, translation, schoenflies, point-on-line, "
-    "point-in-plane or free joint or a pin in a slot";
-
 /// Returns the joint that a series forms, if there is one.
 std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints);
-/// Returns the kinds, for messages: "hinge, slide".
-std::string WordsOf(const std::vector<SerialJoint>& joints);
+/// Returns true if no joint of a series repeats motions of the others, in most positions.
+bool AreIndependent(const std::vector<SerialJoint>& joints);
 /// Returns the motion of a joint, not a free one, at its coordinates `q`.
 Placement MotionOf(const SerialJoint& joint, const double* q);
 /// Converts several joints to one: coordinates from their common pose, speeds from the velocity
@@ -160,7 +156,6 @@ class ImportDraft {
   ImportDraft(const XmlFile& file, const ImportOptions& options);
 
   MechanismDescription description;
-  bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
   std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
 
   /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
@@ -248,13 +243,14 @@ class ImportDraft {
   /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
   /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);
-  /// Makes one joint of joints in series through bodies without mass. Rejects series that form
-  /// none.
+  /// Makes one joint of joints in series through bodies without mass where they form one, and gives
+  /// mass to the other such bodies.
   void ComposeChains();
   void ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed);
-  /// Gives a link without mass between two hinges mass of the bodies beside it, which does not
-  /// change the motion. Returns false if these bodies have none to give.
-  bool GiveMassToLink(const MasslessChain& chain);
+  /// Rejects hinges, slides and balls of a placed chain that repeat motions of each other.
+  void RejectRepeated(const MasslessChain& chain) const;
+  /// Gives mass to the bodies of a placed chain, with a note of its effect on the motion.
+  void GiveMassToLinks(const MasslessChain& chain);
   /// Removes attached bodies (one entry per body) and the joints within their carriers.
   void Attach(const std::vector<Attachment>& attachments);
   /// Fixes bodies without mass at the ends of chains where they are drawn: their motion has no
@@ -276,6 +272,7 @@ class ImportDraft {
   std::map<std::string, int> numbers_;                      ///< of joints with names
   std::map<int, int> leaders_;                              ///< of joints that follow others
   std::vector<std::pair<std::size_t, std::string>> stems_;  ///< for joints without names
+  std::set<std::string> found_names_;                       ///< of these joints
   std::vector<ImportNote> notes_;
   std::set<std::pair<const void*, std::string>>
       rounded_;                   ///< elements and attributes of rounded values

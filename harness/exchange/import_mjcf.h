@@ -92,27 +92,20 @@ struct MjcfSettings {
 /// Minimum and maximum value.
 using MjcfLimits = std::pair<double, double>;
 
-/// A joint of MuJoCo; several on one body form one Loopbench joint.
 struct MjcfJoint : SerialJoint {
   explicit MjcfJoint(MjcfElement element_) : element(std::move(element_)) {}
 
   MjcfElement element;
   std::string name;
   double spring_reference = 0.0;  ///< its coordinate with a relaxed spring
-  int joint = -1;                 ///< Loopbench joint that contains it
-  bool alone = true;              ///< it is the only part of that joint
-
-  /// True if the Loopbench joint has its coordinate and no other.
-  bool has_coordinate() const { return num_q() == 1 && alone; }
+  int joint = -1;                 ///< of the mechanism, until chains are composed
 };
 
-/// The joints of a body, from the outermost, and the Loopbench joint that they form.
-struct MjcfChain {
+/// A body or link, and its connection to its parent: a joint, or fixed.
+struct MjcfStep {
   int parent = kGround, child = kGround;
-  Placement X_PB;                  ///< drawn pose of the body in its parent
-  std::vector<std::size_t> parts;  ///< in MjcfModel::joints; none for a fixed body
-  int joint = -1;
-  ComposedJoint composed;
+  Placement X_PB;  ///< drawn pose in the parent
+  int joint = -1;  ///< in MjcfModel::joints; -1: fixed
 };
 
 /// A site: a point of a body, and the orientation of its frame there.
@@ -140,12 +133,12 @@ class MjcfModel {
   MjcfSettings settings;
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
-  std::vector<MjcfChain> chains;  ///< of all bodies, in the order of the file
+  std::vector<MjcfStep> steps;    ///< of all bodies and links, in the order of the file
   std::map<std::string, MjcfSite> sites;
   std::map<std::string, MjcfElement> meshes;
   mutable std::map<std::string, Solid> mesh_solids;  ///< of meshes that have been read
   std::map<std::string, std::size_t> joint_names;
-  std::set<int> links;  ///< bodies without mass between two hinges of one body of MuJoCo
+  std::set<int> links;  ///< bodies without mass between joints of one body of MuJoCo
   std::vector<MjcfReplicate> replicates;
 
   /// Returns the next copy of the contents of a <replicate>; nullptr stands for no replica.
@@ -212,9 +205,9 @@ struct MjcfPlaced {
   std::string childclass;
   const MjcfReplica* replica = nullptr;
 };
-/// Makes one Loopbench joint from the joints of a body; X_PB is the drawn pose of the body.
-void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
-                  const Placement& X_PB, const std::vector<MjcfPlaced>& joints);
+/// Adds the joints of a body in series, with links between; X_PB is the drawn pose of the body.
+void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int child,
+                   const Placement& X_PB, const std::vector<MjcfPlaced>& joints);
 /// Reads constraints, and spatial tendons between two sites: springs, or rods if an <equality>
 /// keeps their length.
 void ReadMjcfLoops(const XmlElement& root, MjcfModel* model);

@@ -385,7 +385,7 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   if (BoolOr(element.Attribute("mocap"))) {
     draft->Note(element, "mocap", "stays where the file draws it", true);
   }
-  AddMjcfChain(model, element, parent, body, X_PB, contents.joints);
+  AddMjcfJoints(model, element, parent, body, X_PB, contents.joints);
   for (const MjcfPlaced& child : contents.bodies) ReadBody(child, body, is_fixed, model);
 }
 
@@ -454,7 +454,6 @@ void MjcfModel::CountCopy(const XmlElement& element) {
 
 const MjcfReplica* MjcfModel::AddReplica(const XmlElement& element, const MjcfReplica* around,
                                          const std::string& suffix) {
-  draft->has_replicas = true;
   CountCopy(element);
   std::size_t depth = 1;
   for (const MjcfReplica* outer = around; outer != nullptr; outer = outer->around) ++depth;

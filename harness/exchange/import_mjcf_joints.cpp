@@ -1,4 +1,5 @@
-// Joints and actuators of MuJoCo: the joints of a body act in series, as one Loopbench joint.
+// Joints and actuators of MuJoCo. Joints of one body act in series, with links without mass
+// between.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,7 +26,7 @@ void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
   }
 }
 
-/// Adds springs, dampers and the rotor of a joint that is a whole Loopbench joint; drops others.
+/// Adds springs, dampers and the rotor of the joint that was added last; drops those of a ball.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   const MjcfElement& element = joint.element;
   double k = element.Number("stiffness", 0.0, kNotNegative);
@@ -33,7 +34,7 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   if (!model->settings.has_springs) k = 0.0;
   if (!model->settings.has_dampers) c = 0.0;
   const double rotor = element.Number("armature", 0.0, kNotNegative);
-  if (joint.has_coordinate()) {
+  if (joint.num_q() == 1) {
     model->draft->AddSpringAndDamper(k, joint.spring_reference - joint.reference, c);
     model->draft->description.joints.back().rotor_inertia = rotor;
     return;
@@ -82,91 +83,62 @@ MjcfJoint ReadJoint(MjcfModel* written, const MjcfPlaced& placed) {
   return joint;
 }
 
-/// Adds the Loopbench joint of the joints of a body and sets its frame on the child.
-void AddComposed(const XmlElement& body, const std::vector<MjcfJoint>& joints, ImportDraft* draft,
-                 MjcfChain* chain) {
-  const auto composed = Compose({joints.begin(), joints.end()});
-  if (!composed) {
-    const bool has_free = std::ranges::count(joints, SerialKind::kFree, &MjcfJoint::kind) > 0;
-    const std::string words = WordsOf({joints.begin(), joints.end()});
-    body.Fail(fmt::format("{} joints on one body ({}) that are none of ours together",
-                          joints.size(), has_free ? "one of them free" : words),
-              fmt::format("a body with mass between them, or {}", kAxesOfOneJoint));
+void AddJoint(MjcfModel* model, const XmlElement& body, const MjcfStep& step, MjcfJoint joint) {
+  ImportDraft* draft = model->draft;
+  const bool is_free = joint.kind == SerialKind::kFree;
+  if (is_free && step.parent != kGround) {
+    joint.element.own().Fail("a free joint of a body within another",
+                             "a free joint in a body of <worldbody>");
   }
-  std::vector<std::string> names;
-  for (const MjcfJoint& joint : joints) {
-    if (!joint.name.empty()) names.push_back(joint.name);
-  }
-  const std::string name =
-      names.empty() ? draft->NameLater(draft->description.bodies[chain->child].name)
-                    : draft->NewJointName(body, fmt::format("{}", fmt::join(names, "+")));
-  const bool is_free = joints[0].kind == SerialKind::kFree;
-  if (is_free && chain->parent != kGround) {
-    joints[0].element.own().Fail("a free joint of a body within another",
-                                 "a free joint in a body of <worldbody>");
-  }
-  chain->composed = *composed;
-  const Placement X_PF = is_free ? Placement() : chain->X_PB * composed->X_BJ;
-  JointDescription& made = draft->AddComposed(name, *composed, chain->parent, X_PF, chain->child);
-  chain->joint = draft->last_joint();
-  if (composed->type == JointType::kFree) {
-    const Placement X = is_free ? chain->X_PB : Placement();
-    draft->description.initial.coordinates.push_back({chain->joint, X.AsCoordinates()});
-  }
-  if (joints.size() > 1) {
-    draft->Note(body,
-                fmt::format("{} joints are one here: {}", joints.size(), ToString(composed->type)));
-  } else if (joints[0].num_q() == 1) {
-    const bool turns = joints[0].kind == SerialKind::kHinge;
+  const std::string name = joint.name.empty()
+                               ? draft->NameLater(draft->description.bodies[step.child].name)
+                               : draft->NewJointName(body, joint.name);
+  const ComposedJoint ours = *Compose({joint});
+  const Placement X_PF = is_free ? Placement() : step.X_PB * ours.X_BJ;
+  JointDescription& made = draft->AddComposed(name, ours, step.parent, X_PF, step.child);
+  joint.joint = draft->last_joint();
+  if (is_free) {
+    draft->description.initial.coordinates.push_back({joint.joint, step.X_PB.AsCoordinates()});
+  } else if (joint.num_q() == 1) {
+    const bool turns = joint.kind == SerialKind::kHinge;
     const Vector3d own = turns ? Vector3d::UnitZ() : Vector3d::UnitX();
-    if (joints[0].axis != own) made.axis = joints[0].axis;
+    if (joint.axis != own) made.axis = joint.axis;
   }
-}
-
-void AddChain(MjcfModel* model, const XmlElement& body, int parent, int child,
-              const Placement& X_PB, std::vector<MjcfJoint> joints) {
-  MjcfChain chain;
-  chain.parent = parent;
-  chain.child = child;
-  chain.X_PB = X_PB;
-  if (joints.empty()) {
-    model->draft->Fix(parent, X_PB, child, " fixed");
-  } else {
-    AddComposed(body, joints, model->draft, &chain);
-  }
-  for (MjcfJoint& joint : joints) {
-    joint.joint = chain.joint;
-    joint.alone = joints.size() == 1;
-    const std::size_t index = model->joints.size();
-    if (!joint.name.empty() && !model->joint_names.emplace(joint.name, index).second) {
-      joint.element.own().Fail(fmt::format("a second joint \"{}\"", joint.name),
-                               "a name that is not in use");
-    }
-    chain.parts.push_back(index);
-    AddJointForces(model, joint);
-    model->joints.push_back(joint);
-  }
-  model->chains.push_back(std::move(chain));
+  if (!joint.name.empty()) model->joint_names.emplace(joint.name, model->joints.size());
+  AddJointForces(model, joint);
+  model->joints.push_back(std::move(joint));
 }
 
 }  // namespace
 
-void AddMjcfChain(MjcfModel* model, const XmlElement& body, int parent, int child,
-                  const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
+void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int child,
+                   const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
+  ImportDraft* draft = model->draft;
   std::vector<MjcfJoint> joints;
   for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(model, joint));
-  // two hinges that are no joint together: a link without mass is between them
-  const bool has_link = joints.size() == 2 && !Compose({joints.begin(), joints.end()}) &&
-                        std::ranges::count(joints, SerialKind::kHinge, &MjcfJoint::kind) == 2;
-  if (has_link) {
-    ImportDraft* draft = model->draft;
-    const int link = draft->AddBody(body, draft->description.bodies[child].name + " link");
-    draft->at_rest[link] = draft->at_rest[child];
-    model->links.insert(link);
-    AddChain(model, body, parent, link, X_PB, {joints[0]});
-    AddChain(model, body, link, child, {}, {joints[1]});
-  } else {
-    AddChain(model, body, parent, child, X_PB, std::move(joints));
+  if (joints.size() > 1 && std::ranges::count(joints, SerialKind::kFree, &MjcfJoint::kind) > 0) {
+    body.Fail(fmt::format("{} joints on one body, one of them free", joints.size()),
+              "a free joint alone");
+  }
+  MjcfStep step{parent, child, X_PB};
+  if (joints.empty()) {
+    draft->Fix(parent, X_PB, child, " fixed");
+    model->steps.push_back(step);
+  }
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const bool is_last = i + 1 == joints.size();
+    step.child = child;
+    if (!is_last) {
+      const std::string number = i == 0 ? "" : fmt::format(" {}", i + 1);
+      step.child = draft->AddBody(body, draft->description.bodies[child].name + " link" + number);
+      draft->at_rest[step.child] = draft->at_rest[child];
+      model->links.insert(step.child);
+    }
+    step.joint = static_cast<int>(model->joints.size());
+    AddJoint(model, body, step, std::move(joints[i]));
+    model->steps.push_back(step);
+    step.parent = step.child;
+    step.X_PB = {};
   }
 }
 
@@ -316,7 +288,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
     return drop(control == 0.0 ? "its control is 0 in the start that is read" : "its force is 0",
                 false);
   }
-  if (!joint.has_coordinate()) return drop(kNeedsOneCoordinate, true);
+  if (joint.num_q() != 1) return drop(kNeedsOneCoordinate, true);
   if (force[1] > 0.0 || force[2] > 0.0) {
     return drop("its stiffness or damping is negative, or a damping ratio", true);
   }

@@ -101,7 +101,7 @@ bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
   const std::vector<double> a = PolynomialOf(equality);
   const auto other = equality.Attribute("joint2");
   const MjcfJoint* leader = other ? &model->joints[model->JointNamed(*other)] : nullptr;
-  if (!joint.has_coordinate() || (leader != nullptr && !leader->has_coordinate())) {
+  if (joint.num_q() != 1 || (leader != nullptr && leader->num_q() != 1)) {
     model->draft->Note(equality.own(), kNotCoupled, true);
     return false;
   }
@@ -213,7 +213,7 @@ void AddFixedTendon(const XmlElement& element, const XmlElement& held, MjcfModel
   for (const XmlElement& child : element.Children("joint")) {
     const MjcfJoint& joint =
         model->joints[model->JointNamed(child.Required("joint", "the name of a joint"))];
-    if (!joint.has_coordinate()) return model->draft->Note(element, kNotCoupled, true);
+    if (joint.num_q() != 1) return model->draft->Note(element, kNotCoupled, true);
     const auto part = std::ranges::find(parts, joint.joint, &CouplingDescription::Part::joint);
     if (part != parts.end()) child.Fail("a joint twice", "each joint once");
     parts.push_back({joint.joint, child.Required("coef", "a number").Number()});
@@ -299,16 +299,15 @@ void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const d
 /// Returns the coordinates in the drawn position: qpos0 of MuJoCo.
 std::vector<double> DrawnCoordinates(const MjcfModel& model) {
   std::vector<double> qpos;
-  for (const MjcfChain& chain : model.chains) {
-    for (const std::size_t part : chain.parts) {
-      const MjcfJoint& joint = model.joints[part];
-      const Vector3d& p = chain.X_PB.p;
-      const Quaterniond& q = chain.X_PB.q;
-      if (joint.num_q() == 1) qpos.push_back(joint.reference);
-      if (joint.kind == SerialKind::kBall) qpos.insert(qpos.end(), {1.0, 0.0, 0.0, 0.0});
-      if (joint.kind == SerialKind::kFree) {
-        qpos.insert(qpos.end(), {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
-      }
+  for (const MjcfStep& step : model.steps) {
+    if (step.joint < 0) continue;
+    const MjcfJoint& joint = model.joints[step.joint];
+    const Vector3d& p = step.X_PB.p;
+    const Quaterniond& q = step.X_PB.q;
+    if (joint.num_q() == 1) qpos.push_back(joint.reference);
+    if (joint.kind == SerialKind::kBall) qpos.insert(qpos.end(), {1.0, 0.0, 0.0, 0.0});
+    if (joint.kind == SerialKind::kFree) {
+      qpos.insert(qpos.end(), {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
     }
   }
   return qpos;
@@ -320,26 +319,22 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
   InitialDescription& initial = model->draft->description.initial;
   initial.coordinates.clear();
   const double *q = qpos.data(), *u = qvel.data();
-  for (const MjcfChain& chain : model->chains) {
-    if (chain.parts.empty()) continue;
-    const MjcfJoint& first = model->joints[chain.parts[0]];
-    const JointDescription& ours = model->draft->description.joints[chain.joint];
+  for (const MjcfJoint& joint : model->joints) {
+    const JointDescription& ours = model->draft->description.joints[joint.joint];
     std::vector<double> coordinates, speeds;
-    if (first.alone && first.kind == SerialKind::kFree) {
+    if (joint.kind == SerialKind::kFree) {
       // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
       const Vector3d w =
           Quaterniond(q[3], q[4], q[5], q[6]).normalized() * Vector3d(u[3], u[4], u[5]);
       speeds = {w.x(), w.y(), w.z(), u[0], u[1], u[2]};
-    } else if (first.alone && first.num_q() == 1) {
-      coordinates = {q[0] - first.reference};
+    } else if (joint.num_q() == 1) {
+      coordinates = {q[0] - joint.reference};
       speeds = {u[0]};
     } else {
-      std::vector<SerialJoint> series;
-      for (const std::size_t part : chain.parts) series.push_back(model->joints[part]);
-      SetComposed(series, chain.composed, q, u, &coordinates, &speeds);
+      SetComposed({joint}, *Compose({joint}), q, u, &coordinates, &speeds);
     }
-    if (!ours.motions.empty() && first.alone) {
+    if (!ours.motions.empty()) {
       // a start that contradicts an <equality>
       const double held = std::get<Polynomial>(ours.motions[0].value).coefficients[0];
       const std::string reason =
@@ -349,13 +344,11 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
       }
       if (speeds[0] != 0.0) model->draft->Note(key, "qvel", reason, true);
     } else {
-      initial.coordinates.push_back({chain.joint, coordinates});
-      if (has_speeds) initial.speeds.push_back({chain.joint, speeds});
+      initial.coordinates.push_back({joint.joint, coordinates});
+      if (has_speeds) initial.speeds.push_back({joint.joint, speeds});
     }
-    for (const std::size_t part : chain.parts) {
-      q += model->joints[part].num_q();
-      u += model->joints[part].num_u();
-    }
+    q += joint.num_q();
+    u += joint.num_u();
   }
 }
 
@@ -363,13 +356,11 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
 
 std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
   std::vector<Placement> poses(draft->at_rest.size());
-  for (const MjcfChain& chain : chains) {
-    Placement X = poses[chain.parent] * chain.X_PB;
-    for (const std::size_t part : chain.parts) {
-      const MjcfJoint& one = joints[part];
-      if (one.num_q() == 1) X = X * MotionOf(one, &one.spring_reference);
-    }
-    poses[chain.child] = X;
+  for (const MjcfStep& step : steps) {
+    Placement X = poses[step.parent] * step.X_PB;
+    const MjcfJoint* joint = step.joint < 0 ? nullptr : &joints[step.joint];
+    if (joint != nullptr && joint->num_q() == 1) X = X * MotionOf(*joint, &joint->spring_reference);
+    poses[step.child] = X;
   }
   return poses;
 }

@@ -44,16 +44,16 @@ TEST(ImportMjcf, OrientationsAreTheSameInAllForms) {
   ExpectRefusal(Model("", "", "", "quat=\"1 0 0 0\" euler=\"0 0 0\""), {"one orientation"});
 }
 
-/// The type that joints on one body become; "" when they are refused.
+/// The types that joints on one body become, from the outermost.
 std::string TypeOfChain(const std::string& joints) {
-  try {
-    return std::string(ToString(Read(joints).description.joints[0].type));
-  } catch (const ConfigError&) {
-    return "";
+  std::string types;
+  for (const JointDescription& joint : Read(joints).description.joints) {
+    types += (types.empty() ? "" : " ") + std::string(ToString(joint.type));
   }
+  return types;
 }
 
-TEST(ImportMjcf, JointsOnOneBodyAreOneOfOurs) {
+TEST(ImportMjcf, JointsOnOneBodyBecomeJointsOfMechanisms) {
   const std::string x = "<joint type=\"slide\" axis=\"1 0 0\"/>",
                     y = "<joint type=\"slide\" axis=\"0 1 0\"/>",
                     z = "<joint type=\"slide\" axis=\"0 0 1\"/>", a = "<joint axis=\"1 0 0\"/>",
@@ -82,14 +82,17 @@ TEST(ImportMjcf, JointsOnOneBodyAreOneOfOurs) {
   EXPECT_EQ(TypeOfChain(""), "weld");
   EXPECT_EQ(TypeOfChain(x + y), "planar");  // its angle is kept
   // axes that are not perpendicular or do not meet: two joints and a link
-  EXPECT_EQ(TypeOfChain(b + skew), "revolute");
-  EXPECT_EQ(TypeOfChain(a + away), "revolute");
-  // no joint of a mechanism
-  EXPECT_EQ(TypeOfChain(a + a), "");
-  EXPECT_EQ(TypeOfChain(x + x), "");
-  EXPECT_EQ(TypeOfChain(x + ball + y), "");
-  EXPECT_EQ(TypeOfChain("<freejoint/>" + c), "");
-  ExpectRefusal(Model(x + y + x), {"file.xml:1", "3 joints on one body", "slide, slide, slide"});
+  EXPECT_EQ(TypeOfChain(b + skew), "revolute revolute");
+  EXPECT_EQ(TypeOfChain(a + away), "revolute revolute");
+  EXPECT_EQ(TypeOfChain(x + ball + y), "prismatic point-on-line");
+  EXPECT_EQ(TypeOfChain(x + y + z + a + b), "translation universal");
+  EXPECT_EQ(TypeOfChain(c + skew + away + a + b + c), "revolute revolute revolute spherical");
+  EXPECT_EQ(Read(x + y + z + a + b).description.bodies[2].name, "b link 3");
+  for (const std::string& repeated : {a + a, x + x, x + y + x, ball + ball}) {
+    ExpectRefusal(Model(repeated), {"file.xml:1", "without mass that moves, between joints ("});
+  }
+  ExpectRefusal(Model("<freejoint/>" + c),
+                {"file.xml:1", "2 joints on one body, one of them free"});
 }
 
 TEST(ImportMjcf, ShapesHaveTheMassesOfSolids) {

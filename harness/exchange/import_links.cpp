@@ -1,0 +1,418 @@
+// Links without mass between two joints, as in URDF, SDF and bodies of MuJoCo with several joints.
+//
+// Joints in series through such links become one joint if their motions together are those of a
+// joint type and nothing acts on one of them alone. The remaining links get a mass, because the
+// solvers divide by it. Mass is taken from the bodies beside a link such that the motion is the
+// same, where that is possible: a point mass on the axis of a hinge has the same motion on both of
+// its bodies, and a moment of inertia without mass the same rotation on both sides of a slide.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "harness/exchange/import_draft.h"
+#include "mechanism/algebra/symmetric_eigen.h"
+
+namespace loopbench::harness {
+
+/// A joint of a chain; `position` and `axis` for all types.
+struct ChainJoint : SerialJoint {
+  bool is_simple = false;   ///< `kind` is its type
+  bool leads_out = true;    ///< from the inner body to the outer one
+  Eigen::Quaterniond q_CJ;  ///< its axes in the drawn axes of the child
+};
+
+/// Joints in series from body `parent` to body `child`, and the bodies without mass between them.
+struct MasslessChain {
+  int parent = kGround, child = kGround;
+  std::vector<int> joints, between;
+  // in the drawn axes of the child (Place()):
+  std::vector<ChainJoint> series = {};
+  std::vector<Placement> places = {};  ///< of the parent and the bodies between
+
+  std::size_t size() const { return joints.size(); }
+  /// Returns the joints [first, end).
+  MasslessChain Part(std::size_t first, std::size_t end) const {
+    const auto joint = joints.begin(), body = between.begin();
+    const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
+    return {.parent = first == 0 ? parent : between[first - 1],
+            .child = end == size() ? child : between[end - 1],
+            .joints = {joint + at(first), joint + at(end)},
+            .between = {body + at(first), body + at(end) - 1}};
+  }
+};
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+Placement PlacementOf(const JointSide& side) {
+  const double angle = side.rotation.norm();
+  if (angle == 0.0) return Placement(side.position);
+  return {Quaterniond(Eigen::AngleAxisd(angle, side.rotation / angle)), side.position};
+}
+
+/// Returns the direction of the axis of a joint in its frames.
+Vector3d DirectionOf(const JointDescription& joint) {
+  if (!joint.axis.isZero(0.0)) return joint.axis.normalized();
+  return TraitsOf(joint.type).own_axis == 'x' ? Vector3d::UnitX() : Vector3d::UnitZ();
+}
+
+/// Returns chains of bodies without mass that have two joints and carry nothing else.
+std::vector<MasslessChain> FindChains(const MechanismDescription& d) {
+  std::vector<std::vector<int>> joints_of(d.bodies.size());
+  std::vector<bool> is_link(d.bodies.size(), false), seen = is_link;
+  for (std::size_t i = 1; i < is_link.size(); ++i) {
+    const BodyDescription& body = d.bodies[i];
+    is_link[i] = body.mass == 0.0 && body.inertia.isZero(0.0) && body.points.empty();
+  }
+  for (int j = 0; j < std::ssize(d.joints); ++j) {
+    const JointDescription& joint = d.joints[j];
+    for (const int body : {joint.from.body, joint.to.body}) {
+      joints_of[body].push_back(j);
+      if (joint.type == JointType::kFree || joint.type == JointType::kRod) is_link[body] = false;
+    }
+  }
+  for (ForceDescription force : d.forces) {
+    for (const BodyPoint* point : PartsOf(force).points) is_link[point->body] = false;
+  }
+  for (std::size_t i = 1; i < is_link.size(); ++i) {
+    is_link[i] = is_link[i] && joints_of[i].size() == 2;
+  }
+  const auto beyond = [&](int joint, int body) {
+    const JointDescription& one = d.joints[joint];
+    return one.from.body == body ? one.to.body : one.from.body;
+  };
+  const auto carries = [&](int body) { return body == kGround || d.bodies[body].mass > 0.0; };
+  std::vector<MasslessChain> chains;
+  for (int start = 0; start < std::ssize(is_link); ++start) {
+    if (is_link[start]) continue;
+    for (const int first : joints_of[start]) {
+      MasslessChain chain;
+      chain.parent = start;
+      chain.child = beyond(first, start);
+      chain.joints = {first};
+      while (is_link[chain.child] && !seen[chain.child]) {
+        seen[chain.child] = true;  // each chain is found once
+        chain.between.push_back(chain.child);
+        const std::vector<int>& two = joints_of[chain.child];
+        chain.joints.push_back(two[0] == chain.joints.back() ? two[1] : two[0]);
+        chain.child = beyond(chain.joints.back(), chain.child);
+      }
+      if (chain.between.empty() || chain.parent == chain.child) continue;
+      if (!carries(chain.parent) || !carries(chain.child)) continue;
+      const bool leads_back = start != kGround && d.joints[first].to.body == start;
+      if (leads_back || chain.child == kGround) {
+        std::swap(chain.parent, chain.child);
+        std::ranges::reverse(chain.joints);
+        std::ranges::reverse(chain.between);
+      }
+      chains.push_back(std::move(chain));
+    }
+  }
+  return chains;
+}
+
+/// Computes the joints and bodies of a chain in the drawn axes of its child.
+void Place(const MechanismDescription& d, MasslessChain* chain) {
+  chain->series.resize(chain->size());
+  chain->places.resize(chain->size());
+  Placement X_CB;  // of the outer body of the joint
+  for (std::size_t k = chain->size(); k-- > 0;) {
+    const JointDescription& joint = d.joints[chain->joints[k]];
+    ChainJoint& placed = chain->series[k];
+    placed.leads_out = joint.to.body == (k + 1 < chain->size() ? chain->between[k] : chain->child);
+    const Placement X = X_CB * PlacementOf(placed.leads_out ? joint.to : joint.from);
+    constexpr std::array kTypes = {JointType::kRevolute, JointType::kPrismatic,
+                                   JointType::kSpherical};
+    const auto type = std::ranges::find(kTypes, joint.type);
+    placed.is_simple = type != kTypes.end();
+    if (placed.is_simple) placed.kind = static_cast<SerialKind>(type - kTypes.begin());
+    placed.position = X.p;
+    placed.axis = (placed.leads_out ? 1.0 : -1.0) * (X.q * DirectionOf(joint));
+    placed.q_CJ = X.q;
+    X_CB = X * PlacementOf(placed.leads_out ? joint.from : joint.to).Inverse();
+    chain->places[k] = X_CB;
+  }
+}
+
+/// Returns joints that cannot be a part of another one: something acts on their coordinate.
+std::vector<bool> FindSingleJoints(const MechanismDescription& d) {
+  std::vector<bool> single(d.joints.size());
+  for (std::size_t j = 0; j < single.size(); ++j) {
+    single[j] = d.joints[j].rotor_inertia != 0.0 || !d.joints[j].motions.empty();
+  }
+  for (ForceDescription force : d.forces) {
+    const int* joint = PartsOf(force).joint;
+    if (joint != nullptr) single[*joint] = true;
+  }
+  for (const CouplingDescription& coupling : d.couplings) {
+    for (const auto& part : coupling.parts) single[part.joint] = true;
+  }
+  return single;
+}
+
+/// Returns the type of joint that all joints of a placed chain form, if there is one. Values that
+/// are given for some of them belong to single joints.
+std::optional<ComposedJoint> ComposeChain(const MasslessChain& chain,
+                                          const std::vector<bool>& single,
+                                          const InitialDescription& initial) {
+  std::size_t held = 0, moving = 0;
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    const int joint = chain.joints[k];
+    if (!chain.series[k].is_simple || single[joint]) return std::nullopt;
+    held += static_cast<std::size_t>(std::ranges::count(initial.held, joint));
+    moving +=
+        static_cast<std::size_t>(std::ranges::count(initial.speeds, joint, &JointValues::joint));
+  }
+  for (const std::size_t count : {held, moving}) {
+    if (count != 0 && count != chain.size()) return std::nullopt;
+  }
+  return Compose({chain.series.begin(), chain.series.end()});
+}
+
+/// Moves the values of joints of a chain out of a list and appends them to `values`, as numbers of
+/// SerialJoint. Joints without values have the value 0. Returns true if some have values.
+bool TakeValues(const MasslessChain& chain, bool of_speeds, InitialDescription* initial,
+                std::vector<double>* values) {
+  auto& list = of_speeds ? initial->speeds : initial->coordinates;
+  const std::size_t count = list.size();
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    const ChainJoint& joint = chain.series[k];
+    const auto is_of = [&](const std::vector<JointValues>& all) {
+      return std::ranges::find(all, chain.joints[k], &JointValues::joint);
+    };
+    const auto found = is_of(list);
+    std::vector<double> own(joint.num_u(), 0.0);
+    if (found != list.end()) own = found->values;
+    if (joint.kind == SerialKind::kBall) {
+      // of M in F, to the outer body in drawn axes, with velocities in its moved axes
+      const auto turn = is_of(initial->coordinates);
+      Quaterniond q = Quaterniond::Identity();
+      if (turn != initial->coordinates.end()) {
+        q = Quaterniond(turn->values[0], turn->values[1], turn->values[2], turn->values[3]);
+      }
+      if (of_speeds) {
+        const Vector3d w(own[0], own[1], own[2]);
+        const Vector3d moved = joint.q_CJ * (joint.leads_out ? q.conjugate() * w : Vector3d(-w));
+        own = {moved.x(), moved.y(), moved.z()};
+      } else {
+        q = joint.q_CJ * (joint.leads_out ? q : q.conjugate()) * joint.q_CJ.conjugate();
+        own = {q.w(), q.x(), q.y(), q.z()};
+      }
+    }
+    values->insert(values->end(), own.begin(), own.end());
+  }
+  std::erase_if(list, [&](const JointValues& one) {
+    return std::ranges::count(chain.joints, one.joint) > 0;
+  });
+  return list.size() < count;
+}
+
+}  // namespace
+
+/// Replaces the first joint of a chain by the joint that the chain forms; the others become welds.
+void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed) {
+  std::vector<std::string> names;
+  for (const int joint : chain.joints) {
+    const std::string& name = description.joints[joint].name;
+    if (!found_names_.contains(name)) names.push_back(name);
+  }
+  // without names in the file: the one that its last joint got from the body
+  const std::string name = names.empty() ? description.joints[chain.joints.back()].name
+                                         : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
+  InitialDescription& initial = description.initial;
+  std::vector<double> q, u, coordinates, speeds;
+  const bool has_speeds = TakeValues(chain, true, &initial, &u);
+  const bool has_coordinates = TakeValues(chain, false, &initial, &q);
+  const bool is_held = std::erase_if(initial.held, [&](int joint) {
+                         return std::ranges::count(chain.joints, joint) > 0;
+                       }) > 0;
+  const int joint = chain.joints[0];
+  SetComposed({chain.series.begin(), chain.series.end()}, composed, q.data(), u.data(),
+              &coordinates, &speeds);
+  if (has_coordinates || composed.type == JointType::kFree) {
+    initial.coordinates.push_back({joint, coordinates});
+  }
+  if (has_speeds) initial.speeds.push_back({joint, speeds});
+  if (is_held) initial.held.push_back(joint);
+  const Placement X_PC = chain.places[0].Inverse();
+  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child);
+  std::swap(description.joints[joint], description.joints.back());
+  description.joints.pop_back();
+  for (std::size_t k = 1; k < chain.size(); ++k) {
+    description.joints[chain.joints[k]].type = JointType::kWeld;
+  }
+  Note(elements_[chain.child],
+       fmt::format("{} joints are one here: {}", chain.size(), ToString(composed.type)));
+}
+
+// Masses of the remaining links.
+
+namespace {
+
+/// Mass and inertia that move equally with both bodies of a joint.
+struct Lump {
+  double mass = 0.0;                  ///< of each point [kg]
+  std::vector<Vector3d> points = {};  ///< [m]
+  Matrix3d inertia = Matrix3d::Zero();
+
+  Lump In(const Placement& X) const {
+    Lump lump{mass, points, X.q * inertia * X.q.conjugate().toRotationMatrix()};
+    for (Vector3d& point : lump.points) point = X.At(point);
+    return lump;
+  }
+};
+
+/// Returns a lump at a joint of this type. `size`: its extent [m].
+Lump LumpAt(const JointDescription& joint, const Vector3d& at, const Vector3d& axis, double mass,
+            double size) {
+  const Matrix3d all = mass * size * size * Matrix3d::Identity();
+  switch (joint.type) {
+    case JointType::kRevolute:
+      return {mass / 2.0, {at - size * axis, at + size * axis}};
+    case JointType::kUniversal:
+    case JointType::kSpherical:
+      return {mass, {at}};
+    case JointType::kPrismatic:
+    case JointType::kTranslation:
+      return {.inertia = all};
+    case JointType::kPlanar:
+    case JointType::kCylindrical:
+    case JointType::kHelical:
+    case JointType::kPinInSlot:
+    case JointType::kSchoenflies:  // the bodies rotate relative to each other about the axis
+      return {.inertia = all - mass * size * size * axis * axis.transpose()};
+    default:
+      return {};
+  }
+}
+
+/// Adds a lump in the axes of a body, or takes it away with `sign` = -1.
+BodyDescription With(const BodyDescription& body, double sign, const Lump& lump) {
+  const auto spread = [](const Vector3d& r) -> Matrix3d {
+    return r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
+  };
+  BodyDescription sum = body;
+  sum.inertia += sign * lump.inertia;
+  if (lump.points.empty()) return sum;
+  sum.mass += sign * lump.mass * static_cast<double>(lump.points.size());
+  sum.com *= body.mass;
+  for (const Vector3d& point : lump.points) sum.com += sign * lump.mass * point;
+  sum.com /= sum.mass;
+  sum.inertia += body.mass * spread(body.com - sum.com);
+  for (const Vector3d& point : lump.points) {
+    sum.inertia += sign * lump.mass * spread(point - sum.com);
+  }
+  return sum;
+}
+
+double RadiusOf(const BodyDescription& body) {
+  return std::sqrt(SymmetricEigenvalues(body.inertia)[2] / body.mass);
+}
+
+/// Takes a lump from a body, which keeps at least half of its smallest moment. Empty if there is
+/// none.
+Lump Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
+          BodyDescription* body) {
+  const Vector3d moments = SymmetricEigenvalues(body->inertia);
+  for (double share = 1.0 / 4.0; share > 1e-4; share /= 2.0) {
+    for (const double reach : {1.0, 0.25, 1.0 / 16.0}) {
+      const Lump lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));
+      const BodyDescription rest = With(*body, -1.0, lump);
+      const Vector3d left = SymmetricEigenvalues(rest.inertia);
+      // mechanism files accept moments that are rounded by a hundredth
+      if (left[0] < 0.5 * moments[0] || left[2] > 1.005 * (left[0] + left[1])) continue;
+      *body = rest;
+      return lump;
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
+  constexpr double kSmall = 1e-6;  // of the mass of the child, where nothing can be taken
+  auto& bodies = description.bodies;
+  const BodyDescription child = bodies[chain.child];
+  for (std::size_t i = 0; i < chain.between.size(); ++i) {
+    BodyDescription link = bodies[chain.between[i]];
+    const Placement X_LC = chain.places[i + 1].Inverse();
+    const auto add = [&](std::size_t k, int body, const Placement& X_CB) {
+      const ChainJoint& at = chain.series[k];
+      const JointDescription& joint = description.joints[chain.joints[k]];
+      const Placement X_BC = X_CB.Inverse();
+      const Vector3d position = X_BC.At(at.position), axis = X_BC.q * at.axis;
+      // mass of the ground moves as little there
+      const Lump lump = body == kGround
+                            ? LumpAt(joint, position, axis, child.mass / 8.0, RadiusOf(child))
+                            : Take(joint, position, axis, &bodies[body]);
+      link = With(link, 1.0, lump.In(X_LC * X_CB));
+    };
+    if (i == 0) add(0, chain.parent, chain.places[0]);
+    if (i + 1 == chain.between.size()) add(i + 1, chain.child, {});
+    const Vector3d moments = SymmetricEigenvalues(link.inertia);
+    std::string added = "; the motion is the same";
+    const bool is_whole = link.mass > 0.0 && moments[0] > kSmall * moments[2];
+    if (!is_whole) {
+      const double mass = kSmall * child.mass, radius = RadiusOf(child);
+      const Vector3d at = link.mass > 0.0 ? link.com : X_LC.At(chain.series[i + 1].position);
+      link = With(link, 1.0, {mass, {at}, mass * radius * radius * Matrix3d::Identity()});
+      added = fmt::format(" and {:.2g} kg are added, {:g} of the mass of \"{}\"", mass, kSmall,
+                          child.name);
+    }
+    bodies[chain.between[i]] = link;
+    Note(elements_[chain.between[i]],
+         fmt::format("\"{}\" has no mass: mass and inertia of the bodies beside it are moved there"
+                     "{}",
+                     link.name, added),
+         !is_whole);
+  }
+}
+
+void ImportDraft::RejectRepeated(const MasslessChain& chain) const {
+  if (std::ranges::all_of(chain.series, &ChainJoint::is_simple) &&
+      !AreIndependent({chain.series.begin(), chain.series.end()})) {
+    std::vector<std::string_view> types;
+    for (const int j : chain.joints) types.push_back(ToString(description.joints[j].type));
+    elements_[chain.between[0]].Fail(
+        fmt::format("a body without mass that moves, between joints ({}) that repeat each other",
+                    fmt::join(types, ", ")),
+        "a mass > 0, or joints with independent motions");
+  }
+}
+
+void ImportDraft::ComposeChains() {
+  std::vector<Attachment> attachments(description.bodies.size());
+  const std::vector<bool> single = FindSingleJoints(description);
+  for (MasslessChain& chain : FindChains(description)) {
+    Place(description, &chain);
+    RejectRepeated(chain);
+    for (std::size_t first = 0, end = chain.size(); end > 0; end = first) {
+      // the longest series that ends here; last joints first, because they move the body with mass
+      for (first = 0; first + 1 < end; ++first) {
+        MasslessChain part = chain.Part(first, end);
+        Place(description, &part);
+        const auto composed = ComposeChain(part, single, description.initial);
+        if (!composed) continue;
+        ReplaceChain(part, *composed);
+        for (std::size_t k = 0; k < part.between.size(); ++k) {
+          attachments[part.between[k]] = {
+              .carrier = part.child, .X = part.places[k + 1].AsFrame(), .attached = true};
+        }
+        break;
+      }
+    }
+  }
+  if (std::ranges::any_of(attachments, &Attachment::attached)) Attach(attachments);
+  for (MasslessChain& chain : FindChains(description)) {
+    Place(description, &chain);
+    GiveMassToLinks(chain);
+  }
+}
+
+}  // namespace loopbench::harness

@@ -55,8 +55,9 @@ Placement PlacementOf(const JointSide& side) {
   return {Quaterniond(Eigen::AngleAxisd(angle, side.rotation / angle)), side.position};
 }
 
-/// Returns the direction of the axis of a joint in its frames.
+/// Returns the direction of a slide, or else of the axis of rotation, in the frames of a joint.
 Vector3d DirectionOf(const JointDescription& joint) {
+  if (joint.type == JointType::kPinInSlot) return AxisAlignment(joint) * Vector3d::UnitZ();
   if (!joint.axis.isZero(0.0)) return joint.axis.normalized();
   return TraitsOf(joint.type).own_axis == 'x' ? Vector3d::UnitX() : Vector3d::UnitZ();
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -48,11 +49,22 @@ struct VerdictCommand {
   std::filesystem::path store, claims, out;
 };
 
+/// Rejects a folder that is named like a picture and does not exist.
+void RequireFolder(const std::filesystem::path& out, const char* expected) {
+  constexpr std::array kPictures = {".svg", ".pdf", ".png", ".jpg", ".jpeg", ".eps", ".gif"};
+  const std::string ending = out.extension().string();
+  if (std::ranges::find(kPictures, ending) == kPictures.end()) return;
+  if (std::filesystem::is_directory(out)) return;
+  throw ConfigError(fmt::format("--out {}: found the ending \"{}\", expected {}", out.string(),
+                                ending, expected));
+}
+
 /// Returns --out if it ends like a figure file; else it is a folder.
 std::filesystem::path FileOf(const PlotCommand& command) {
   const std::filesystem::path& out = command.out;
   const std::string ending = out.extension().string();
   if (ending != ".svg" && ending != ".pdf") {
+    RequireFolder(out, "\".svg\", \".pdf\" or a folder");
     return out / fmt::format("{}.{}", FileName(command.free.y + "-over-" + command.free.x),
                              command.format.empty() ? "svg" : command.format);
   }
@@ -185,6 +197,7 @@ int PrintTable(const TableCommand& command, const std::string& typed) {
 
 int Plot(const PlotCommand& command) {
   const bool is_free = IsFree(command);
+  if (!is_free) RequireFolder(command.out, "a folder; a file needs --x KEY and --y KEY");
   const Loaded loaded = LoadOrScan(command.store, command.where);
   if (loaded.many && is_free) return DrawMany(*loaded.many, command);
   if (loaded.many) {

@@ -159,10 +159,11 @@ void ImportDraft::MergeFixed(bool whole) {
   const auto cluster_of = ClusterFinder(description, sound, whole);
   for (int i = 1; i < std::ssize(sound); ++i) {
     if (sound[i] || seen[i]) continue;
-    const Cluster cluster = cluster_of(i);
+    Cluster cluster = cluster_of(i);
+    if (cluster.carrier < 0) cluster.carrier = i;  // a link without mass of several parts
     for (const int body : cluster.members) {
       seen[body] = true;
-      if (body == cluster.carrier || cluster.carrier < 0) continue;
+      if (body == cluster.carrier) continue;
       attachments[body] = {
           .carrier = cluster.carrier,
           .X = cluster.poses.at(cluster.carrier).Inverse() * cluster.poses.at(body),
@@ -198,6 +199,19 @@ void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
     const int body = description.joints[lost->joint].to.body;
     Note(elements_[body], fmt::format("coupling \"{}\" dropped with its joint", coupling.name));
   }
+  for (PoseTarget pose : description.initial.poses) {
+    const Attachment& at = attachments[pose.body];
+    if (at.attached) {
+      pose.body = at.carrier;
+      pose.point = at.X.R * pose.point + at.X.p;
+      if (pose.rotation) {
+        const Frame X = PoseOf({0, Eigen::Vector3d::Zero(), *pose.rotation});
+        pose.rotation = RotationVector(Eigen::Quaterniond(X.R * at.X.R.transpose()));
+      }
+    }
+    pose.body = renumbering.bodies[pose.body];
+    merged_description.initial.poses.push_back(pose);
+  }
   description = std::move(merged_description);
   for (std::size_t i = 0; i < attachments.size(); ++i) {
     const int kept = renumbering.bodies[i];  // never above i
@@ -222,6 +236,7 @@ bool ImportDraft::CouplesOthers(int joint) const {
 }
 
 void ImportDraft::FixMasslessEnds() {
+  std::set<const void*> noted;
   for (bool found = true; found;) {
     found = false;
     std::set<int> loaded;
@@ -247,7 +262,9 @@ void ImportDraft::FixMasslessEnds() {
       attachments[i] = {.carrier = carrier,
                         .X = (at_rest[carrier].Inverse() * at_rest[i]).AsFrame(),
                         .attached = true};
-      Note(elements_[i], "without mass at the end of a chain: fixed where it is drawn");
+      if (noted.insert(elements_[i].id()).second) {
+        Note(elements_[i], "without mass at the end of a chain: fixed where it is drawn");
+      }
       found = true;
     }
     if (found) Attach(attachments);
@@ -442,10 +459,12 @@ Imported ImportDraft::Finish(const std::string& format) {
   std::ranges::stable_sort(notes_, {}, [&](const ImportNote& note) {
     return std::tuple(note.file != file_.name(), note.file, note.line);
   });
-  std::set<std::tuple<std::string, int, std::string, std::string>> seen;
-  std::erase_if(notes_, [&](const ImportNote& note) {
-    return !seen.emplace(note.file, note.line, note.element, note.reason).second;
-  });
+  if (has_replicas) {
+    std::set<std::tuple<std::string, int, std::string, std::string>> seen;
+    std::erase_if(notes_, [&](const ImportNote& note) {
+      return !seen.emplace(note.file, note.line, note.element, note.reason).second;
+    });
+  }
   imported.description = std::move(description);
   imported.notes = std::move(notes_);
   return imported;

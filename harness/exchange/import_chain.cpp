@@ -206,30 +206,6 @@ ChainMotion Move(const std::vector<SerialJoint>& series, const ComposedJoint& co
 
 }  // namespace
 
-bool AreIndependent(const std::vector<SerialJoint>& series) {
-  std::vector<double> q;
-  int n = 0;
-  for (const SerialJoint& joint : series) {
-    // no position of symmetry
-    for (int i = 0; i < joint.num_q(); ++i)
-      q.push_back(std::sin(1.0 + static_cast<double>(q.size())));
-    n += joint.num_u();
-  }
-  MatrixX<double> J(6, n), U(n, n);
-  for (int i = 0; i < n; ++i) {
-    std::vector<double> u(static_cast<std::size_t>(n), 0.0);
-    u[i] = 1.0;
-    const ChainMotion motion = Move(series, {}, q.data(), u.data());
-    J.col(i) << motion.w, motion.v;
-    J.col(i).normalize();
-  }
-  MatrixX<double> A = J.transpose() * J;
-  VectorX<double> lambda(n);
-  SymmetricEigen<double>(A, U, lambda);
-  // squares of singular values: round-off of sums of six products if they depend on each other
-  return lambda[0] > 64.0 * std::numeric_limits<double>::epsilon() * lambda[n - 1];
-}
-
 void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& composed,
                  const double* q, const double* u, std::vector<double>* coordinates,
                  std::vector<double>* speeds) {

@@ -113,6 +113,15 @@ int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
   return index;
 }
 
+int ImportDraft::AddLink(const XmlElement& element, int body) {
+  BodyDescription link;
+  link.name = description.bodies[body].name + " link";
+  description.bodies.push_back(link);
+  at_rest.push_back(at_rest[body]);
+  elements_.push_back(element);
+  return static_cast<int>(description.bodies.size()) - 1;
+}
+
 int ImportDraft::BodyNamed(const XmlValue& value, const std::set<std::string>& also) const {
   return also.contains(value.Name()) ? kGround : BodyNamed(value.Name(), value);
 }

@@ -140,8 +140,6 @@ struct ComposedJoint {
 
 /// Returns the joint that a series forms, if there is one.
 std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints);
-/// Returns true if no joint of a series repeats motions of the others, in most positions.
-bool AreIndependent(const std::vector<SerialJoint>& joints);
 /// Returns the motion of a joint, not a free one, at its coordinates `q`.
 Placement MotionOf(const SerialJoint& joint, const double* q);
 /// Converts several joints to one: coordinates from their common pose, speeds from the velocity
@@ -156,11 +154,14 @@ class ImportDraft {
   ImportDraft(const XmlFile& file, const ImportOptions& options);
 
   MechanismDescription description;
+  bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
   std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
 
   /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
   /// initially 0.
   int AddBody(const XmlElement& element, const std::string& name);
+  /// Adds a link without mass between joints of a body. References do not find it.
+  int AddLink(const XmlElement& element, int body);
   /// Returns the index of an existing body; `also`: further names of Ground.
   int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
   int BodyNamed(const std::string& name, const XmlElement& user) const;
@@ -247,8 +248,9 @@ class ImportDraft {
   /// mass to the other such bodies.
   void ComposeChains();
   void ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed);
-  /// Rejects hinges, slides and balls of a placed chain that repeat motions of each other.
-  void RejectRepeated(const MasslessChain& chain) const;
+  /// Rejects joints of a placed chain that repeat motions of each other, unless they are
+  /// `determined` without mass.
+  void RejectRepeated(const MasslessChain& chain, const std::vector<bool>& determined) const;
   /// Gives mass to the bodies of a placed chain, with a note of its effect on the motion.
   void GiveMassToLinks(const MasslessChain& chain);
   /// Removes attached bodies (one entry per body) and the joints within their carriers.

@@ -10,9 +10,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "harness/exchange/import_draft.h"
 #include "mechanism/algebra/symmetric_eigen.h"
+#include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
 
@@ -140,18 +143,24 @@ void Place(const MechanismDescription& d, MasslessChain* chain) {
   }
 }
 
+/// Returns joints whose motion is determined without mass: by a rotor, a coupling or a motion.
+std::vector<bool> FindDetermined(const MechanismDescription& d) {
+  std::vector<bool> determined(d.joints.size());
+  for (std::size_t j = 0; j < determined.size(); ++j) {
+    determined[j] = d.joints[j].rotor_inertia != 0.0 || !d.joints[j].motions.empty();
+  }
+  for (const CouplingDescription& coupling : d.couplings) {
+    for (const auto& part : coupling.parts) determined[part.joint] = true;
+  }
+  return determined;
+}
+
 /// Returns joints that cannot be a part of another one: something acts on their coordinate.
 std::vector<bool> FindSingleJoints(const MechanismDescription& d) {
-  std::vector<bool> single(d.joints.size());
-  for (std::size_t j = 0; j < single.size(); ++j) {
-    single[j] = d.joints[j].rotor_inertia != 0.0 || !d.joints[j].motions.empty();
-  }
+  std::vector<bool> single = FindDetermined(d);
   for (ForceDescription force : d.forces) {
     const int* joint = PartsOf(force).joint;
     if (joint != nullptr) single[*joint] = true;
-  }
-  for (const CouplingDescription& coupling : d.couplings) {
-    for (const auto& part : coupling.parts) single[part.joint] = true;
   }
   return single;
 }
@@ -223,11 +232,19 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
     if (!found_names_.contains(name)) names.push_back(name);
   }
   // without names in the file: the one that its last joint got from the body
-  const std::string name = names.empty() ? description.joints[chain.joints.back()].name
-                                         : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
+  if (names.empty()) names.push_back(description.joints[chain.joints.back()].name);
+  const std::string name =
+      names.size() == 1 ? names[0] : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
   InitialDescription& initial = description.initial;
   std::vector<double> q, u, coordinates, speeds;
   const bool has_speeds = TakeValues(chain, true, &initial, &u);
+  double weight = 1.0;
+  bool is_cut = false;
+  for (const int part : chain.joints) {
+    const auto guess = std::ranges::find(initial.coordinates, part, &JointValues::joint);
+    if (guess != initial.coordinates.end()) weight = std::max(weight, guess->weight);
+    is_cut = is_cut || description.joints[part].cut;
+  }
   const bool has_coordinates = TakeValues(chain, false, &initial, &q);
   const bool is_held = std::erase_if(initial.held, [&](int joint) {
                          return std::ranges::count(chain.joints, joint) > 0;
@@ -236,12 +253,12 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
   SetComposed({chain.series.begin(), chain.series.end()}, composed, q.data(), u.data(),
               &coordinates, &speeds);
   if (has_coordinates || composed.type == JointType::kFree) {
-    initial.coordinates.push_back({joint, coordinates});
+    initial.coordinates.push_back({joint, coordinates, weight});
   }
   if (has_speeds) initial.speeds.push_back({joint, speeds});
   if (is_held) initial.held.push_back(joint);
   const Placement X_PC = chain.places[0].Inverse();
-  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child);
+  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child).cut = is_cut;
   std::swap(description.joints[joint], description.joints.back());
   description.joints.pop_back();
   for (std::size_t k = 1; k < chain.size(); ++k) {
@@ -312,21 +329,23 @@ BodyDescription With(const BodyDescription& body, double sign, const Lump& lump)
 }
 
 double RadiusOf(const BodyDescription& body) {
-  return std::sqrt(SymmetricEigenvalues(body.inertia)[2] / body.mass);
+  return std::sqrt(SymmetricEigenvalues(body.inertia).cwiseAbs().maxCoeff() / body.mass);
 }
 
-/// Takes a lump from a body, which keeps at least half of its smallest moment. Empty if there is
-/// none.
+/// Takes a small lump from a body, which keeps most of its smallest moment, and moments of which
+/// none exceeds the sum of the others. Empty if there is none.
 Lump Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
           BodyDescription* body) {
   const Vector3d moments = SymmetricEigenvalues(body->inertia);
-  for (double share = 1.0 / 4.0; share > 1e-4; share /= 2.0) {
+  for (double share = 1.0 / 64.0; share > 1e-5; share /= 4.0) {
     for (const double reach : {1.0, 0.25, 1.0 / 16.0}) {
       const Lump lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));
       const BodyDescription rest = With(*body, -1.0, lump);
       const Vector3d left = SymmetricEigenvalues(rest.inertia);
-      // mechanism files accept moments that are rounded by a hundredth
-      if (left[0] < 0.5 * moments[0] || left[2] > 1.005 * (left[0] + left[1])) continue;
+      constexpr double kSlack = 64.0 * std::numeric_limits<double>::epsilon();
+      if (!(left[0] > 0.9 * moments[0] && left[2] <= (1.0 + kSlack) * (left[0] + left[1]))) {
+        continue;
+      }
       *body = rest;
       return lump;
     }
@@ -357,45 +376,92 @@ void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
     if (i == 0) add(0, chain.parent, chain.places[0]);
     if (i + 1 == chain.between.size()) add(i + 1, chain.child, {});
     const Vector3d moments = SymmetricEigenvalues(link.inertia);
-    std::string added = "; the motion is the same";
     const bool is_whole = link.mass > 0.0 && moments[0] > kSmall * moments[2];
     if (!is_whole) {
       const double mass = kSmall * child.mass, radius = RadiusOf(child);
       const Vector3d at = link.mass > 0.0 ? link.com : X_LC.At(chain.series[i + 1].position);
       link = With(link, 1.0, {mass, {at}, mass * radius * radius * Matrix3d::Identity()});
-      added = fmt::format(" and {:.2g} kg are added, {:g} of the mass of \"{}\"", mass, kSmall,
-                          child.name);
     }
     bodies[chain.between[i]] = link;
     Note(elements_[chain.between[i]],
-         fmt::format("\"{}\" has no mass: mass and inertia of the bodies beside it are moved there"
-                     "{}",
-                     link.name, added),
+         is_whole ? "a link without mass between joints: it gets mass of the bodies beside it; the "
+                    "motion is the same"
+                  : fmt::format("a link without mass between joints: {:.2g} kg are added, {:g} of "
+                                "the mass of \"{}\"",
+                                kSmall * child.mass, kSmall, child.name),
          !is_whole);
   }
 }
 
-void ImportDraft::RejectRepeated(const MasslessChain& chain) const {
-  if (std::ranges::all_of(chain.series, &ChainJoint::is_simple) &&
-      !AreIndependent({chain.series.begin(), chain.series.end()})) {
-    std::vector<std::string_view> types;
-    for (const int j : chain.joints) types.push_back(ToString(description.joints[j].type));
-    elements_[chain.between[0]].Fail(
-        fmt::format("a body without mass that moves, between joints ({}) that repeat each other",
-                    fmt::join(types, ", ")),
-        "a mass > 0, or joints with independent motions");
+void ImportDraft::RejectRepeated(const MasslessChain& chain,
+                                 const std::vector<bool>& determined) const {
+  // the chain as a mechanism on the ground
+  MechanismDescription d;
+  d.name = "chain";
+  d.space = SpaceKind::kSpatial;
+  std::map<int, int> numbers = {{chain.parent, kGround}};
+  int freedoms = 0;
+  double length = 0.0;
+  for (std::size_t k = 0; k < chain.size(); ++k) {
+    const int child = k + 1 < chain.size() ? chain.between[k] : chain.child;
+    numbers.emplace(child, static_cast<int>(d.bodies.size()));
+    BodyDescription body;
+    body.name = fmt::format("{}", k);
+    body.mass = 1.0;
+    body.inertia.setIdentity();
+    d.bodies.push_back(body);
+    JointDescription joint = description.joints[chain.joints[k]];
+    if (determined[chain.joints[k]]) joint.type = JointType::kWeld;
+    for (JointSide* side : {&joint.from, &joint.to}) side->body = numbers.at(side->body);
+    joint.motions.clear();
+    joint.rotor_inertia = 0.0;
+    joint.cut = false;
+    freedoms += NumValues(joint.type, d.space, true);
+    d.joints.push_back(joint);
+    length = std::max(length, (chain.series[k].position - chain.series[0].position).norm());
   }
+  const auto reject = [&] {
+    elements_[chain.between[0]].Fail(
+        fmt::format("a body without mass that moves, between {} joints ({}, ...) that repeat "
+                    "motions of each other",
+                    chain.size(), ToString(description.joints[chain.joints[0]].type)),
+        "a mass > 0, or joints with independent motions");
+  };
+  if (freedoms > 6) reject();
+  d.bodies.back().com = chain.series.back().position;  // where velocities are taken
+  if (freedoms == 0 || !Validate(d).empty()) return;
+  const Mechanism<Spatial, double> mechanism(d, Coordinates::kJoint);
+  Kinematics<Spatial, double> kinematics(mechanism);
+  VectorX<double> q(mechanism.num_q());
+  for (Eigen::Index i = 0; i < q.size(); ++i) q[i] = std::sin(1.0 + static_cast<double>(i));
+  mechanism.Normalise(q);  // a position without symmetry
+  kinematics.UpdatePosition(q);
+  const auto last = static_cast<std::size_t>(std::ssize(d.bodies) - 1);
+  MatrixX<double> J(6, freedoms), U(freedoms, freedoms);
+  for (int i = 0; i < freedoms; ++i) {
+    kinematics.UpdateVelocity(VectorX<double>::Unit(freedoms, i));
+    const Velocity<Spatial, double>& V = kinematics.motions()[last];
+    J.col(i) << V.angular.eigen(), V.linear.eigen() / (length > 0.0 ? length : 1.0);
+    J.col(i).normalize();
+  }
+  MatrixX<double> A = J.transpose() * J;
+  VectorX<double> lambda(freedoms);
+  SymmetricEigen<double>(A, U, lambda);
+  // squares of singular values: round-off of sums of six products if they depend on each other
+  if (lambda[0] <= 64.0 * std::numeric_limits<double>::epsilon() * lambda[freedoms - 1]) reject();
 }
 
 void ImportDraft::ComposeChains() {
   std::vector<Attachment> attachments(description.bodies.size());
-  const std::vector<bool> single = FindSingleJoints(description);
+  const std::vector<bool> determined = FindDetermined(description),
+                          single = FindSingleJoints(description);
   for (MasslessChain& chain : FindChains(description)) {
     Place(description, &chain);
-    RejectRepeated(chain);
+    RejectRepeated(chain, determined);
     for (std::size_t first = 0, end = chain.size(); end > 0; end = first) {
       // the longest series that ends here; last joints first, because they move the body with mass
-      for (first = 0; first + 1 < end; ++first) {
+      constexpr std::size_t kMost = 6;  // joints that one joint has the motions of
+      for (first = end > kMost ? end - kMost : 0; first + 1 < end; ++first) {
         MasslessChain part = chain.Part(first, end);
         Place(description, &part);
         const auto composed = ComposeChain(part, single, description.initial);
@@ -410,7 +476,17 @@ void ImportDraft::ComposeChains() {
     }
   }
   if (std::ranges::any_of(attachments, &Attachment::attached)) Attach(attachments);
-  for (MasslessChain& chain : FindChains(description)) {
+  std::vector<MasslessChain> left = FindChains(description);
+  std::set<int> links;
+  for (const MasslessChain& chain : left) links.insert(chain.between.begin(), chain.between.end());
+  exchange::UniqueNames names;
+  for (int i = 0; i < std::ssize(description.bodies); ++i) {
+    if (!links.contains(i)) names.Add(description.bodies[i].name);
+  }
+  for (const int link : links) {
+    description.bodies[link].name = names.Take(description.bodies[link].name);
+  }
+  for (MasslessChain& chain : left) {
     Place(description, &chain);
     GiveMassToLinks(chain);
   }

@@ -454,6 +454,7 @@ void MjcfModel::CountCopy(const XmlElement& element) {
 
 const MjcfReplica* MjcfModel::AddReplica(const XmlElement& element, const MjcfReplica* around,
                                          const std::string& suffix) {
+  draft->has_replicas = true;
   CountCopy(element);
   std::size_t depth = 1;
   for (const MjcfReplica* outer = around; outer != nullptr; outer = outer->around) ++depth;

@@ -120,6 +120,12 @@ void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int chi
     body.Fail(fmt::format("{} joints on one body, one of them free", joints.size()),
               "a free joint alone");
   }
+  int freedoms = 0;
+  for (const MjcfJoint& joint : joints) freedoms += joint.num_u();
+  if (freedoms > 6) {
+    body.Fail(fmt::format("joints with {} degrees of freedom on one body", freedoms),
+              "at most 6, as in MuJoCo");
+  }
   MjcfStep step{parent, child, X_PB};
   if (joints.empty()) {
     draft->Fix(parent, X_PB, child, " fixed");
@@ -127,13 +133,8 @@ void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int chi
   }
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const bool is_last = i + 1 == joints.size();
-    step.child = child;
-    if (!is_last) {
-      const std::string number = i == 0 ? "" : fmt::format(" {}", i + 1);
-      step.child = draft->AddBody(body, draft->description.bodies[child].name + " link" + number);
-      draft->at_rest[step.child] = draft->at_rest[child];
-      model->links.insert(step.child);
-    }
+    step.child = is_last ? child : draft->AddLink(body, child);
+    if (!is_last) model->links.insert(step.child);
     step.joint = static_cast<int>(model->joints.size());
     AddJoint(model, body, step, std::move(joints[i]));
     model->steps.push_back(step);

@@ -210,6 +210,11 @@ PictureMotion Swing(const MechanismDescription& description, Follower<Space>* fo
   const bool is_length = follower->kinematics().joints()[step->joint].H(column).angular.isZero();
   PictureMotion motion;
   motion.name = mechanism.speed_names()[static_cast<std::size_t>(beginning.speed)];
+  const JointDescription& joint = description.joints[step->joint];
+  const auto words = ValueWords(joint.type, description.space, true);
+  if (words.size() > 1 && joint.motions.empty()) {
+    motion.name = fmt::format("{}.{}", joint.name, words[column].name);
+  }
   double reach[2] = {0.0, 0.0};
   std::vector<Poses> sides[2];
   for (const int side : {0, 1}) {

@@ -41,6 +41,20 @@ bool IsRegular(const Excursion<Space>& position, double probe) {
   return true;
 }
 
+/// Adds the rows of the next position of a walk, and rows in between: imposed rows may lose rank
+/// there within a hundredth of a turn.
+void AddRows(const Eigen::MatrixXd& next, std::vector<Eigen::MatrixXd>& rows) {
+  constexpr int kParts = 8;
+  if (!rows.empty()) {
+    const Eigen::MatrixXd last = rows.back();
+    for (int i = 1; i < kParts; ++i) {
+      const double share = static_cast<double>(i) / kParts;
+      rows.push_back((1.0 - share) * last + share * next);
+    }
+  }
+  rows.push_back(next);
+}
+
 /// Walks through positions of the largest rank met; returns the one farthest from losing it.
 /// `moves`: whether the walk left its start. `rows`: at these positions and more of the same rank.
 template <class Space>
@@ -54,12 +68,12 @@ Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>
   for (int k = 1; k <= all && best.rank() < mechanism.num_rows(); ++k) {
     if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < best.rank()) continue;
     if (k > enough) {
-      if (excursion.rank() == best.rank()) rows.push_back(excursion.rows().rows);
+      if (excursion.rank() == best.rank()) AddRows(excursion.rows().rows, rows);
       continue;
     }
     moves = true;
     if (excursion.rank() > best.rank()) rows.clear();
-    rows.push_back(excursion.rows().rows);
+    AddRows(excursion.rows().rows, rows);
     if (excursion.rank() > best.rank() || excursion.conditioning() > best.conditioning()) {
       best = excursion;
     }

@@ -29,6 +29,9 @@ TEST_F(FiguresOfAStore, MotionIsThatOfLevelPositionWhereItIsStored) {
   Write("tiny.json", text.replace(text.find(one), one.size(), levels));
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   ExpectEnding(Call("plot out --out figures"), 0, {"wrote 2 figures"});
+  ExpectEnding(Call("plot out --out a.pdf"), 2, {"found the ending \".pdf\"", "a file needs --x"});
+  ExpectEnding(Call("plot out --out a.png --x rtol --y steps"), 2,
+               {"found the ending \".png\"", "expected \".svg\", \".pdf\" or a folder"});
   const std::string svg = ReadFile(folder_ / "figures/motion-four-bar-0.5s.svg");
   EXPECT_NE(svg.find(", projection, joint, rank-revealing, rtol 10⁻⁶"), std::string::npos);
 }

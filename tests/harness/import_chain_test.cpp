@@ -413,7 +413,7 @@ TEST(ImportChain, OtherLinksWithoutMassAreRejected) {
   // joints that repeat motions of each other: one axis twice, four hinges that meet
   const Step again = {"again", "continuous", "0 0 0", "1 0 0"};
   ExpectRefusal(Series({kX, again}), {"file.xml:2: <link name=\"cross_1\">: " + found,
-                                      "between joints (revolute, revolute) that repeat"});
+                                      "between 2 joints (revolute, ...) that repeat"});
   const Step fourth = {"again", "continuous", "0 0 0.25", "1 1 0"};
   ExpectRefusal(Series({kX, kY, kZ, fourth}), {"<link name=\"cross_1\">: " + found});
   // a link that a force or a third joint needs
@@ -541,7 +541,7 @@ void ExpectEnergies(const std::vector<Hinged>& chain, const std::string& more,
 TEST(ImportChain, HingesThatMissEachOtherKeepTheirMotion) {
   using Eigen::Vector3d;
   const Hinged shin = {
-      3.0, {0.01, 0.02, -0.2}, {0.04, 0.05, 0.01}, {0, 0, 1}, {{{0, 0, 0}, {0, 1, 0}}}};
+      3.0, {0.01, 0.02, -0.2}, {0.04, 0.05, 0.02}, {0, 0, 1}, {{{0, 0, 0}, {0, 1, 0}}}};
   const auto foot = [](const Vector3d& axis, double miss, const Vector3d& place) {
     return Hinged{1.0,
                   {0.05, 0.01, 0},
@@ -617,10 +617,90 @@ TEST(ImportChain, RandomJointsOfABodyKeepTheirMotion) {
       ExpectEnergies({body}, damping);
       ++read;
     } catch (const ConfigError& error) {
-      EXPECT_NE(std::string(error.what()).find("that repeat each other"), std::string::npos);
+      EXPECT_NE(std::string(error.what()).find("repeat motions of each other"), std::string::npos);
     }
   }
   EXPECT_GT(read, 100);
+}
+
+/// A thin disk has no mass to give to a hinge beside its plane: it would be no body any more.
+TEST(ImportChain, BodiesThatGiveMassStayBodies) {
+  const std::string hinges = "<joint axis=\"1 0 0\" pos=\"0 0.3 0.5\"/><joint axis=\"0 0 1\"/>";
+  ImportOptions options;
+  options.balances_inertia = true;
+  const Imported disk = ImportText(
+      "<mujoco><worldbody><body name=\"a\"><inertial pos=\"0 0 0\" mass=\"1\" "
+      "diaginertia=\"0.01 0.01 0.02\"/>" +
+          hinges + "</body></worldbody></mujoco>",
+      "file.xml", options);
+  EXPECT_EQ(disk.description.bodies[1].inertia.diagonal(), Vector3d(0.01, 0.01, 0.02));
+  // twelve fingers on one palm
+  std::string fingers;
+  for (int i = 0; i < 12; ++i) {
+    fingers += fmt::format(
+        "<body pos=\"{} 0 0.1\"><inertial pos=\"0 0 0\" mass=\"0.1\" diaginertia=\"1 1 1\"/>"
+        "<joint axis=\"1 0 0\" pos=\"0 0 -0.05\"/><joint axis=\"0 1 0\"/></body>",
+        0.1 * i);
+  }
+  const Imported hand = ImportText(
+      "<mujoco><worldbody><body name=\"palm\"><freejoint/><inertial pos=\"0 0 0\" "
+      "mass=\"1\" diaginertia=\"0.02 0.025 0.03\"/>" +
+          fingers + "</body></worldbody></mujoco>",
+      "file.xml");
+  EXPECT_EQ(std::ranges::count(hand.notes, true, &ImportNote::changes_motion), 0);
+  EXPECT_GT(hand.description.bodies[1].mass, 0.8);
+}
+
+TEST(ImportChain, NamesOfLinksAndJointsDoNotCollide) {
+  const std::string axes = "<joint name=\"p\" axis=\"1 0 0\"/><joint axis=\"0 1 0\"/>",
+                    mass = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>",
+                    skew = "<joint axis=\"1 0 0\"/><joint axis=\"0 1 0\" pos=\"0 0 1\"/>";
+  const MechanismDescription d =
+      ImportText("<mujoco><worldbody><body name=\"a\">" + mass + axes +
+                     "</body><body name=\"a link\">" + mass + skew + "</body><body name=\"b\">" +
+                     mass + skew + "</body><body name=\"b link\">" + mass +
+                     axes.substr(axes.find("/>") + 2) + "</body></worldbody></mujoco>",
+                 "file.xml")
+          .description;
+  EXPECT_EQ(d.joints[0].name, "p");
+  std::vector<std::string> names;
+  for (const BodyDescription& body : d.bodies) names.push_back(body.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"ground", "a", "a link", "a link link", "b",
+                                             "b link_2", "b link"}));
+}
+
+TEST(ImportChain, TargetsAndWeightsOfASidecarSurvive) {
+  const std::string ball = Series({kX, kY, kZ});
+  const InitialDescription start =
+      WithSidecar(ball, R"({"initial": {"coordinates": {"rx": 0.1}, "weights": {"rx": 5}, "poses":
+                            [{"body": "rod", "point": [0, 0, 1], "at": [0, 0.5, 2.5]}]}})")
+          .description.initial;
+  ASSERT_EQ(start.poses.size(), 1u);
+  EXPECT_EQ(start.poses[0].body, 1);
+  EXPECT_EQ(start.poses[0].point, Vector3d(0, 0, 1));
+  ASSERT_EQ(start.coordinates.size(), 1u);
+  EXPECT_EQ(start.coordinates[0].weight, 5.0);
+}
+
+TEST(ImportChain, LinksOfSeveralPartsAreOne) {
+  const Step weld = {"f", "fixed", "0 0 0", "1 0 0"};
+  const Imported imported = ImportText(Series({kX, weld, kY, kZ}), "file.xml");
+  ASSERT_EQ(imported.description.joints.size(), 1u);
+  EXPECT_EQ(ToString(imported.description.joints[0].type), "spherical");
+  const Step again = {"again", "continuous", "0 0 0", "1 0 0"};
+  ExpectRefusal(Series({kX, weld, again}), {"that repeat motions of each other"});
+}
+
+TEST(ImportChain, JointsThatOthersMoveMayRepeatMotions) {
+  // a rotor determines the second angle; without it nothing does
+  const auto model = [](const std::string& rotor) {
+    return "<mujoco><worldbody><body><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>"
+           "<joint axis=\"1 0 0\"/><joint axis=\"1 0 0\"" +
+           rotor + "/></body></worldbody></mujoco>";
+  };
+  ExpectRefusal(model(""), {"that repeat motions of each other"});
+  ExpectRefusal(model(" damping=\"1\""), {"that repeat motions of each other"});
+  EXPECT_EQ(ImportText(model(" armature=\"0.1\""), "file.xml").description.joints.size(), 2u);
 }
 
 TEST(ImportChain, TwoSlidesAreAPlanarJointThatKeepsItsAngle) {

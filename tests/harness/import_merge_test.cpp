@@ -180,7 +180,7 @@ TEST(ImportMerge, LinksWithoutMassAtTheEndAreFixed) {
                Joint("w", "continuous", "arm", "wrist", "0 0 -1") +
                Joint("p", "continuous", "wrist", "palm", "0.1 0 0") +
                Joint("t", "continuous", "palm", "tool", "0.1 0 0")));
-  ExpectNote(added, "<link name=\"wrist\">", "1e-06 kg are added");
+  ExpectNote(added, "<link name=\"wrist\">", "1e-06 kg are added, 1e-06 of the mass of \"tool\"");
   ExpectRefusal(Arm(Link("flag") + Joint("f", "continuous", "world", "flag")),
                 {"<link name=\"flag\">: found a body without mass that moves"});
 }

@@ -182,8 +182,10 @@ TEST(View, SwingsOfShiftsAreLengths) {
   description.joints = {joint};
   const Picture picture = MakePicture(description, "");
   ASSERT_EQ(picture.motions.size(), 4u);
+  const char* const names[] = {"j.angle", "j.x", "j.y", "j.z"};
   for (std::size_t i = 0; i < 4; ++i) {
     const std::string unit = i == 0 ? " rad;" : " m;";
+    EXPECT_EQ(picture.motions[i].name, names[i]);
     EXPECT_NE(picture.motions[i].text.find(unit), std::string::npos) << picture.motions[i].text;
   }
 }

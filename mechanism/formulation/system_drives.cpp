@@ -115,7 +115,7 @@ std::string System<Space, S>::Why() const {
   }
   if (is_singular || IsSingular()) {
     return "the prescribed motions pass a singular configuration or a dead end, where errors of "
-           "this level decide the branch; level projection keeps it";
+           "this level decide the branch; in a singular configuration level projection keeps it";
   }
   return "the prescribed motions contradict each other or the loops at joint \"" +
          mechanism_.joint_names()[static_cast<std::size_t>(drives_->worst_joint())] + '"' +

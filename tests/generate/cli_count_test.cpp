@@ -111,7 +111,8 @@ std::map<std::string, std::string> RowsByKey(const std::string& csv) {
 }
 
 /// The gate without a clock. `loopbench count` writes the file anew (results/methods/README.md).
-/// Rows that are not exact, where rounding decides an iteration or a pivot, are not compared.
+/// Rows that are not exact, where rounding decides an iteration or a pivot, are not compared. The
+/// table is of the native build, where four rows of spatial-four-bar are exact that are not here.
 class CountGate : public CountTest, public testing::WithParamInterface<std::string> {};
 
 TEST_P(CountGate, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {
@@ -121,15 +122,20 @@ TEST_P(CountGate, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {
   ASSERT_EQ(now.code, 0) << now.text;
   const auto found = RowsByKey(ReadFile(folder_ / "counts.csv"));
   const auto expected = RowsByKey(ReadFile(kept));
-  int exact = 0;
+  int exact = 0, rounded_here = 0;
   for (const auto& [key, counts] : expected) {
     if (key.find("," + GetParam() + ",") == std::string::npos) continue;
     if (!counts.ends_with(",yes,")) continue;
-    ++exact;
     const auto row = found.find(key);
+    if (row != found.end() && row->second.ends_with(",no,")) {
+      ++rounded_here;
+      continue;
+    }
+    ++exact;
     EXPECT_EQ(row == found.end() ? "no row" : row->second, counts) << key;
   }
   EXPECT_GT(exact, 300);
+  EXPECT_LE(rounded_here, 4);
   for (const auto& [key, counts] : found) EXPECT_TRUE(expected.contains(key)) << key << " is new";
 }
 

@@ -153,8 +153,6 @@ TEST(Results, TablesAreOfOneProgram) {
   for (const auto& entry : fs::directory_iterator(kRoot / "results")) {
     const std::string folder = entry.path().filename().string();
     if (!entry.is_directory() || folder == "baselines" || folder == "runs") continue;
-    // of earlier programs, which results/README.md states
-    if (folder == "overconstrained" || folder == "extremes") continue;
     EXPECT_EQ(CommitsOf(entry.path()), present) << folder;
   }
 }

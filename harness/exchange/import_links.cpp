@@ -1,10 +1,9 @@
 // Links without mass between two joints, as in URDF, SDF and bodies of MuJoCo with several joints.
 //
-// Joints in series through such links become one joint if their motions together are those of a
-// joint type and nothing acts on one of them alone. The remaining links get a mass, because the
-// solvers divide by it. Mass is taken from the bodies beside a link such that the motion is the
-// same, where that is possible: a point mass on the axis of a hinge has the same motion on both of
-// its bodies, and a moment of inertia without mass the same rotation on both sides of a slide.
+// Joints in series through such links become one joint if a joint type has their motions and
+// nothing acts on one of them alone. The remaining links get a mass, because the solvers divide by
+// it. If possible, it is taken from the bodies beside a link without a change of the motion. For
+// example, a point mass on the axis of a hinge moves equally with both bodies of the hinge.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -170,16 +169,15 @@ std::vector<bool> FindSingleJoints(const MechanismDescription& d) {
 std::optional<ComposedJoint> ComposeChain(const MasslessChain& chain,
                                           const std::vector<bool>& single,
                                           const InitialDescription& initial) {
-  std::size_t held = 0, moving = 0;
+  std::ptrdiff_t held = 0, moving = 0;
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const int joint = chain.joints[k];
     if (!chain.series[k].is_simple || single[joint]) return std::nullopt;
-    held += static_cast<std::size_t>(std::ranges::count(initial.held, joint));
-    moving +=
-        static_cast<std::size_t>(std::ranges::count(initial.speeds, joint, &JointValues::joint));
+    held += std::ranges::count(initial.held, joint);
+    moving += std::ranges::count(initial.speeds, joint, &JointValues::joint);
   }
-  for (const std::size_t count : {held, moving}) {
-    if (count != 0 && count != chain.size()) return std::nullopt;
+  for (const std::ptrdiff_t count : {held, moving}) {
+    if (count != 0 && count != std::ssize(chain.joints)) return std::nullopt;
   }
   return Compose({chain.series.begin(), chain.series.end()});
 }
@@ -337,6 +335,7 @@ double RadiusOf(const BodyDescription& body) {
 Lump Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
           BodyDescription* body) {
   const Vector3d moments = SymmetricEigenvalues(body->inertia);
+  // small shares, so that many links can be beside one body
   for (double share = 1.0 / 64.0; share > 1e-5; share /= 4.0) {
     for (const double reach : {1.0, 0.25, 1.0 / 16.0}) {
       const Lump lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));

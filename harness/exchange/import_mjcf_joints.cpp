@@ -26,7 +26,7 @@ void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
   }
 }
 
-/// Adds springs, dampers and the rotor of the joint that was added last; drops those of a ball.
+/// Adds springs, dampers and the rotor of the joint that was added last; a ball's are dropped.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
   const MjcfElement& element = joint.element;
   double k = element.Number("stiffness", 0.0, kNotNegative);

@@ -494,7 +494,7 @@ std::string MujocoText(const std::vector<Hinged>& chain, const std::string& more
   return "<mujoco><worldbody>" + text + end + "</worldbody></mujoco>";
 }
 
-/// Compares the energies of an imported chain with those of its bodies of MuJoCo, at several
+/// Compares the energies of an imported chain with the bodies' energies in MuJoCo, at several
 /// starts. As functions of coordinates and speeds they determine the motion. `more`: attributes of
 /// all joints; `is_exact`: no mass is added; by default the notes decide.
 void ExpectEnergies(const std::vector<Hinged>& chain, const std::string& more,

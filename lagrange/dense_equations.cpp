@@ -90,6 +90,7 @@ Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kin
                                                  Conditioning& found) {
   found.rank = LoopRank(mechanism_, 0);
   found.smallest_weight = 1.0;
+  found.is_regularized = false;
   FormResponse(kinematics, Masses::kPhysical);
   if (mass_factor_.info() != Eigen::Success) return Outcome::kNonFinite;
   if (loop_.size() == 0) return Outcome::kFinished;
@@ -101,6 +102,7 @@ Outcome DenseEquations<Space, S>::FactorResponse(const Kinematics<Space, S>& kin
     loop_.FactorGeometric(response_, kinematics.regularization());
     found.rank = LoopRank(mechanism_, loop_.size() - loop_.rank());
     found.smallest_weight = static_cast<double>(loop_.smallest_weight());
+    found.is_regularized = loop_.smallest_weight() < S(1);
     FormResponse(kinematics, Masses::kPhysical);
     if (!loop_.FactorRegularized(response_)) return Outcome::kSingular;
   }

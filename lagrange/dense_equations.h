@@ -51,7 +51,7 @@ class DenseEquations {
   MatrixX<S> augmented_;
   VectorX<S> rhs_, solution_;
   Eigen::PartialPivLU<MatrixX<S>> lu_;
-  Eigen::LLT<MatrixX<S>> mass_factor_;
+  CholeskyFactor<MatrixX<S>> mass_factor_;
   LoopSolver<S> loop_;
 };
 

@@ -71,6 +71,7 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   this->conditioning_ = {.rank = LoopRank(mechanism_, joins.dependent_rows()),
                          .rcond = static_cast<double>(joins.rcond()),
                          .smallest_weight = static_cast<double>(joins.smallest_weight()),
+                         .is_regularized = joins.smallest_weight() < S(1),
                          .worst_joint = joins.worst_joint()};
   return outcome;
 }

@@ -110,6 +110,7 @@ void DenseReduction<Space, S>::FactorNullSpace(const Kinematics<Space, S>& kinem
   found.rank = LoopRank(mechanism_, mechanism_.num_rows() - null_space_->rank());
   found.rcond = static_cast<double>(null_space_->rcond());
   found.smallest_weight = static_cast<double>(null_space_->smallest_weight());
+  found.is_regularized = null_space_->smallest_weight() < S(1);
 }
 
 template <class Space, class S>
@@ -119,6 +120,7 @@ bool DenseReduction<Space, S>::FactorPartition(const Kinematics<Space, S>& kinem
   found.rank = LoopRank(mechanism_, mechanism_.num_rows() - r);
   found.rcond = 0.0;
   found.smallest_weight = 1.0;
+  found.is_regularized = false;
   kinematics_ = &kinematics;
   uses_null_space_ = mass_is_current_ = false;
   // more rows than dependent speeds: redundant constraints, as published; or a rank that has grown

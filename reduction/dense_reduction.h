@@ -92,7 +92,7 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   VectorX<S> speed_scale_;  ///< one over the mechanism's length for rotations, else 1
   VectorX<S> pivot_scale_;  ///< of dependent speeds
   Eigen::PartialPivLU<MatrixX<S>> lu_;
-  Eigen::LLT<MatrixX<S>> reduced_factor_;
+  CholeskyFactor<MatrixX<S>> reduced_factor_;
   std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published
   bool uses_null_space_ = false;                     ///< since the last Factor()
 };

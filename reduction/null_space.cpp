@@ -46,7 +46,7 @@ void NullSpace<Space, S>::Factor(const Kinematics<Space, S>& kinematics,
   for (std::size_t k = 0; k < K_.size(); ++k) {
     const int index = mechanism_.constraints()[k];
     const Joint<Space, S>& joint = mechanism_.joints()[index];
-    const Eigen::LLT<JointMatrix<S>> free(FreeResponse(kinematics, Masses::kGeometric, index));
+    const CholeskyFactor<JointMatrix<S>> free(FreeResponse(kinematics, Masses::kGeometric, index));
     K_[k] = free.matrixL();
     auto block = B_.middleRows(joint.row, joint.num_constraints());
     K_[k].template triangularView<Eigen::Lower>().solveInPlace(block);

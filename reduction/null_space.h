@@ -66,7 +66,7 @@ class NullSpace {
   S rcond_ = S(1);
   std::vector<JointMatrix<S>> K_;  ///< Cholesky factors, by constraint
   MatrixX<S> B_, response_, work_, M_g_, Mh_, basis_, reduced_;
-  Eigen::LLT<MatrixX<S>> L_, Mh_factor_, reduced_factor_;
+  CholeskyFactor<MatrixX<S>> L_, Mh_factor_, reduced_factor_;
   SingularValues<S> svd_;
   DirectionWeights<S> weights_;
   VectorX<S> lambda_, rows_, c_, z_, speeds_, column_;

@@ -12,10 +12,10 @@
 // (mechanism/loops/joint_response.h): they prove it or leave it uncertain.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <memory>
 #include <vector>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "reduction/sparse_lu.h"
@@ -93,7 +93,7 @@ class SparsePartition {
   std::vector<int> place_;            ///< of a speed among the independent ones
   Columns B_;                         ///< num_u x f
   MatrixX<double> V_, MV_, reduced_;  ///< a column for each of B and one for c
-  Eigen::LLT<MatrixX<double>> reduced_factor_;
+  CholeskyFactor<MatrixX<double>> reduced_factor_;
   bool mass_is_current_ = false;
   std::vector<Acceleration<Space, double>> motions_;
   VectorX<double> c_, z_, column_, residual_, rows_;

@@ -115,10 +115,6 @@ class BenchIn final : public TrialBench {
     GiveJacobian(choice.integrator, JacobianKind::kForward, description_, *system);
     GiveExecution(choice.method, description_, *system, &result);
     if (result.outcome != Outcome::kFinished) return result;
-    const auto compile_s = [&] {
-      return system->compiled() != nullptr ? system->compiled()->seconds() : 0.0;
-    };
-    const double compiled_before = compile_s();
     std::vector<double> y(static_cast<std::size_t>(system->size()));
     system->ToState(in.start.q, in.start.u, y);
     const StepObserver observe = [&](double t, std::span<double> state) {
@@ -135,10 +131,8 @@ class BenchIn final : public TrialBench {
         meter->Add(k, snapshot, snapshot);
       };
     }
-    result = Integrate(*system, 0.0, problem_.horizon, y, options, observe,
-                       meter != nullptr ? &dense : nullptr);
-    result.wall_s -= compile_s() - compiled_before;
-    return result;
+    return Integrate(*system, 0.0, problem_.horizon, y, options, observe,
+                     meter != nullptr ? &dense : nullptr);
   }
 
   const TrialProblem& problem_;

@@ -47,9 +47,9 @@ const Glyph& GlyphOf(CellState state) {
   static constexpr Glyph kGlyphs[] = {{7, 0.25, "", "holds"},
                                       {0, 0.0, "–", "not applicable"},
                                       {0, 0.0, "?", "not measured"},
-                                      {8, 0.6, "", "stopped and said why"},
-                                      {6, 0.55, "", "did not end by itself"},
-                                      {2, 0.55, "", "wrong without a word"},
+                                      {8, 0.6, "", "ended with a named outcome"},
+                                      {6, 0.55, "", "reached a limit of time or steps"},
+                                      {2, 0.55, "", "finished, demand not met"},
                                       {3, 0.6, "", "crashed, or no result"}};
   return kGlyphs[static_cast<std::size_t>(state)];
 }
@@ -421,7 +421,7 @@ std::string Slug(const std::string& text) {
 
 Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
                            const WorkPrecisionProblem& problem) {
-  Figure figure{.title = problem.name + ": what accuracy costs",
+  Figure figure{.title = problem.name + ": error against cost",
                 .x_label = WithUnit(work_precision.cost, work_precision.cost),
                 .y_label = WithUnit(work_precision.error, work_precision.error),
                 .log_x = true,

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <map>
 
 #include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
+#include "harness/text/cpu_time.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/formulation/side_by_side.h"
 
@@ -19,19 +19,11 @@ namespace {
 constexpr int kFirstMisses = 2, kMaxDoublings = 20;
 constexpr std::size_t kMaxBranches = 8, kMaxModes = 16;
 
-/// Adds the time of its life to a sum [s].
-class Timer {
- public:
-  explicit Timer(double& sum) : sum_(sum) {}
-  ~Timer() {
-    sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-  Timer(const Timer&) = delete;
-  Timer& operator=(const Timer&) = delete;
-
- private:
-  double& sum_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+/// Recordings of one mechanism, each of them once, and by mode.
+struct SharedBranches {
+  using Codes = std::vector<std::shared_ptr<const Code>>;
+  Codes all;
+  std::map<std::vector<double>, Codes> of_mode;
 };
 
 /// Calls of compiled functions by runs of one thread, kLanes runs at once.
@@ -54,15 +46,22 @@ class LaneCalls final : public SharedWork {
     *free = true;
     return static_cast<int>(free - taken_.begin());
   }
-  void GiveBack(int lane) { taken_[lane] = false; }
-
-  /// Branches of one mode of the mechanism of a first recording with this key.
-  std::vector<std::shared_ptr<const Code>>& Shared(const std::string& first_key,
-                                                   const std::vector<double>& mode) {
-    return shared_[{first_key, mode}];
+  void GiveBack(int lane) {
+    taken_[lane] = false;
+    for (auto& [function, constants] : constants_) constants.of[lane] = nullptr;
   }
-  /// The code of equal recordings in all modes, which lanes evaluate together; null at first.
-  std::shared_ptr<const Code>& CodeOf(const std::string& key) { return codes_[key]; }
+
+  /// Branches of runs whose first recordings have this key.
+  std::shared_ptr<SharedBranches> Shared(const std::string& first_key) {
+    std::erase_if(shared_, [](const auto& known) { return known.second.expired(); });
+    std::weak_ptr<SharedBranches>& known = shared_[first_key];
+    if (known.expired()) {
+      auto shared = std::make_shared<SharedBranches>();
+      known = shared;
+      return shared;
+    }
+    return known.lock();
+  }
 
   void Want(int lane, const Code& wanted, std::span<const double> x, std::span<double> y) {
     const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
@@ -71,24 +70,33 @@ class LaneCalls final : public SharedWork {
     grow(x_, x.size());
     grow(y_, y.size());
     grow(w_, static_cast<std::size_t>(wanted.compiled.room));
+    Constants& constants = constants_[wanted.compiled.function];
+    grow(constants.numbers, wanted.constants.size());
+    if (constants.of[lane] != &wanted) {
+      constants.of[lane] = &wanted;
+      SetLane(wanted.constants, lane, constants.numbers);
+    }
     calls_[lane] = {&wanted, x, y};
   }
   bool Held(int lane) const { return calls_[lane].held; }
 
   void Do() noexcept override {
     for (const Call& first : calls_) {
-      const Code* code = first.code;
-      if (code == nullptr) continue;
+      if (first.code == nullptr) continue;
+      const auto function = first.code->compiled.function;
+      const auto is_together = [function](const Call& call) {
+        return call.code != nullptr && call.code->compiled.function == function;
+      };
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (calls_[lane].code != code) continue;
-        for (std::size_t i = 0; i < calls_[lane].x.size(); ++i) x_[i][lane] = calls_[lane].x[i];
+        if (is_together(calls_[lane])) SetLane(calls_[lane].x, lane, x_);
       }
-      const int held = code->compiled.function(
-          reinterpret_cast<const double*>(x_.data()), code->constants.data(),
-          reinterpret_cast<double*>(y_.data()), reinterpret_cast<double*>(w_.data()));
+      const int held =
+          function(reinterpret_cast<const double*>(x_.data()),
+                   reinterpret_cast<const double*>(constants_[function].numbers.data()),
+                   reinterpret_cast<double*>(y_.data()), reinterpret_cast<double*>(w_.data()));
       for (int lane = 0; lane < kLanes; ++lane) {
         Call& call = calls_[lane];
-        if (call.code != code) continue;
+        if (!is_together(call)) continue;
         call.code = nullptr;
         call.held = (held >> lane & 1) != 0;
         for (std::size_t i = 0; i < call.y.size(); ++i) call.y[i] = y_[i][lane];
@@ -103,12 +111,20 @@ class LaneCalls final : public SharedWork {
     std::span<double> y;
     bool held = false;  ///< all comparisons, in the last call
   };
+  /// Constants of a function in each lane, and the code that has them.
+  struct Constants {
+    std::vector<Lanes> numbers;
+    std::array<const Code*, kLanes> of{};
+  };
+  static void SetLane(std::span<const double> numbers, int lane, std::vector<Lanes>& all) {
+    for (std::size_t i = 0; i < numbers.size(); ++i) all[i][lane] = numbers[i];
+  }
+
   std::array<bool, kLanes> taken_{};
   std::array<Call, kLanes> calls_;
   std::vector<Lanes> x_, y_, w_;
-  std::map<std::pair<std::string, std::vector<double>>, std::vector<std::shared_ptr<const Code>>>
-      shared_;
-  std::map<std::string, std::shared_ptr<const Code>> codes_;
+  std::map<decltype(CompiledBranch::function), Constants> constants_;
+  std::map<std::string, std::weak_ptr<SharedBranches>> shared_;
 };
 
 }  // namespace
@@ -127,7 +143,12 @@ class Lane {
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
-  LaneCalls& calls() { return calls_; }
+  /// Joins the runs whose first recordings have this key, unless it has joined others.
+  void Join(const std::string& first_key) {
+    if (shared_ == nullptr) shared_ = calls_.Shared(first_key);
+  }
+  /// Branches of the runs that it has joined; null before.
+  SharedBranches* shared() { return shared_.get(); }
 
   /// Returns false if a comparison differs from its recorded outcome.
   bool Call(const Code& code, std::span<const double> x, std::span<double> y) {
@@ -143,6 +164,7 @@ class Lane {
   SideBySide& beside_;
   LaneCalls& calls_;
   int lane_;
+  std::shared_ptr<SharedBranches> shared_;
 };
 
 template <class Space>
@@ -163,7 +185,7 @@ GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
   mode_->misses_left = kFirstMisses;
   x_[0] = mode_->start.t;
   system.ToState(mode_->start.q, mode_->start.u, std::span(x_).subspan(1));
-  const Timer timer(seconds_);
+  const harness::ForeignWork work(seconds_);
   AddBranch();
 }
 
@@ -182,7 +204,7 @@ void GeneratedDerivative<Space>::FindMode() {
   scratch_.assign({gains.alpha, gains.beta});
   scratch_.insert(scratch_.end(), choices_.begin(), choices_.end());
   if (mode_ != nullptr && key_ == scratch_) return;
-  const Timer timer(seconds_);  // graphs are large
+  const harness::ForeignWork work(seconds_);  // graphs are large
   key_ = scratch_;
   if (modes_.size() >= kMaxModes && !modes_.contains(key_)) modes_.clear();
   mode_ = &modes_[key_];
@@ -199,8 +221,8 @@ void GeneratedDerivative<Space>::AddBranch() {
   const auto add = [&](std::shared_ptr<const Code> code) {
     mode_->branches.insert(mode_->branches.begin(), Branch{std::move(code)});
   };
-  if (!first_key_.empty()) {
-    const auto& shared = lane_->calls().Shared(first_key_, key_);
+  if (lane_ != nullptr && lane_->shared() != nullptr) {
+    const SharedBranches::Codes& shared = lane_->shared()->of_mode[key_];
     const auto known = std::ranges::find_if(shared, holds);
     if (known != shared.end()) return add(*known);
   }
@@ -222,21 +244,27 @@ void GeneratedDerivative<Space>::AddBranch() {
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
+  const bool is_first = lane_ != nullptr && lane_->shared() == nullptr;
+  if (is_first && LiveNodes(recorded) < subject_.least_in_lanes) lane_.reset();
   if (lane_ == nullptr) return add(Compile(std::move(recorded), false));
-  if (first_key_.empty()) first_key_ = recorded.key;
-  std::shared_ptr<const Code>& code = lane_->calls().CodeOf(recorded.key);
-  if (code == nullptr) code = Compile(std::move(recorded), true);
-  auto& shared = lane_->calls().Shared(first_key_, key_);
-  if (std::ranges::find(shared, code) == shared.end()) shared.push_back(code);
-  add(code);
+  lane_->Join(recorded.key);
+  auto& [all, of_mode] = *lane_->shared();
+  auto code = std::ranges::find(all, recorded.key, [](const auto& known) -> const std::string& {
+    return known->recorded.key;
+  });
+  if (code == all.end()) code = all.insert(code, Compile(std::move(recorded), true));
+  SharedBranches::Codes& shared = of_mode[key_];
+  if (std::ranges::find(shared, *code) == shared.end()) shared.push_back(*code);
+  add(*code);
 }
 
 template <class Space>
 std::shared_ptr<const Code> GeneratedDerivative<Space>::Compile(RecordedFunction recorded,
                                                                 bool in_lanes) {
+  const bool own_sines = contraction_ == Contraction::kFused;
   const auto print = [&] {
     RequireShort(recorded);
-    return in_lanes ? PrintLanes(recorded, kLanes) : PrintLibrary(recorded);
+    return in_lanes ? PrintLanes(recorded, kLanes, own_sines) : PrintLibrary(recorded, own_sines);
   };
   const CompiledBranch compiled =
       CompileBranch(recorded.structure + (in_lanes ? " in lanes" : ""), print, contraction_);
@@ -276,7 +304,7 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
   ++misses_;
   if (--misses_left > 0 || branches.size() >= kMaxBranches) return false;
   misses_left = kFirstMisses << std::min(++attempts, kMaxDoublings);
-  const Timer timer(seconds_);
+  const harness::ForeignWork work(seconds_);
   try {
     AddBranch();
   } catch (const NotCovered&) {
@@ -294,7 +322,7 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
     const RecordedFunction& recorded = branch.derivative->recorded;
     const bool is_known = branch.jacobian != nullptr || branch.has_no_jacobian;
     if (!is_known && recorded.graph.Holds(recorded.graph.Values(x_))) {
-      const Timer timer(seconds_);
+      const harness::ForeignWork work(seconds_);
       const std::vector<int>& inputs = recorded.inputs;
       const auto columns = static_cast<std::ptrdiff_t>(jacobian.size() / y.size());
       RecordedFunction function = recorded;

@@ -5,8 +5,9 @@
 // too. Branches are valid in one mode of the system; earlier modes keep theirs. Batched runs
 // (members of an ensemble) call compiled code together, each in a lane of a function for kLanes
 // states (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a
-// single run. A member records its first branch. If another member has recorded an equal one, both
-// have the same mechanism, and the member takes branches of all modes from there.
+// single run. Each lane has its own constants, so cases of a sweep share a call, too. A run records
+// its first branch. If another run has recorded an equal one, both have the same mechanism, and the
+// run takes branches of all modes from there.
 //
 // Compiled code receives the recorded constants. Two recordings share it if they differ in the
 // numbers of constants alone: members of an ensemble, or cases of a sweep over lengths or masses. A
@@ -83,7 +84,6 @@ class GeneratedDerivative final : public CompiledDerivative {
   const Contraction contraction_;
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
-  std::string first_key_;       ///< of the first recording of a run with a lane
   std::map<ModeKey, Mode> modes_;
   Mode* mode_ = nullptr;
   ModeKey key_, scratch_;  ///< of mode_

@@ -123,23 +123,45 @@ int Graph::Input() {
 }
 
 int Graph::Constant(double value) {
-  const auto [at, is_new] =
-      constants_.try_emplace(std::bit_cast<std::uint64_t>(value), static_cast<int>(nodes_.size()));
-  if (is_new) nodes_.push_back({Operation::kConstant, -1, -1, value, true});
-  return at->second;
+  return FindOrAppend({Operation::kConstant, -1, -1, value, true});
 }
 
 int Graph::Append(Operation operation, int a, int b) {
   const bool commutes = operation == Operation::kAdd || operation == Operation::kMultiply;
   if (commutes && a > b) std::swap(a, b);
-  const auto [at, is_new] =
-      seen_[static_cast<int>(operation)].try_emplace(Pair(a, b), static_cast<int>(nodes_.size()));
-  if (!is_new) return at->second;
   const bool is_known = IsKnown(a) && (b < 0 || IsKnown(b));
   const double other = b < 0 ? 0.0 : nodes_[b].value;
-  nodes_.push_back(
+  return FindOrAppend(
       {operation, a, b, is_known ? Value(operation, nodes_[a].value, other) : 0.0, is_known});
-  return at->second;
+}
+
+int Graph::FindOrAppend(const Node& node) {
+  const auto bits = [](const Node& of) {
+    return of.operation == Operation::kConstant ? std::bit_cast<std::uint64_t>(of.value)
+                                                : Pair(of.a, of.b);
+  };
+  const auto place_of = [&](const Node& of) {
+    std::uint64_t hash =
+        (bits(of) + static_cast<std::uint64_t>(of.operation)) * 0x9e3779b97f4a7c15u;
+    hash = (hash ^ hash >> 32) * 0xd6e8feb86659fd93u;
+    std::size_t place = hash >> 32;
+    for (;; ++place) {
+      const int found = table_[place &= table_.size() - 1];
+      if (found < 0) return place;
+      const Node& other = nodes_[found];
+      if (other.operation == of.operation && bits(other) == bits(of)) return place;
+    }
+  };
+  if (2 * nodes_.size() >= table_.size()) {
+    table_.assign(std::max<std::size_t>(1024, 2 * table_.size()), -1);
+    for (int i = 0; i < std::ssize(nodes_); ++i) {
+      if (nodes_[i].operation != Operation::kInput) table_[place_of(nodes_[i])] = i;
+    }
+  }
+  int& found = table_[place_of(node)];
+  if (found >= 0) return found;
+  nodes_.push_back(node);
+  return found = static_cast<int>(nodes_.size()) - 1;
 }
 
 int Graph::Make(Operation operation, int a, int b) {

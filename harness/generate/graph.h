@@ -155,12 +155,13 @@ class Graph {
  private:
   bool IsKnown(int node) const { return nodes_[node].is_known; }
   int Append(Operation operation, int a, int b);
+  /// The node equal to this one, appended if there is none. Constants are equal by their bits.
+  int FindOrAppend(const Node& node);
 
   bool keeps_numbers_;
   std::vector<Node> nodes_;
   std::vector<Comparison> comparisons_;
-  std::unordered_map<std::uint64_t, int> constants_;  ///< by bits
-  std::unordered_map<std::uint64_t, int> seen_[static_cast<int>(Operation::kMax) + 1];
+  std::vector<int> table_;  ///< nodes by their hash, at the next free place; -1: free
   std::unordered_map<std::uint64_t, std::array<std::uint8_t, 3>> compared_;  ///< outcome + 1
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 namespace loopbench::generate {
 
@@ -21,7 +22,6 @@ constexpr int kOperationsOfFunction = 500;
 constexpr const char* kLaneHelpers = R"(#include <math.h>
 typedef double number __attribute__((vector_size(8 * LANES)));
 typedef long long holds __attribute__((vector_size(8 * LANES)));
-#define ALL(constant) ((constant) - (number){0})
 #define EACH(f) \
   static inline number each_##f(number a) { \
     for (int i = 0; i < LANES; ++i) a[i] = f(a[i]); \
@@ -96,18 +96,22 @@ enum class Form { kLiterals, kConstants, kLanes };  // the last two receive cons
 
 class Printer {
  public:
-  Printer(const RecordedFunction& recorded, const std::string& name, Form form)
+  Printer(const RecordedFunction& recorded, const std::string& name, Form form,
+          bool own_sines = false)
       : form_(form),
+        own_sines_(own_sines),
         has_lanes_(form == Form::kLanes),
         number_(has_lanes_ ? "number" : "double"),
-        parameters_(fmt::format("const {0}* x, {1}{0}* y, {0}* w", number_,
-                                form == Form::kLiterals ? "" : "const double* c, ")),
+        parameters_(
+            fmt::format("const {0}* x, {1}{0}* y, {0}* w", number_,
+                        form == Form::kLiterals ? "" : fmt::format("const {}* c, ", number_))),
         arguments_(form == Form::kLiterals ? "x, y, w" : "x, c, y, w"),
         graph_(recorded.graph),
         outputs_(recorded.outputs),
         name_(name),
         function_(graph_.nodes().size(), 0),
-        places_(graph_.nodes().size(), -1) {
+        places_(graph_.nodes().size(), -1),
+        sines_in_(graph_.nodes().size(), -1) {
     live_ = graph_.Live(outputs_, true);
     results_.resize(graph_.nodes().size());
     tests_.resize(graph_.nodes().size());
@@ -203,10 +207,11 @@ class Printer {
     return fmt::format("v{}", node);
   }
 
-  /// Does the same for constants without a number.
-  std::string Whole(int node, int function) const {
-    const std::string name = Name(node, function);
-    return has_lanes_ && graph_.nodes()[node].is_known ? fmt::format("ALL({})", name) : name;
+  /// Sine and cosine of an angle, s and c with its node, once in each function.
+  void PrintSines(int angle, int function) {
+    if (std::exchange(sines_in_[angle], function) == function) return;
+    fmt::format_to(std::back_inserter(text_), "  {0} s{1}, c{1};\n  sines({2}, &s{1}, &c{1});\n",
+                   number_, angle, Name(angle, function));
   }
 
   void Print(int node, int function, int* input) {
@@ -216,7 +221,12 @@ class Printer {
     if (!live_[node]) return;
     const auto a = [&] { return Name(of.a, function); };
     const auto b = [&] { return Name(of.b, function); };
-    switch (of.is_known ? Operation::kConstant : of.operation) {
+    const Operation operation =
+        of.is_known                                     ? Operation::kConstant
+        : own_sines_ && of.operation == Operation::kSin ? Operation::kPoseSin
+        : own_sines_ && of.operation == Operation::kCos ? Operation::kPoseCos
+                                                        : of.operation;
+    switch (operation) {
       case Operation::kInput:
       case Operation::kConstant:
         break;
@@ -232,20 +242,20 @@ class Printer {
                        b());
         break;
       case Operation::kPoseSin:
-        fmt::format_to(out, "  {2} v{0}, c{0};\n  sines({1}, &v{0}, &c{0});\n", node, a(), number_);
-        break;
       case Operation::kPoseCos:
-        fmt::format_to(out, "  const {} v{} = c{};\n", number_, node, of.b);
+        PrintSines(of.a, function);
+        fmt::format_to(out, "  const {} v{} = {}{};\n", number_, node,
+                       operation == Operation::kPoseSin ? 's' : 'c', of.a);
         break;
       default:
         fmt::format_to(out, "  const {} v{} = {}{}({}", number_, node, has_lanes_ ? "each_" : "",
-                       FunctionName(of.operation), Whole(of.a, function));
-        if (of.b >= 0) fmt::format_to(out, ", {}", Whole(of.b, function));
+                       FunctionName(operation), a());
+        if (of.b >= 0) fmt::format_to(out, ", {}", b());
         text_ += ");\n";
     }
     if (room_[node] >= 0) fmt::format_to(out, "  w[{}] = v{};\n", room_[node], node);
     for (const std::size_t i : results_[node]) {
-      fmt::format_to(out, "  y[{}] = {};\n", i, Whole(node, function));
+      fmt::format_to(out, "  y[{}] = {};\n", i, Name(node, function));
     }
     for (const Comparison* test : tests_[node]) {
       const char* relation = test->relation == Relation::kLess        ? "<"
@@ -260,6 +270,7 @@ class Printer {
   }
 
   const Form form_;
+  const bool own_sines_;
   const bool has_lanes_;
   const char* const number_;  ///< its type in C
   const std::string parameters_, arguments_;
@@ -270,6 +281,7 @@ class Printer {
   std::vector<std::vector<std::size_t>> results_;      ///< indices of outputs, by node
   std::vector<std::vector<const Comparison*>> tests_;  ///< by their later node
   std::vector<int> function_, room_, places_;          ///< by node
+  std::vector<int> sines_in_;                          ///< last function with those of an angle
   int num_functions_ = 0, num_room_ = 0;
   std::string text_;
 };
@@ -282,8 +294,8 @@ std::string PrintFunction(const RecordedFunction& recorded, const std::string& n
   return printer.Text();
 }
 
-std::string PrintLibrary(const RecordedFunction& recorded) {
-  Printer printer(recorded, "function", Form::kConstants);
+std::string PrintLibrary(const RecordedFunction& recorded, bool own_sines) {
+  Printer printer(recorded, "function", Form::kConstants, own_sines);
   return fmt::format(R"(#include <math.h>
 static void (*sines)(double, double*, double*);
 void loopbench_use_sines(void (*of_pose)(double, double*, double*)) {{ sines = of_pose; }}
@@ -303,12 +315,12 @@ std::vector<double> ConstantsOf(const RecordedFunction& recorded) {
   return constants;
 }
 
-std::string PrintLanes(const RecordedFunction& recorded, int lanes) {
-  Printer printer(recorded, "function", Form::kLanes);
+std::string PrintLanes(const RecordedFunction& recorded, int lanes, bool own_sines) {
+  Printer printer(recorded, "function", Form::kLanes, own_sines);
   return fmt::format(R"(#define LANES {}
 {}{}const int loopbench_room = {};
 int loopbench_function(const double* x, const double* c, double* y, double* w) {{
-  const holds ok = function((const number*)x, c, (number*)y, (number*)w);
+  const holds ok = function((const number*)x, (const number*)c, (number*)y, (number*)w);
   int bits = 0;
   for (int i = 0; i < LANES; ++i) bits |= ok[i] != 0 ? 1 << i : 0;
   return bits;

@@ -29,7 +29,8 @@ std::string PrintFunction(const RecordedFunction& recorded, const std::string& n
 ///
 /// c holds ConstantsOf() the function. The text contains no number, so mechanisms with other masses
 /// or lengths share it.
-std::string PrintLibrary(const RecordedFunction& recorded);
+/// With `own_sines`, the function that loopbench_use_sines() receives computes all sines.
+std::string PrintLibrary(const RecordedFunction& recorded, bool own_sines = false);
 /// Values of Graph::Given().
 std::vector<double> ConstantsOf(const RecordedFunction& recorded);
 
@@ -37,10 +38,9 @@ std::vector<double> ConstantsOf(const RecordedFunction& recorded);
 ///
 ///   void loopbench_use_lane_sines(void (*sines)(const double*, double*, double*))
 ///
-/// receives sines and cosines of as many angles. x, y and w are arrays of vectors: the numbers of a
-/// quantity in all lanes follow each other. All lanes have the same c. Bit i of the result is set
-/// if all comparisons come out as recorded in lane i. Without fused multiply-add, lanes have
-/// PrintLibrary()'s bits.
-std::string PrintLanes(const RecordedFunction& recorded, int lanes);
+/// receives sines and cosines of as many angles. x, c, y and w are arrays of vectors: the numbers
+/// of a quantity in all lanes follow each other. Bit i of the result is set if all comparisons come
+/// out as recorded in lane i. Without fused multiply-add, lanes have PrintLibrary()'s bits.
+std::string PrintLanes(const RecordedFunction& recorded, int lanes, bool own_sines = false);
 
 }  // namespace loopbench::generate

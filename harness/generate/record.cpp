@@ -275,10 +275,13 @@ RecordedFunction RecordFunction(const RecordingSubject& subject, const Recording
   return RecordAt(subject, start, start.t, nullptr);
 }
 
+std::int64_t LiveNodes(const RecordedFunction& recorded) {
+  return std::ranges::count(recorded.graph.Live(recorded.outputs, true), true);
+}
+
 void RequireShort(const RecordedFunction& recorded) {
   constexpr std::int64_t kMaxOperations = 50'000;
-  const std::int64_t operations =
-      std::ranges::count(recorded.graph.Live(recorded.outputs, true), true);
+  const std::int64_t operations = LiveNodes(recorded);
   if (operations <= kMaxOperations) return;
   throw NotCovered(
       fmt::format("found {} operations, expected at most {}: they would take a compiler too long",

@@ -41,6 +41,9 @@ struct RecordingSubject {
   /// Longest recording, in nodes. Equations of shipped mechanisms have some ten thousand,
   /// factorisations that iterate more.
   std::size_t most_nodes = 100'000;
+  /// Shortest recording, in live nodes, that runs side by side call together. A change of runs
+  /// takes some 150 ns, more than lanes save in shorter code (results/methods/README.md).
+  std::int64_t least_in_lanes = 2000;
 };
 
 /// Time [s], positions and all speeds at which a system starts and chooses its mode.
@@ -84,6 +87,9 @@ double ShiftOf(std::size_t i);
 /// Throws NotCovered if a compiler would take too long: 24 000 operations take 3.5 s,
 /// factorisations that iterate have hundreds of thousands.
 void RequireShort(const RecordedFunction& recorded);
+
+/// Nodes on which outputs or comparisons depend.
+std::int64_t LiveNodes(const RecordedFunction& recorded);
 
 /// Exact counts of a right-hand side.
 struct MethodCounts {

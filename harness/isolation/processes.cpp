@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -25,8 +26,8 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/integrator/cpu_time.h"
 #include "harness/record/select.h"
+#include "harness/text/cpu_time.h"
 #include "harness/text/files.h"
 #include "harness/text/run_program.h"
 #include "harness/text/terminal.h"
@@ -444,46 +445,30 @@ namespace {
 constexpr double kBusy_s = 0.1;     ///< duration of a process; its start takes about 5 ms
 constexpr std::size_t kMost = 500;  ///< maximum tasks of a process: all repeat after a crash
 constexpr std::size_t kGrowth = 4;  ///< from one process to the next, while times are estimates
-constexpr std::size_t kLongestHead = 100;  ///< maximum size of an answer's header: three numbers
-
-double WallSecondsSince(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-/// Returns "LENGTH CPU_S WALL_S\n" and the answer, for each task.
-std::string AnswersOf(const std::vector<std::size_t>& tasks,
-                      const std::function<std::string(std::size_t)>& work) {
-  std::string answers;
-  for (const std::size_t task : tasks) {
-    const auto begin = std::chrono::steady_clock::now();
-    const double cpu_s = ThreadCpuSeconds();
-    const std::string answer = work(task);
-    answers += fmt::format("{} {} {}\n", answer.size(), ThreadCpuSeconds() - cpu_s,
-                           WallSecondsSince(begin));
-    answers += answer;
-  }
-  return answers;
+/// Returns "LENGTH\n" and the text, for each answer.
+std::string Packed(const std::vector<std::string>& answers) {
+  std::string text;
+  for (const std::string& answer : answers) text += fmt::format("{}\n{}", answer.size(), answer);
+  return text;
 }
 
 /// Returns an empty list unless each task has an answer.
 std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
-                                    const std::string& text) {
+                                    const ProcessResult& process) {
+  const std::string_view text = process.text;
   std::vector<TaskResult> results;
   std::size_t at = 0;
   for (const std::size_t task : tasks) {
-    TaskResult result = {.task = task, .result = {}};
     std::size_t length = 0;
-    int head = 0;
-    const std::string begin = at < text.size() ? text.substr(at, kLongestHead) : "";
-    if (std::sscanf(begin.c_str(), "%zu %lf %lf%n", &length, &result.result.cpu_s,
-                    &result.result.wall_s, &head) != 3) {
-      return {};
-    }
-    at += static_cast<std::size_t>(head) + 1;
-    if (at > text.size() || length > text.size() - at) return {};
-    result.result.text = text.substr(at, length);
+    const auto [end, error] = std::from_chars(text.data() + at, text.data() + text.size(), length);
+    if (error != std::errc() || end == text.data() + text.size()) return {};
+    at = static_cast<std::size_t>(end - text.data()) + 1;
+    if (length > text.size() - at) return {};
+    const auto share = static_cast<double>(tasks.size());
+    results.push_back({task,
+                       {ProcessEnding::kAnswered, std::string(text.substr(at, length)),
+                        process.wall_s / share, process.cpu_s / share}});
     at += length;
-    results.push_back(std::move(result));
   }
   return at == text.size() ? results : std::vector<TaskResult>();
 }
@@ -491,7 +476,8 @@ std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
 /// Distributes tasks to processes.
 class Batches {
  public:
-  Batches(std::size_t count, int jobs) : count_(count), jobs_(static_cast<std::size_t>(jobs)) {}
+  Batches(std::size_t count, int jobs, const std::function<std::size_t(std::size_t)>& together)
+      : count_(count), jobs_(static_cast<std::size_t>(jobs)), together_(together) {}
 
   /// Returns nothing if all tasks are running or done.
   std::vector<std::size_t> Next() {
@@ -502,7 +488,9 @@ class Batches {
     }
     // smaller batches at the end, so that the last processes end together
     const std::size_t fair = std::max<std::size_t>(1, (count_ - next_) / (2 * jobs_));
-    const std::size_t size = std::min({size_, fair, count_ - next_});
+    if (next_ == count_) return {};
+    const std::size_t size =
+        std::min(std::max(std::min(size_, fair), together_(next_)), count_ - next_);
     std::vector<std::size_t> tasks(size);
     for (std::size_t& task : tasks) task = next_++;
     return tasks;
@@ -521,17 +509,18 @@ class Batches {
 
  private:
   std::size_t count_, jobs_, next_ = 0, size_ = 1;
+  const std::function<std::size_t(std::size_t)>& together_;
   std::deque<std::size_t> alone_;  ///< tasks of failed processes
 };
 
 }  // namespace
 
-std::size_t RunInSharedProcesses(std::size_t count, int jobs,
-                                 const std::function<std::string(std::size_t)>& work,
-                                 const std::function<ProcessLimits(std::size_t)>& limits,
-                                 const std::function<void(const std::vector<TaskResult>&)>& done,
-                                 const SharedNews& news) {
-  Batches batches(count, jobs);
+std::size_t RunInSharedProcesses(
+    std::size_t count, int jobs,
+    const std::function<std::vector<std::string>(const std::vector<std::size_t>&)>& work,
+    const std::function<ProcessLimits(std::size_t)>& limits,
+    const std::function<void(const std::vector<TaskResult>&)>& done, const SharedNews& news) {
+  Batches batches(count, jobs, news.together);
   std::deque<std::vector<std::size_t>> processes;  // by number; finished ones are empty
   std::size_t begun = 0;                           // tasks start in order, except for repetitions
   const auto next = [&]() -> std::optional<std::size_t> {
@@ -550,6 +539,8 @@ std::size_t RunInSharedProcesses(std::size_t count, int jobs,
       least = {lower(least.cpu_s, own.cpu_s), lower(least.memory_mb, own.memory_mb),
                std::min(least.idle_s, own.idle_s)};
     }
+    least.cpu_s *= static_cast<double>(
+        std::min(news.together(processes[process].front()), processes[process].size()));
     return least;
   };
   const auto ended = [&](std::size_t process, const ProcessResult& result) {
@@ -560,7 +551,7 @@ std::size_t RunInSharedProcesses(std::size_t count, int jobs,
       return;
     }
     std::vector<TaskResult> results;
-    if (result.ending == ProcessEnding::kAnswered) results = ReadAnswers(tasks, result.text);
+    if (result.ending == ProcessEnding::kAnswered) results = ReadAnswers(tasks, result);
     if (results.empty() && tasks.size() > 1) {
       batches.RunAlone(tasks);
       return;
@@ -570,8 +561,7 @@ std::size_t RunInSharedProcesses(std::size_t count, int jobs,
     batches.Answered(tasks.size(), result.cpu_s);
     done(results);
   };
-  RunInProcesses(next, jobs,
-                 [&](std::size_t process) { return AnswersOf(processes[process], work); },
+  RunInProcesses(next, jobs, [&](std::size_t process) { return Packed(work(processes[process])); },
                  limits_of, ended,
                  {.started =
                       [&](std::size_t process) {

@@ -179,10 +179,13 @@ int TextFromChild(const std::string& name, const ProcessLimits& limits,
 // Short tasks share processes, because starting a process costs more than many a case.
 //
 // The number of tasks per process follows from their measured times: enough for a tenth of a
-// second. Isolation is kept: results of a failed process (crash, exception, limits) are discarded.
-// Its tasks run again, each in its own process, which determines the ending of the task.
+// second, or as many as share their work. Isolation is kept: results of a failed process (crash,
+// exception, limits) are discarded. Its tasks run again, each in its own process, which determines
+// the ending of the task.
 
 struct SharedNews {
+  /// Returns the number of tasks from one on that share their work, and therefore a process.
+  std::function<std::size_t(std::size_t)> together = [](std::size_t) { return std::size_t{1}; };
   std::function<void(std::size_t)> started = {};  ///< at the first start of a task
   std::function<void()> waited = {};
 };
@@ -193,14 +196,15 @@ struct TaskResult {
   ProcessResult result;
 };
 
-/// Runs work(0) .. work(count - 1) as RunInProcesses(), with consecutive tasks sharing a process. A
-/// process has the lowest limits of its tasks. `done` receives all tasks of a process at once, in
-/// order.
+/// Runs tasks 0 .. count - 1 as RunInProcesses(), with consecutive ones sharing a process: `work`
+/// returns their texts in order. A process has the lowest limits of its tasks, CPU time once for
+/// each that shares its work. `done` receives all tasks of a process at once, in order, each with
+/// an equal share of its time.
 /// @returns  number of processes
-std::size_t RunInSharedProcesses(std::size_t count, int jobs,
-                                 const std::function<std::string(std::size_t)>& work,
-                                 const std::function<ProcessLimits(std::size_t)>& limits,
-                                 const std::function<void(const std::vector<TaskResult>&)>& done,
-                                 const SharedNews& news = {});
+std::size_t RunInSharedProcesses(
+    std::size_t count, int jobs,
+    const std::function<std::vector<std::string>(const std::vector<std::size_t>&)>& work,
+    const std::function<ProcessLimits(std::size_t)>& limits,
+    const std::function<void(const std::vector<TaskResult>&)>& done, const SharedNews& news = {});
 
 }  // namespace loopbench::harness

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/integrator/cpu_time.h"
 #include "harness/precision/scalars.h"
+#include "harness/text/cpu_time.h"
 
 namespace loopbench::harness {
 

@@ -8,10 +8,10 @@
 #include <limits>
 #include <memory>
 
-#include "harness/integrator/cpu_time.h"
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "harness/precision/scalars.h"
+#include "harness/text/cpu_time.h"
 #include "lagrange/lagrange.h"
 #include "odca/odca.h"
 

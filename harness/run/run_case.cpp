@@ -87,17 +87,10 @@ void ForEachMember(const Experiment& experiment, const Case& entry, int threads,
       Member& member = held[static_cast<std::size_t>(i)];
       member.start =
           MemberStart(experiment.problems[entry.problem].mechanism.description, entry, first + i);
-      member.run = RunOnce(experiment, entry, member.start, &beside);
+      member.run = RunOnce(experiment, entry, member.start, RunKind::kMember, &beside);
     };
     RunSideBySide(static_cast<int>(held.size()), threads, run_member);
-    for (int i = 0; i < static_cast<int>(held.size()); ++i) {
-      Member& member = held[static_cast<std::size_t>(i)];
-      // its time includes the other runs of its batch
-      if (member.run.record.Text("outcome") == ToString(Outcome::kTimeLimit)) {
-        RunSideBySide(1, 1, [&](int, SideBySide& alone) { run_member(i, alone); });
-      }
-      keep(std::move(member.run), member.start);
-    }
+    for (Member& member : held) keep(std::move(member.run), member.start);
   }
 }
 
@@ -119,14 +112,15 @@ bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Out
 
 /// The largest difference of final poses from a run at a tenth of the tolerance; infinite where
 /// that run does not finish.
-void WriteRefinement(const Experiment& experiment, Case entry, Record& record) {
+void WriteRefinement(const Experiment& experiment, Case entry, SideBySide* beside, Record& record) {
   entry.rtol /= 10.0;
   entry.atol /= 10.0;
   if (entry.atols) {
     for (double* tolerance : entry.atols->All()) *tolerance /= 10.0;
   }
   const Run finer =
-      RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description, nullptr);
+      RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description,
+              RunKind::kCase, beside);
   record.Set("refinement_difference", HasFinished(finer.record)
                                           ? DifferenceOf(record, finer.record).largest
                                           : std::numeric_limits<double>::infinity());
@@ -184,7 +178,7 @@ template void LimitSteps(const Case&, const Mechanism<Planar, double>&, Integrat
 template void LimitSteps(const Case&, const Mechanism<Spatial, double>&, IntegratorOptions*);
 
 Record RunCase(const Experiment& experiment, const Case& entry, const Reference* reference,
-               const std::filesystem::path& trajectory, int threads) {
+               const std::filesystem::path& trajectory, int threads, SideBySide* beside) {
   const ExperimentProblem& problem = experiment.problems[entry.problem];
   Record record = entry.keys;
   record.Set("problem_id", Fnv1a(problem.mechanism.canonical));
@@ -200,12 +194,12 @@ Record RunCase(const Experiment& experiment, const Case& entry, const Reference*
                  fmt::format("{} {} {} {}", entry.mechanism, ToString(entry.method),
                              entry.integrator, SettingOf(entry)));
   }
-  Run nominal = RunOnce(experiment, entry, problem.mechanism.description, nullptr, held,
-                        task ? &*task : nullptr);
+  Run nominal = RunOnce(experiment, entry, problem.mechanism.description, RunKind::kCase, beside,
+                        held, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
 
   if (experiment.refine && entry.rtol > 0.0 && !IsPeer(record) && HasFinished(record)) {
-    WriteRefinement(experiment, entry, record);
+    WriteRefinement(experiment, entry, beside, record);
   }
 
   std::vector<DriftSeries> runs;
@@ -251,12 +245,12 @@ std::string StateHash(std::span<const double> y) {
 template <class Space>
 class Runner {
  public:
-  /// Runs part `part` of `user`, simplified to `problem`. A member of an ensemble has other runs
-  /// `beside` it and fewer observers.
+  /// Runs part `part` of `user`, simplified to `problem`.
   Runner(const Experiment& experiment, const Case& entry, const MechanismDescription& user,
-         const SimplifiedProblem& problem, int part, SideBySide* beside, const ErrorReference& held,
-         const TrajectoryTask* trajectory)
+         const SimplifiedProblem& problem, int part, RunKind kind, SideBySide* beside,
+         const ErrorReference& held, const TrajectoryTask* trajectory)
       : case_(entry),
+        kind_(kind),
         user_(user),
         compiled_(problem.compiled),
         part_(part),
@@ -426,15 +420,12 @@ class Runner {
       }
       return restart ? StepAction::kRestart : StepAction::kContinue;
     };
-    const double compiled_before =
-        formulation->compiled() != nullptr ? formulation->compiled()->seconds() : 0.0;
     const DenseObserver dense = Dense(*formulation);
     IntegratorResult run =
         peer ? peer->Integrate(case_.horizon, y_, options, observe)
              : harness::Integrate(*formulation, 0.0, case_.horizon, y_, options, observe,
                                   dense.times.empty() ? nullptr : &dense);
     if (const CompiledDerivative* compiled = formulation->compiled()) {
-      run.wall_s -= compiled->seconds() - compiled_before;
       library_evaluations_ = compiled->misses();
       compile_s_ = compiled->seconds();
     }
@@ -450,9 +441,10 @@ class Runner {
     return run;
   }
 
-  bool IsMember() const { return beside_ != nullptr; }
+  bool IsMember() const { return kind_ == RunKind::kMember; }
 
   const Case& case_;
+  const RunKind kind_;
   const MechanismDescription& user_;
   const Compiled& compiled_;
   int part_;
@@ -476,14 +468,15 @@ class Runner {
 }  // namespace
 
 Run RunOnce(const Experiment& experiment, const Case& entry,
-            const MechanismDescription& description, SideBySide* beside, const ErrorReference& held,
-            const TrajectoryTask* trajectory) {
+            const MechanismDescription& description, RunKind kind, SideBySide* beside,
+            const ErrorReference& held, const TrajectoryTask* trajectory) {
   const ObservedQuantities& observe = experiment.problems[entry.problem].mechanism.observe;
   const SimplifiedProblem problem = SimplifyProblem(description, observe, experiment.compile);
   std::vector<Run> parts;
   for (int part = 0; part < static_cast<int>(problem.compiled.parts.size()); ++part) {
     const auto run = [&]<class Space>() {
-      return Runner<Space>(experiment, entry, description, problem, part, beside, held, trajectory)
+      return Runner<Space>(experiment, entry, description, problem, part, kind, beside, held,
+                           trajectory)
           .Execute();
     };
     const auto& own = problem.compiled.parts[static_cast<std::size_t>(part)].description;

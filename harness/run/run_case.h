@@ -135,12 +135,12 @@ std::vector<double> AtolsOf(const Case& entry, const MechanismDescription& descr
 /// (harness/trajectory/), unless that is empty.
 ///
 /// Members of the ensemble run in batches on `threads` threads (side_by_side.h), which does not
-/// change their bits.
+/// change their bits. Other cases may run `beside` the unperturbed run.
 ///
 /// Numerical failures are stored in the record; only misuse throws.
 Record RunCase(const Experiment& experiment, const Case& entry,
                const Reference* reference = nullptr, const std::filesystem::path& trajectory = {},
-               int threads = 1);
+               int threads = 1, SideBySide* beside = nullptr);
 
 // One motion of a case: start, integration, observers, and their records.
 
@@ -150,11 +150,13 @@ struct ErrorReference {
   const PublishedSeries* series = nullptr;  ///< with times within the horizon
 };
 
-/// `description` is the case's or the start of an ensemble member. Members have other runs `beside`
-/// them and fewer observers; `beside` is null for the case itself. Parts connected through ground
-/// alone run one after another.
+/// The case itself, or a member of its ensemble, which has fewer observers.
+enum class RunKind { kCase, kMember };
+
+/// `description` is the case's or the start of an ensemble member. Other runs may be `beside` it.
+/// Parts connected through ground alone run one after another.
 Run RunOnce(const Experiment& experiment, const Case& entry,
-            const MechanismDescription& description, SideBySide* beside,
+            const MechanismDescription& description, RunKind kind, SideBySide* beside,
             const ErrorReference& held = {}, const TrajectoryTask* trajectory = nullptr);
 
 }  // namespace loopbench::harness

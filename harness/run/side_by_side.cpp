@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "harness/text/cpu_time.h"
 #include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {
@@ -76,6 +77,7 @@ class Places final : public SideBySide {
  public:
   /// `start(run)` is called in a place for each run that `next` gives, -1 being none.
   void Run(const std::function<int()>& next, const std::function<void(int)>& start) {
+    const double others_s = foreign_time.others_s;
     for (int i = 0; i < kMost; ++i) places_.push_back(std::make_unique<Place>(i));
     if (kMost == 1 || !places_.front()->HasStack()) {  // one after another, on this stack
       for (int run = next(); run >= 0; run = next()) start(run);
@@ -95,24 +97,40 @@ class Places final : public SideBySide {
             return std::move(back_);
           });
         }
+        if (!place->IsTaken()) switched_s_ = Now();
       }
-      if (std::ranges::none_of(places_, [](const auto& place) { return place->IsTaken(); })) return;
+      const auto waiting =
+          std::ranges::count_if(places_, [](const auto& place) { return place->IsTaken(); });
+      if (waiting == 0) break;
+      const double begin_s = switched_s_;
       DoAll();
+      switched_s_ = Now();
+      share_s_ = (switched_s_ - begin_s) / static_cast<double>(waiting);
     }
+    foreign_time.others_s = others_s;
   }
 
   void Meet() override {
     if (!back_) return DoAll();
+    const double left_s = Now(), others_s = foreign_time.others_s;
+    switched_s_ = left_s;
     back_ = std::move(back_).resume();
+    foreign_time.others_s = others_s + (switched_s_ - left_s) - share_s_;
   }
 
  private:
+  /// Wall time without recording and compiling.
+  static double Now() { return WallSeconds() - foreign_time.wall_s; }
+
   void DoAll() {
     for (const std::unique_ptr<SharedWork>& work : works) work->Do();
   }
 
   std::vector<std::unique_ptr<Place>> places_;
   context::fiber back_;  ///< to Run(), while a run is at work on a stack of its own
+  double switched_s_ =
+      0.0;                ///< when the run that is at work went on; one clock reading for two runs
+  double share_s_ = 0.0;  ///< of a run in the last work for all
 };
 
 }  // namespace

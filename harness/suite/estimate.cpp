@@ -13,10 +13,10 @@
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/analysis/structure_hints.h"
-#include "harness/integrator/cpu_time.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/suite.h"
+#include "harness/text/cpu_time.h"
 #include "harness/text/files.h"
 #include "mechanism/start/assembly.h"
 

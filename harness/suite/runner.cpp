@@ -13,11 +13,13 @@
 #include "harness/record/provenance.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
+#include "harness/run/side_by_side.h"
 #include "harness/suite/suite.h"
 #include "harness/text/escape.h"
 #include "harness/text/terminal.h"
 #include "harness/timing/calibration.h"
 #include "harness/trajectory/trajectory.h"
+#include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {
 
@@ -130,22 +132,27 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
   const int runs = entry.ensemble > 1 ? entry.ensemble + 1 : 1;
   std::filesystem::path trajectory;
   if (experiment.output) trajectory = TrajectoryPath(store, RunId(entry.keys));
-  const auto work = [&experiment, entry, store, trajectory](int threads) {
+  const auto work = [&experiment, entry, store, trajectory](int threads, SideBySide* beside) {
     const std::optional<Reference> reference = FindReference(experiment, entry, store);
     Record record =
-        RunCase(experiment, entry, reference ? &*reference : nullptr, trajectory, threads);
+        RunCase(experiment, entry, reference ? &*reference : nullptr, trajectory, threads, beside);
     if (reference && !reference->snapshots.empty()) {
       record.Set("reference_file", ReferenceOf(experiment, entry, store).id);
     }
     return std::vector<Record>{std::move(record)};
   };
   ProcessLimits limits = LimitsOfRuns(entry.limits, runs * entry.method.threads);
+  // of an ensemble the members share calls; fused code may have other bits in lanes than alone
+  const bool has_lanes = entry.method.execution == Execution::kGenerated && runs == 1;
   return {
       .owed = {entry.keys},
       .work = work,
       .limits = limits,
       .label = fmt::format("{} {} {}", entry.mechanism, ToString(entry.method), SettingOf(entry)),
       .cost = CostOf(entry),
+      .lanes = has_lanes ? fmt::format("{} {} {}", entry.mechanism, ToString(entry.method),
+                                       entry.integrator)
+                         : "",
       .trajectory = trajectory};
 }
 
@@ -153,13 +160,14 @@ Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& referenc
   Limits limits = experiment.limits;
   if (experiment.reference) limits.cpu_s = experiment.reference->cpu_s;
   constexpr double kWitnesses = 3.0;
-  return {.owed = {reference.keys},
-          .work = [&experiment,
-                   reference](int) { return std::vector<Record>{MakeOne(experiment, reference)}; },
-          .limits = LimitsOfRuns(limits, kWitnesses),
-          .label = fmt::format("{} {} s", reference.keys.Text("mechanism"), reference.horizon),
-          .cost = reference.horizon,
-          .product = reference.file};
+  return {
+      .owed = {reference.keys},
+      .work = [&experiment, reference](
+                  int, SideBySide*) { return std::vector<Record>{MakeOne(experiment, reference)}; },
+      .limits = LimitsOfRuns(limits, kWitnesses),
+      .label = fmt::format("{} {} s", reference.keys.Text("mechanism"), reference.horizon),
+      .cost = reference.horizon,
+      .product = reference.file};
 }
 
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
@@ -174,18 +182,19 @@ Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   constexpr double kDerivatives_s = 60.0;
   piece.limits = {kPatience * runs * experiment.limits.cpu_s + kDerivatives_s * methods * threads,
                   experiment.limits.memory_mb};
-  piece.work = [&experiment, &group](int) { return TimeTogether(experiment, group); };
+  piece.work = [&experiment, &group](int, SideBySide*) { return TimeTogether(experiment, group); };
   piece.label = group.name;
   return piece;
 }
 
 Piece LadderPiece(const Experiment& experiment, const LadderGroup& group) {
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
-  return {.owed = group.keys,
-          .work = [&experiment, &group](int) { return ClimbTogether(experiment, group); },
-          .limits = LimitsOfRuns(experiment.limits, runs),
-          .label = fmt::format("{} {}", group.keys.front().Text("mechanism"),
-                               ToString(group.task.method))};
+  return {
+      .owed = group.keys,
+      .work = [&experiment, &group](int, SideBySide*) { return ClimbTogether(experiment, group); },
+      .limits = LimitsOfRuns(experiment.limits, runs),
+      .label =
+          fmt::format("{} {}", group.keys.front().Text("mechanism"), ToString(group.task.method))};
 }
 
 std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
@@ -240,11 +249,29 @@ std::vector<Progress::Piece> EstimatedTasks(const std::vector<Piece>& pieces, Es
 }
 
 /// Returns all records, one per line (child process).
-std::string AnswerOf(const Piece& piece) {
+std::string AnswerOf(const Piece& piece, SideBySide* beside) {
   if (const auto garbage = PlantedFault(piece.owed.front())) return *garbage;
   std::string text;
-  for (const Record& record : piece.work(piece.threads)) text += ToJsonLine(record) + '\n';
+  for (const Record& record : piece.work(piece.threads, beside)) text += ToJsonLine(record) + '\n';
   return text;
+}
+
+/// Returns the answers of pieces, side by side where they share calls (child process).
+std::vector<std::string> AnswersOf(const std::vector<Piece>& pieces,
+                                   const std::vector<std::size_t>& asked) {
+  std::vector<std::string> answers(asked.size());
+  const auto has_lanes = [&](std::size_t i) { return !pieces[i].lanes.empty(); };
+  const auto answer = [&](int k, SideBySide* beside) {
+    const Piece& piece = pieces[asked[static_cast<std::size_t>(k)]];
+    answers[static_cast<std::size_t>(k)] = AnswerOf(piece, piece.lanes.empty() ? nullptr : beside);
+  };
+  const int count = static_cast<int>(asked.size());
+  if (count > 1 && std::ranges::any_of(asked, has_lanes)) {
+    RunSideBySide(count, 1, [&](int k, SideBySide& beside) { answer(k, &beside); });
+  } else {
+    for (int k = 0; k < count; ++k) answer(k, nullptr);
+  }
+  return answers;
 }
 
 }  // namespace
@@ -280,7 +307,10 @@ bool Runner::Done(const Piece& piece, std::size_t* failed) {
 std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int jobs, bool shared,
                         Estimate* estimate) {
   std::vector<Piece> pieces = NotAsked(std::move(all));
-  std::ranges::stable_sort(pieces, std::greater<>(), &Piece::cost);
+  std::ranges::stable_sort(pieces, [](const Piece& a, const Piece& b) {
+    return std::pair(-a.cost, std::string_view(a.lanes)) <
+           std::pair(-b.cost, std::string_view(b.lanes));
+  });
   std::size_t failed = 0;
   std::erase_if(pieces, [&](const Piece& piece) {
     if (!Done(piece, &failed)) return false;
@@ -292,9 +322,9 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
   const int free = std::max(1, jobs / static_cast<int>(pieces.size()));
   for (Piece& piece : pieces) piece.threads = free;
   Progress progress(what, EstimatedTasks(pieces, estimate), jobs);
-  const auto work = [&](std::size_t i) {
+  const auto work = [&](const std::vector<std::size_t>& asked) {
     store_.LeaveToParent();
-    return AnswerOf(pieces[i]);
+    return AnswersOf(pieces, asked);
   };
   const auto limits = [&](std::size_t i) { return pieces[i].limits; };
   const auto keep = [&](const std::vector<TaskResult>& ended) {
@@ -312,22 +342,30 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
     store_.Append(records);
     for (const TaskResult& result : ended) progress.Done(result.task);
   };
+  const auto together = [&](std::size_t first) -> std::size_t {
+    const std::string& lanes = pieces[first].lanes;
+    std::size_t last = first + 1;
+    while (!lanes.empty() && last < pieces.size() && pieces[last].lanes == lanes) ++last;
+    const std::size_t of_job = (last - first - 1) / static_cast<std::size_t>(jobs) + 1;
+    return std::min<std::size_t>(kLanes, of_job);
+  };
   const auto started = [&](std::size_t i) { progress.Start(i); };
   const auto waited = [&] { progress.Look(); };
   if (shared) {
-    count.processes += RunInSharedProcesses(pieces.size(), jobs, work, limits, keep,
-                                            {.started = started, .waited = waited});
+    count.processes +=
+        RunInSharedProcesses(pieces.size(), jobs, work, limits, keep, {together, started, waited});
   } else {
     count.processes += pieces.size();
     const auto before_fork = [&](std::size_t i) {
       CalibrationNs();  // calibrates the machine speed for timings
       return limits(i);
     };
-    RunInProcesses(pieces.size(), jobs, work, before_fork,
-                   [&](std::size_t i, const ProcessResult& result) {
-                     keep({{i, result}});
-                   },
-                   {.started = started, .waited = waited});
+    RunInProcesses(
+        pieces.size(), jobs, [&](std::size_t i) { return work({i}).front(); }, before_fork,
+        [&](std::size_t i, const ProcessResult& result) {
+          keep({{i, result}});
+        },
+        {.started = started, .waited = waited});
   }
   count.pieces += pieces.size();
   return failed;

@@ -67,10 +67,12 @@ class Progress {
 struct Piece {
   std::vector<Record> owed;     ///< keys, case_id and content: complete except for results
   std::int64_t experiment = 0;  ///< index among the experiments of the command
-  std::function<std::vector<Record>(int threads)> work;
+  /// `beside`: other pieces of the process, null without any.
+  std::function<std::vector<Record>(int threads, SideBySide* beside)> work;
   ProcessLimits limits;
   std::string label;
   double cost = 0.0;                      ///< expensive pieces run first
+  std::string lanes = {};                 ///< pieces with equal names share calls; "": none
   int threads = 1;                        ///< threads of `work`, which may need fewer
   std::filesystem::path product = {};     ///< file that must exist for the piece to be done
   std::filesystem::path trajectory = {};  ///< file that its process may leave incomplete

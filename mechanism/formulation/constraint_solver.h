@@ -35,6 +35,7 @@ struct Conditioning {
   int rank = 0;                  ///< independent loop constraints: rank of J in joint coordinates
   double rcond = 1.0;            ///< ratio of extreme pivots or eigenvalues of the solver's matrix
   double smallest_weight = 1.0;  ///< below 1: some direction was regularized
+  bool is_regularized = false;   ///< the same, decided in the solver's scalar
   int worst_joint = -1;          ///< index of the joint behind rcond, -1 when not attributable
 };
 

@@ -152,10 +152,9 @@ template <class Space, class S>
 Outcome System<Space, S>::FactorBranch() {
   carried_ = nullptr;
   const Outcome outcome = state_.Factor();
-  const bool is_regularized = solver_->conditioning().smallest_weight < 1.0;
   // prescribed motions do not continue along the present speeds, and have rules of their own
   if (!AtPassage() || drives_ != nullptr) return outcome;
-  if (outcome != Outcome::kFinished || !is_regularized) return outcome;
+  if (outcome != Outcome::kFinished || !solver_->conditioning().is_regularized) return outcome;
   if (passage_ == nullptr) passage_ = std::make_unique<Passage<Space, S>>(mechanism_, *solver_);
   const Nearby beside = passage_->Look(kinematics());
   state_.ForgetFactors();
@@ -188,7 +187,7 @@ Outcome System<Space, S>::Accelerate() {
     if (const Outcome outcome = FactorBranch(); outcome != Outcome::kFinished) return outcome;
     SolveAccelerations(lambda);
     if (!udot_.allFinite()) return Outcome::kNonFinite;
-    if (solver_->conditioning().smallest_weight < 1.0) ++regularized_evaluations_;
+    if (solver_->conditioning().is_regularized) ++regularized_evaluations_;
   }
   return drives_ == nullptr ? Outcome::kFinished : JudgeDrives();
 }

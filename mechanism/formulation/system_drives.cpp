@@ -26,7 +26,7 @@ int System<Space, S>::FirmRank([[maybe_unused]] const Kinematics<Space, S>& at) 
 
 template <class Space, class S>
 bool System<Space, S>::IsSingular() const {
-  return solver_->conditioning().smallest_weight < 1.0 &&
+  return solver_->conditioning().is_regularized &&
          FirmRank(kinematics()) < drives_->usual_rank();
 }
 
@@ -81,13 +81,12 @@ bool System<Space, S>::IsOffBranch() const {
 template <class Space, class S>
 Outcome System<Space, S>::JudgeDrives() {
   const Conditioning& found = solver_->conditioning();
-  const bool is_regularized = found.smallest_weight < 1.0;
   const bool is_accepted = kinematics().time() == accepted_t_;
   const bool is_projected = options_.enforcement == Enforcement::kPosition;
-  if (is_projected && is_regularized && !is_accepted) return Outcome::kFinished;
+  if (is_projected && found.is_regularized && !is_accepted) return Outcome::kFinished;
   if (drives_->has_left_branch()) return Outcome::kSingular;
   if (is_accepted && options_.solver == SolverKind::kRankRevealing && mechanism_.num_u() > 0) {
-    if (is_regularized && drives_->usual_rank() == 0) NoteRankAhead();
+    if (found.is_regularized && drives_->usual_rank() == 0) NoteRankAhead();
     const bool has_left = drives_->NoteRank(found.rank);  // a singular start
     if (is_projected && (has_left || IsSingular())) {
       drives_->Followed(kinematics(), udot_, *feedback_);
@@ -119,7 +118,7 @@ std::string System<Space, S>::Why() const {
   }
   return "the prescribed motions contradict each other or the loops at joint \"" +
          mechanism_.joint_names()[static_cast<std::size_t>(drives_->worst_joint())] + '"' +
-         (solver_->conditioning().smallest_weight < 1.0
+         (solver_->conditioning().is_regularized
               ? ", or start in a singular configuration without the speeds of a branch"
               : "");
 }

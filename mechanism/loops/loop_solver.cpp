@@ -24,7 +24,7 @@ LoopSolver<S>::LoopSolver(std::span<const int> rows, std::shared_ptr<LoopScratch
   if (scratch_ == nullptr) scratch_ = std::make_shared<LoopScratch<S>>(size_);
   if (size_ <= kSmallTriangle) {
     small_.setIdentity(size_, size_);
-  } else {  // an LLT that has computed nothing has no valid state to copy
+  } else {  // a factor that has computed nothing has no valid state to copy
     cholesky_.compute(MatrixX<S>::Identity(size_, size_).eval());
   }
   directions_.setIdentity(size_, size_);
@@ -95,14 +95,18 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
   form_ = Form::kScaled;
   rcond_ = S(0);
   if (!(Cholesky(X) > S(0))) return false;
+  using std::min;
   rcond_ = S(1);
+  bool is_regular = true;  // not decided by rcond_, of which a recording would note the row
   for (const Part& part : parts_) {
     for (int i = 0; i < part.rows; ++i) {
-      const S ratio = scales_[part.scale + i * (part.rows + 1)] / InversePivot(part.row + i);
-      if (!(ratio * ratio >= rcond_)) rcond_ = ratio * ratio;  // also for NaN
+      const S root = scales_[part.scale + i * (part.rows + 1)] / InversePivot(part.row + i);
+      const S ratio = root * root;
+      rcond_ = min(rcond_, ratio);
+      is_regular = ratio >= S(kSuspicious) && is_regular;  // false for NaN, too
     }
   }
-  return rcond_ >= S(kSuspicious);
+  return is_regular;
 }
 
 /// "geometric": K_g^-1 X_g K_g^-T = U diag(lambda) U^T and the weights w_i; inverse_norms_ are

@@ -124,7 +124,7 @@ class LoopSolver {
   std::vector<Part> parts_;          ///< the joints
   std::vector<S> scales_;            ///< K of each joint, K^-1 if geometric, by columns
   MatrixX<S> small_;                 ///< L as in lower_triangle.h, for small sizes
-  Eigen::LLT<MatrixX<S>> cholesky_;  ///< L elsewhere
+  CholeskyFactor<MatrixX<S>> cholesky_;  ///< L elsewhere
   MatrixX<S> directions_;            ///< U
   VectorX<S> eigenvalues_, inverse_norms_;
   DirectionWeights<S> weights_;

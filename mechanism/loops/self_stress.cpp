@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/algebra/lower_triangle.h"
 #include "mechanism/loops/row_choice.h"
@@ -17,7 +18,7 @@ template <class S>
 S FactorInPlace(MatrixX<S>& A) {
   const auto size = static_cast<int>(A.rows());
   if (size <= kSmallTriangle) return FactorLower(A.data(), size);
-  const Eigen::LLT<Eigen::Ref<MatrixX<S>>> factor(A);
+  CholeskyFactor<MatrixX<S>>::InPlace(A);
   const S least = A.diagonal().minCoeff();
   A.diagonal() = A.diagonal().cwiseInverse().eval();
   return least * least;

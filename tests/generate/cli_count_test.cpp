@@ -112,7 +112,7 @@ std::map<std::string, std::string> RowsByKey(const std::string& csv) {
 
 /// The gate without a clock. `loopbench count` writes the file anew (results/methods/README.md).
 /// Rows that are not exact, where rounding decides an iteration or a pivot, are not compared. The
-/// table is of the native build, where four rows of spatial-four-bar are exact that are not here.
+/// table is of the portable build; in others a few rows may not be exact.
 class CountGate : public CountTest, public testing::WithParamInterface<std::string> {};
 
 TEST_P(CountGate, CountsOfAllMechanismsAreThoseOfTheCommittedTable) {

@@ -386,5 +386,38 @@ TEST_F(GenerateTest, TheFmuIsValidAndMovesAsTheLibraryDoes) {
   EXPECT_EQ((model.Call<int (*)(void*, double, double, int)>("fmi2DoStep", 1.0, -1.0, 1)), 3);
 }
 
+/// Cases of a sweep call compiled code together. One that crashes leaves the others their records.
+TEST_F(GenerateTest, CasesOfASweepShareCallsAndHaveTheBitsThatTheyHaveAlone) {
+  Write("sweep.json", R"({"name": "sweep", "timing": {"repeats": 0}, "tolerances": [1e-6],
+    "problems": [{"mechanism": ")" +
+                          (kRoot / "configs/mechanisms/double-wishbone.json").string() +
+                          R"(", "horizon": 0.1}],
+    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection",
+                 "execution": "generated"}],
+    "sweep": [{"name": "mass", "field": "/problems/0/mechanism/bodies/2/mass",
+               "values": {"lin": [1.1, 2.3, 5]}}]})");
+  ExpectEnding(Call("run sweep.json --out shared --jobs 1"), 0, {"ran 10 cases in "});
+  ExpectEnding(Call("run sweep.json --out alone --isolate"), 0, {"ran 10 cases, 0 reused"});
+  ExpectEnding(Call("run sweep.json --out faulty --jobs 1", "LOOPBENCH_FAULT=crash:mass=1.7"), 0,
+               {"(2 not finished)"});
+  const std::vector<Record> alone = ReadRecords(folder_ / "alone");
+  for (const char* name : {"shared", "faulty"}) {
+    const std::vector<Record> records = ReadRecords(folder_ / name);
+    ASSERT_EQ(records.size(), alone.size());
+    for (const Record& record : records) {
+      if (record.Number("mass") == 1.7 && name == std::string("faulty")) {
+        EXPECT_EQ(record.Text("outcome"), "crashed");
+        continue;
+      }
+      const auto same = std::ranges::find(alone, record.Text("id"),
+                                          [](const Record& one) { return one.Text("id"); });
+      ASSERT_NE(same, alone.end());
+      EXPECT_EQ(record.Text("state_hash"), same->Text("state_hash"));
+      EXPECT_EQ(record.Number("library_evaluations"), same->Number("library_evaluations"));
+      EXPECT_GT(record.Number("cpu_s"), 0.0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace loopbench::harness

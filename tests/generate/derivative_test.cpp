@@ -474,19 +474,22 @@ TEST(GeneratedDerivativeTest, AModeKeepsItsBranchesWhileAnotherIsInUse) {
   EXPECT_LT(generated.misses(), 8000 / 20);
 }
 
-/// More runs than lanes, with two sets of masses. Some take a branch that is not compiled.
+/// More runs than lanes, with three sets of masses. Some take a branch that is not compiled.
 TEST(LanesTest, RunsSideBySideHaveTheBitsThatTheyHaveAlone) {
   constexpr int kRuns = 2 * kLanes + 3;
   for (const std::string& formulation : kFormulations) {
     const auto derivatives = [&](int run, SideBySide* beside, std::int64_t* misses) {
-      const MechanismDescription description = Varied(Shipped("four-bar"), 1 + run % 2);
+      const MechanismDescription description = Varied(Shipped("four-bar"), 1 + run % 3);
       const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
       const harness::BenchmarkState state = harness::ComputeState(description, Coordinates::kJoint);
       const auto system = harness::MakeFormulation<Planar>(formulation, mechanism,
                                                            {.general = true, .beside = beside});
       EXPECT_EQ(system->Start(0.0, state.q, state.u), Outcome::kFinished);
       system->UseCompiled(std::make_unique<GeneratedDerivative<Planar>>(
-          RecordingSubject{description, Coordinates::kJoint, formulation, system->options()},
+          RecordingSubject{.description = description,
+                           .formulation = formulation,
+                           .options = system->options(),
+                           .least_in_lanes = 0},
           *system));
       std::vector<double> y(static_cast<std::size_t>(system->size())), ydot(y.size()), all;
       system->ToState(state.q, state.u, y);

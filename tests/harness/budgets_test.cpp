@@ -36,32 +36,32 @@ struct Budget {
 // clang-format off
 constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
-    {"mechanism/algebra",       { 2053,  22,   0},  1900},
+    {"mechanism/algebra",       { 2074,  22,   0},  1900},
     {"mechanism/description",   { 2134,  28,   1},  1750},
     {"mechanism/model",         { 3009,  22,   2},  2300},
-    {"mechanism/loops",         { 3247,  23,   2},  1900},
+    {"mechanism/loops",         { 3252,  23,   2},  1900},
     {"mechanism/start",         { 2144,  18,   4},   700},
     {"mechanism/formulation",   { 2633,  23,   4},  1500},
     {"mechanism/simplify",      { 3370,  25,   5},  2600},
-    {"odca",                    { 6998,  38,   5},  3900},
-    {"lagrange",                {  374,   4,   4},   350},
-    {"reduction",               { 1624,  12,   4},  1350},
-    {"harness/text",            { 1552,  12,   0},   900},
+    {"odca",                    { 6999,  38,   5},  3900},
+    {"lagrange",                {  376,   4,   4},   350},
+    {"reduction",               { 1626,  12,   4},  1350},
+    {"harness/text",            { 1635,  13,   0},   900},
     {"harness/json",            { 2004,   9,   1},  1300},
     {"harness/record",          { 1508,  10,   3},  1200},
     {"harness/store",           { 1656,   8,   3},  1300},
     {"harness/config",          { 6310,  24,  11},  4000},
     {"harness/analysis",        { 2117,   8,   9},  1200},
-    {"harness/generate",        { 2299,  12,   7},  1230},
-    {"harness/integrator",      { 1388,   7,   4},   900},
+    {"harness/generate",        { 2372,  12,   7},  1230},
+    {"harness/integrator",      { 1388,   7,   5},   900},
     {"harness/reference",       {  913,   4,   4},   800},
     {"harness/trajectory",      { 2495,   9,  12},  1750},
     {"harness/observers",       { 1147,   4,   7},  1000},
-    {"harness/run",             { 1786,  12,  14},  1700},
+    {"harness/run",             { 1799,  12,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
     {"harness/isolation",       {  795,   2,   4},   790},
     {"harness/timing",          { 1357,  10,   7},  1050},
-    {"harness/suite",           { 2322,  10,  15},  1500},
+    {"harness/suite",           { 2362,  10,  15},  1500},
     {"harness/cluster",         {  491,   2,   5},   420},
     {"harness/advise",          {  651,   2,   8},   650},
     {"harness/tables",          { 2017,  10,   5},  1500},
@@ -72,8 +72,8 @@ constexpr Budget kBudgets[] = {
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 8425,  26,  29},  3600},
-    {"peers",                   {  733,  12,   5},   650},
-    {"",                        {92999, 508, 242}, 62000}
+    {"peers",                   {  733,  12,   6},   650},
+    {"",                        {93175, 508, 242}, 62000}
 };
 // clang-format on
 

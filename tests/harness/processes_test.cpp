@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/integrator/cpu_time.h"
+#include "harness/text/cpu_time.h"
 #include "harness/text/run_program.h"
 
 namespace loopbench::harness {
@@ -181,8 +181,13 @@ std::pair<std::map<std::size_t, ProcessResult>, std::size_t> Share(
     std::size_t count, const std::function<std::string(std::size_t)>& work,
     const ProcessLimits& limits = {}) {
   std::map<std::size_t, ProcessResult> results;
+  const auto all = [&](const std::vector<std::size_t>& tasks) {
+    std::vector<std::string> texts;
+    for (const std::size_t task : tasks) texts.push_back(work(task));
+    return texts;
+  };
   const std::size_t processes = RunInSharedProcesses(
-      count, 2, work, [&](std::size_t) { return limits; },
+      count, 2, all, [&](std::size_t) { return limits; },
       [&](const std::vector<TaskResult>& ended) {
         for (const TaskResult& one : ended) {
           EXPECT_TRUE(results.emplace(one.task, one.result).second) << one.task << " ended twice";

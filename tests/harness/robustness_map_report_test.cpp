@@ -127,7 +127,7 @@ TEST(RobustnessMapFigure, HasAGlyphAndShadeForEachCell) {
   const MapDrawing drawing = DrawMap(map);
   for (const char* text :
        {"\"O-DCA\"", "\"singular\"", "\"Two methods\"", "\"33 %\"", "\"?\"", "\"not measured\"",
-        "\"wrong without a word\"", "\"frame: must hold and does not\""}) {
+        "\"finished, demand not met\"", "\"frame: must hold and does not\""}) {
     EXPECT_TRUE(Contains(drawing.script, text));
   }
   EXPECT_EQ(drawing.script.find("holds, with warnings"), std::string::npos);

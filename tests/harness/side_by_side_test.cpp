@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/text/cpu_time.h"
 #include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {
@@ -66,6 +67,38 @@ TEST(SideBySide, DoesTheWorkOfAllLanesAtOnce) {
   if (most == 1) GTEST_SKIP() << "one stack under sanitizers";
   EXPECT_EQ(most, kLanes);
   EXPECT_EQ(done, 40) << "four fillings of the lanes, ten meetings each";
+}
+
+/// A run's clock stands while others compute, and in work that belongs to no run.
+TEST(SideBySide, EachRunHasItsOwnTime) {
+  const auto compute = [](double seconds) {
+    const double end = ThreadCpuSeconds() + seconds;
+    while (ThreadCpuSeconds() < end) {
+    }
+  };
+  std::vector<double> cpu_s(3), wall_s(3);
+  double compiling_s = 0.0;
+  RunSideBySide(3, 1, [&](int run, SideBySide& beside) {
+    CounterOf(beside);
+    const CpuLimit time(1.0);
+    beside.Meet();
+    compute(0.02 * run);
+    if (run == 1) {
+      const ForeignWork compiling(compiling_s);
+      compute(0.03);
+    }
+    beside.Meet();
+    cpu_s[static_cast<std::size_t>(run)] = time.cpu_s();
+    wall_s[static_cast<std::size_t>(run)] = time.wall_s();
+  });
+  EXPECT_GE(compiling_s, 0.03);
+  for (const int run : {0, 1, 2}) {
+    const auto at = static_cast<std::size_t>(run);
+    // in proportion to the wall time, which other work of the machine may lengthen
+    EXPECT_GE(wall_s[at], 0.019 * run);
+    EXPECT_LT(cpu_s[at], 0.02 * run + 0.019);
+    EXPECT_LE(cpu_s[at], wall_s[at] + 1e-3);
+  }
 }
 
 TEST(SideBySide, ThrowsWhatTheFirstRunThrewWhenAllHaveEnded) {

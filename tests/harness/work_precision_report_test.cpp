@@ -1,4 +1,4 @@
-// What accuracy costs, as tables, figures and the statement of what was equal.
+// Error against cost: tables, figures and the statement of what was equal.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 

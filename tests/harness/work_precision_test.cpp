@@ -1,4 +1,4 @@
-// What accuracy costs: joins of runs and timings, fronts against domination by definition, the
+// Error against cost: joins of runs and timings, fronts against domination by definition, the
 // cheapest methods, what is left out and why.
 #include "harness/judge/work_precision.h"
 

@@ -36,7 +36,9 @@ class CholeskyFactor : public Eigen::LLT<Matrix> {
  public:
   CholeskyFactor() = default;
   template <class Input>
-  explicit CholeskyFactor(const Input& A) { compute(A); }
+  explicit CholeskyFactor(const Input& A) {
+    compute(A);
+  }
 
   template <class Input>
   CholeskyFactor& compute(const Input& A) {

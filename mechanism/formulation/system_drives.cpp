@@ -93,8 +93,9 @@ Outcome System<Space, S>::JudgeDrives() {
       return drives_->DecidesBranch(kinematics()) ? Outcome::kFinished : Outcome::kSingular;
     }
   }
-  return drives_->Followed(kinematics(), udot_, *feedback_) ? Outcome::kFinished
-                                                            : Outcome::kInconsistentMotion;
+  if (drives_->Followed(kinematics(), udot_, *feedback_)) return Outcome::kFinished;
+  const bool is_singular = options_.solver == SolverKind::kRankRevealing && IsSingular();
+  return is_singular ? Outcome::kSingular : Outcome::kInconsistentMotion;
 }
 
 template <class Space, class S>
@@ -112,7 +113,7 @@ std::string System<Space, S>::Why() const {
            "speed too low for inertia to carry bodies across it, or a start without the speeds of "
            "its branch; keep away from the configuration or pass it faster";
   }
-  if (is_singular || IsSingular()) {
+  if (is_singular) {
     return "the prescribed motions pass a singular configuration or a dead end, where errors of "
            "this level decide the branch; in a singular configuration level projection keeps it";
   }

@@ -195,22 +195,33 @@ TEST_P(DrivenPassage, StartsInLineNeedTheirSpeeds) {
 
 /// The loop of configs/experiments/extremes/endings.json: 2.2 from the crank's end to the rocker's
 /// pivot are the most, reached when the crank is at acos((0.4^2 + 1.9^2 - 2.2^2) / (2 0.4 1.9)).
-TEST_P(DrivenPassage, DeadEndsAreNone) {
+void ExpectDeadEnd(const Method& method, double tolerance) {
   MechanismDescription d = FourBar(0.5, 1.5, 0, Polynomial{{0.5, 3.0}});
   d.joints[1].from.position.x() = 0.4;
   d.joints[2].from.position.x() = 1.9;
   d.joints[3].from.position.x() = 1.2;
   d.initial.coordinates = {{1, {0.2}}, {2, {1.5}}};
   const double end = (std::acos((0.16 + 3.61 - 4.84) / (2 * 0.4 * 1.9)) - 0.5) / 3.0;
-  for (const double tolerance : {1e-5, 1e-8}) {
-    const Record record = RunFile(FileOf(d), GetParam(), tolerance, 5.0);
-    EXPECT_EQ(record.Text("outcome"), "singular") << record.Text("message");
-    EXPECT_NEAR(record.Number("t_reached"), end, 1e-6);
-    EXPECT_NE(record.Text("message").find("dead end"), std::string::npos);
-  }
+  const Record record = RunFile(FileOf(d), method, tolerance, 5.0);
+  EXPECT_EQ(record.Text("outcome"), "singular") << ToString(method) << record.Text("message");
+  EXPECT_NEAR(record.Number("t_reached"), end, 1e-6) << ToString(method);
+  EXPECT_NE(record.Text("message").find("dead end"), std::string::npos) << ToString(method);
+}
+
+TEST_P(DrivenPassage, DeadEndsAreNone) {
+  for (const double tolerance : {1e-5, 1e-8}) ExpectDeadEnd(GetParam(), tolerance);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, DrivenPassage, testing::ValuesIn(PositionMethods()), NameOfParam);
+
+TEST(DrivenPassageBelowPosition, DeadEndsHaveOneOutcome) {
+  for (Method method : RankRevealingMethods()) {
+    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
+      method.enforcement = level;
+      ExpectDeadEnd(method, 1e-8);
+    }
+  }
+}
 
 /// Below level projection a passage ends on its branch or with a name and the cure.
 TEST(DrivenPassageBelowPosition, IsRightOrNamed) {

@@ -244,15 +244,14 @@ void GeneratedDerivative<Space>::AddBranch() {
       throw NotCovered("the state carries other speeds in the recorded text than in double");
     }
   }
-  const bool is_first = lane_ != nullptr && lane_->shared() == nullptr;
-  if (is_first && LiveNodes(recorded) < subject_.least_in_lanes) lane_.reset();
   if (lane_ == nullptr) return add(Compile(std::move(recorded), false));
+  if (lane_->shared() == nullptr) in_lanes_ = LiveNodes(recorded) >= subject_.least_in_lanes;
   lane_->Join(recorded.key);
   auto& [all, of_mode] = *lane_->shared();
   auto code = std::ranges::find(all, recorded.key, [](const auto& known) -> const std::string& {
     return known->recorded.key;
   });
-  if (code == all.end()) code = all.insert(code, Compile(std::move(recorded), true));
+  if (code == all.end()) code = all.insert(code, Compile(std::move(recorded), in_lanes_));
   SharedBranches::Codes& shared = of_mode[key_];
   if (std::ranges::find(shared, *code) == shared.end()) shared.push_back(*code);
   add(*code);
@@ -268,20 +267,21 @@ std::shared_ptr<const Code> GeneratedDerivative<Space>::Compile(RecordedFunction
   };
   const CompiledBranch compiled =
       CompileBranch(recorded.structure + (in_lanes ? " in lanes" : ""), print, contraction_);
-  room_.resize(std::max(room_.size(), static_cast<std::size_t>(compiled.room)));
   std::vector<double> constants = ConstantsOf(recorded);
   return std::make_shared<Code>(Code{std::move(recorded), compiled, std::move(constants)});
 }
 
 template <class Space>
 bool GeneratedDerivative<Space>::Call(const Code& code, std::span<double> results) {
+  const auto room = static_cast<std::size_t>(code.compiled.room);
+  if (room_.size() < room) room_.resize(room);
   return code.compiled.function(x_.data(), code.constants.data(), results.data(), room_.data()) !=
          0;
 }
 
 template <class Space>
 bool GeneratedDerivative<Space>::CallDerivative(const Code& code, std::span<double> ydot) {
-  return lane_ ? lane_->Call(code, x_, ydot.first(x_.size() - 1)) : Call(code, ydot);
+  return in_lanes_ ? lane_->Call(code, x_, ydot.first(x_.size() - 1)) : Call(code, ydot);
 }
 
 template <class Space>

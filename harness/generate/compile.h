@@ -27,7 +27,7 @@ inline constexpr const char* kCompilerFlags[] = {
 
 /// Rounding of a product and a sum: separate, with the bits of the library's general code, or once
 /// (fused multiply-add). Fused code also computes all sines and cosines by the library's own
-/// function, all lanes at once, with an error of at most 1.1 units in the last place (lanes.h).
+/// function, for all lanes at once. Its error is at most 1.1 units in the last place (lanes.h).
 enum class Contraction { kNone, kFused };
 
 /// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no

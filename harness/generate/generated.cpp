@@ -51,16 +51,12 @@ class LaneCalls final : public SharedWork {
     for (auto& [function, constants] : constants_) constants.of[lane] = nullptr;
   }
 
-  /// Branches of runs whose first recordings have this key.
-  std::shared_ptr<SharedBranches> Shared(const std::string& first_key) {
-    std::erase_if(shared_, [](const auto& known) { return known.second.expired(); });
-    std::weak_ptr<SharedBranches>& known = shared_[first_key];
-    if (known.expired()) {
-      auto shared = std::make_shared<SharedBranches>();
-      known = shared;
-      return shared;
-    }
-    return known.lock();
+  /// Branches of runs with this mechanism whose first recordings have this key.
+  std::shared_ptr<SharedBranches> Shared(const void* mechanism, const std::string& first_key) {
+    if (mechanism == nullptr) return std::make_shared<SharedBranches>();
+    std::shared_ptr<SharedBranches>& known = shared_[{mechanism, first_key}];
+    if (known == nullptr) known = std::make_shared<SharedBranches>();
+    return known;
   }
 
   void Want(int lane, const Code& wanted, std::span<const double> x, std::span<double> y) {
@@ -124,7 +120,7 @@ class LaneCalls final : public SharedWork {
   std::array<Call, kLanes> calls_;
   std::vector<Lanes> x_, y_, w_;
   std::map<decltype(CompiledBranch::function), Constants> constants_;
-  std::map<std::string, std::weak_ptr<SharedBranches>> shared_;
+  std::map<std::pair<const void*, std::string>, std::shared_ptr<SharedBranches>> shared_;
 };
 
 }  // namespace
@@ -143,9 +139,9 @@ class Lane {
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
-  /// Joins the runs whose first recordings have this key, unless it has joined others.
-  void Join(const std::string& first_key) {
-    if (shared_ == nullptr) shared_ = calls_.Shared(first_key);
+  /// Joins the runs of LaneCalls::Shared(), unless it has joined others.
+  void Join(const void* mechanism, const std::string& first_key) {
+    if (shared_ == nullptr) shared_ = calls_.Shared(mechanism, first_key);
   }
   /// Branches of the runs that it has joined; null before.
   SharedBranches* shared() { return shared_.get(); }
@@ -246,7 +242,7 @@ void GeneratedDerivative<Space>::AddBranch() {
   }
   if (lane_ == nullptr) return add(Compile(std::move(recorded), false));
   if (lane_->shared() == nullptr) in_lanes_ = LiveNodes(recorded) >= subject_.least_in_lanes;
-  lane_->Join(recorded.key);
+  lane_->Join(subject_.mechanism, recorded.key);
   auto& [all, of_mode] = *lane_->shared();
   auto code = std::ranges::find(all, recorded.key, [](const auto& known) -> const std::string& {
     return known->recorded.key;

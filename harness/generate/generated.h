@@ -6,8 +6,8 @@
 // (members of an ensemble) call compiled code together, each in a lane of a function for kLanes
 // states (mechanism/formulation/side_by_side.h); without fused multiply-add with the bits of a
 // single run. Each lane has its own constants, so cases of a sweep share a call, too. Short code is
-// called alone (record.h). A run records its first branch. If another run has recorded an equal
-// one, both have the same mechanism, and the run takes branches of all modes from there.
+// called alone (record.h). Each run records its first branch. Members of an ensemble with equal
+// first branches share their branches of all modes.
 //
 // Compiled code receives the recorded constants. Two recordings share it if they differ in the
 // numbers of constants alone: members of an ensemble, or cases of a sweep over lengths or masses. A
@@ -84,7 +84,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   const Contraction contraction_;
   const System<Space, double>& system_;
   std::unique_ptr<Lane> lane_;  ///< if other runs are beside this one
-  bool in_lanes_ = false;       ///< calls are common, too; else the lane shares branches alone
+  bool in_lanes_ = false;       ///< true: runs call code together; false: they share recordings
   std::map<ModeKey, Mode> modes_;
   Mode* mode_ = nullptr;
   ModeKey key_, scratch_;  ///< of mode_

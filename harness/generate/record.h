@@ -41,9 +41,13 @@ struct RecordingSubject {
   /// Longest recording, in nodes. Equations of shipped mechanisms have some ten thousand,
   /// factorisations that iterate more.
   std::size_t most_nodes = 100'000;
-  /// Shortest recording, in live nodes, that runs side by side call together. A change of runs
-  /// takes some 150 ns, more than lanes save in shorter code (results/methods/README.md).
+  /// Runs side by side call code together if its recording has at least this many live nodes. A
+  /// change of runs takes some 150 ns, more than lanes save in shorter code
+  /// (results/methods/README.md).
   std::int64_t least_in_lanes = 2000;
+  /// Runs with equal ones have equal mechanisms, except for their starts, and share recordings;
+  /// null: no other run has an equal mechanism.
+  const void* mechanism = nullptr;
 };
 
 /// Time [s], positions and all speeds at which a system starts and chooses its mode.
@@ -88,7 +92,7 @@ double ShiftOf(std::size_t i);
 /// factorisations that iterate have hundreds of thousands.
 void RequireShort(const RecordedFunction& recorded);
 
-/// Nodes on which outputs or comparisons depend.
+/// Nodes on which outputs or comparisons depend: inputs, constants and operations.
 std::int64_t LiveNodes(const RecordedFunction& recorded);
 
 /// Exact counts of a right-hand side.

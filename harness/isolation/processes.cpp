@@ -445,6 +445,7 @@ namespace {
 constexpr double kBusy_s = 0.1;     ///< duration of a process; its start takes about 5 ms
 constexpr std::size_t kMost = 500;  ///< maximum tasks of a process: all repeat after a crash
 constexpr std::size_t kGrowth = 4;  ///< from one process to the next, while times are estimates
+
 /// Returns "LENGTH\n" and the text, for each answer.
 std::string Packed(const std::vector<std::string>& answers) {
   std::string text;
@@ -457,6 +458,7 @@ std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
                                     const ProcessResult& process) {
   const std::string_view text = process.text;
   std::vector<TaskResult> results;
+  const auto count = static_cast<double>(tasks.size());
   std::size_t at = 0;
   for (const std::size_t task : tasks) {
     std::size_t length = 0;
@@ -464,10 +466,9 @@ std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
     if (error != std::errc() || end == text.data() + text.size()) return {};
     at = static_cast<std::size_t>(end - text.data()) + 1;
     if (length > text.size() - at) return {};
-    const auto share = static_cast<double>(tasks.size());
     results.push_back({task,
                        {ProcessEnding::kAnswered, std::string(text.substr(at, length)),
-                        process.wall_s / share, process.cpu_s / share}});
+                        process.wall_s / count, process.cpu_s / count}});
     at += length;
   }
   return at == text.size() ? results : std::vector<TaskResult>();
@@ -486,9 +487,9 @@ class Batches {
       alone_.pop_front();
       return {task};
     }
+    if (next_ == count_) return {};
     // smaller batches at the end, so that the last processes end together
     const std::size_t fair = std::max<std::size_t>(1, (count_ - next_) / (2 * jobs_));
-    if (next_ == count_) return {};
     const std::size_t size =
         std::min(std::max(std::min(size_, fair), together_(next_)), count_ - next_);
     std::vector<std::size_t> tasks(size);
@@ -539,8 +540,10 @@ std::size_t RunInSharedProcesses(
       least = {lower(least.cpu_s, own.cpu_s), lower(least.memory_mb, own.memory_mb),
                std::min(least.idle_s, own.idle_s)};
     }
-    least.cpu_s *= static_cast<double>(
+    const auto together = static_cast<double>(
         std::min(news.together(processes[process].front()), processes[process].size()));
+    least.cpu_s *= together;
+    least.memory_mb *= together;
     return least;
   };
   const auto ended = [&](std::size_t process, const ProcessResult& result) {

@@ -197,8 +197,8 @@ struct TaskResult {
 };
 
 /// Runs tasks 0 .. count - 1 as RunInProcesses(), with consecutive ones sharing a process: `work`
-/// returns their texts in order. A process has the lowest limits of its tasks, CPU time once for
-/// each that shares its work. `done` receives all tasks of a process at once, in order, each with
+/// returns their texts in order. A process has the lowest limits of its tasks, once for each that
+/// shares its work. `done` receives all tasks of a process at once, in order, each with
 /// an equal share of its time.
 /// @returns  number of processes
 std::size_t RunInSharedProcesses(

@@ -388,7 +388,8 @@ class Runner {
     if (result.outcome != Outcome::kFinished) return result;
     formulation->IntegrateWork(mechanism_.has_power() && !peer);  // peers integrate none
     GiveJacobian(case_.integrator, case_.jacobian, description_, *formulation);
-    GiveExecution<Space>(case_.method, description_, *formulation, &result);
+    GiveExecution<Space>(case_.method, description_, *formulation, &result,
+                         IsMember() ? &problem_ : nullptr);
     if (result.outcome != Outcome::kFinished) return result;
     const std::size_t n = static_cast<std::size_t>(formulation->state_size());
     y_.assign(static_cast<std::size_t>(formulation->size()), 0.0);

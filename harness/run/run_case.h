@@ -62,14 +62,17 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
 }
 
 /// Gives a system, after its start and IntegrateWork(), the generated right-hand side of a method.
-/// Throws NotCovered (harness/generate/record.h).
+/// `mechanism` as RecordingSubject has it. Throws NotCovered (harness/generate/record.h).
 template <class Space>
 void GiveExecution(const Method& method, const MechanismDescription& description,
-                   System<Space, double>& system) {
+                   System<Space, double>& system, const void* mechanism = nullptr) {
   if (method.execution == Execution::kLibrary) return;
   system.UseCompiled(std::make_unique<generate::GeneratedDerivative<Space>>(
-      generate::RecordingSubject{description, method.coordinates, method.formulation,
-                                 system.options()},
+      generate::RecordingSubject{.description = description,
+                                 .coordinates = method.coordinates,
+                                 .formulation = method.formulation,
+                                 .options = system.options(),
+                                 .mechanism = mechanism},
       system,
       method.execution == Execution::kGeneratedFma ? generate::Contraction::kFused
                                                    : generate::Contraction::kNone));
@@ -78,9 +81,10 @@ void GiveExecution(const Method& method, const MechanismDescription& description
 /// Stores NotCovered as outcome and message of `result` instead of throwing it.
 template <class Space>
 void GiveExecution(const Method& method, const MechanismDescription& description,
-                   System<Space, double>& system, IntegratorResult* result) {
+                   System<Space, double>& system, IntegratorResult* result,
+                   const void* mechanism = nullptr) {
   try {
-    GiveExecution(method, description, system);
+    GiveExecution(method, description, system, mechanism);
   } catch (const generate::NotCovered& why) {
     result->outcome = Outcome::kInexpressible;
     result->message = why.what();

@@ -127,10 +127,9 @@ class Places final : public SideBySide {
   }
 
   std::vector<std::unique_ptr<Place>> places_;
-  context::fiber back_;  ///< to Run(), while a run is at work on a stack of its own
-  double switched_s_ =
-      0.0;                ///< when the run that is at work went on; one clock reading for two runs
-  double share_s_ = 0.0;  ///< of a run in the last work for all
+  context::fiber back_;      ///< to Run(), while a run is at work on a stack of its own
+  double switched_s_ = 0.0;  ///< when the last run stopped and the present one continued
+  double share_s_ = 0.0;     ///< of a run in the last work for all
 };
 
 }  // namespace

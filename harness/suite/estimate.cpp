@@ -164,11 +164,12 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     if (pilot.step > 0.0) pilot.step = std::ranges::max(like.fixed_steps);
     pilot.horizon = fraction * Longest(like, problem);
     pilot.limits.cpu_s = std::min(budget_.most_s, one.limits.cpu_s);
-    const CpuLimit all(pilot.limits.cpu_s);
+    const double begin_s = ThreadCpuSeconds();
     const Record record = RunCase(like, pilot, nullptr, rows);
     const double reached = record.Number("t_reached"), running = record.Number("cpu_s");
     const bool ended = record.Text("outcome") != ToString(Outcome::kFinished);
-    PilotCost spent = {.all_s = all.cpu_s(), .running_s = std::isnan(running) ? 0.0 : running};
+    PilotCost spent = {.all_s = ThreadCpuSeconds() - begin_s,
+                       .running_s = std::isnan(running) ? 0.0 : running};
     // longer runs have more rows at a fixed distance, but not at a fixed number
     if (like.output && like.output->number == 0) spent.running_s = spent.all_s;
     spent.reached = std::isnan(reached) ? 0.0 : fraction * reached / pilot.horizon;
@@ -179,9 +180,9 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     spent.failed = ended && record.Text("outcome") != ToString(Outcome::kTimeLimit);
     if (one.ensemble > 1) {
       pilot.ensemble = std::min(one.ensemble, kMembers);
-      const CpuLimit with_members(pilot.limits.cpu_s);
+      const double members_begin_s = ThreadCpuSeconds();
       RunCase(like, pilot);
-      spent.members_s = with_members.cpu_s();
+      spent.members_s = ThreadCpuSeconds() - members_begin_s;
       const double each_s = (spent.members_s - spent.all_s) / pilot.ensemble;
       spent.member = std::clamp(each_s / spent.all_s, 0.0, 1.0);
     }
@@ -239,9 +240,9 @@ double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
       ReferenceOptions options = *own.reference;
       options.points = std::max(2, static_cast<int>(fraction * options.points));
       const double horizon = fraction * one.horizon;
-      const CpuLimit all(options.cpu_s);
+      const double begin_s = ThreadCpuSeconds();
       const Reference reference = MakeReference(user, horizon, LinkLength(user), options, tried);
-      return {.all_s = all.cpu_s(),
+      return {.all_s = ThreadCpuSeconds() - begin_s,
               .running_s = reference.cpu_s,
               .reached = fraction * (reference.trust_horizon < horizon ? kNearlyAll : 1.0),
               .failed = reference.trust_horizon < horizon};
@@ -269,9 +270,10 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
   const auto run = [&](double fraction) -> PilotCost {
     LadderGroup part = group;
     part.task.horizon *= fraction;
-    const CpuLimit all(budget_.most_s);
+    const double begin_s = ThreadCpuSeconds();
     ClimbTogether(own, part);
-    return {.all_s = all.cpu_s(), .running_s = all.cpu_s(), .reached = fraction};
+    const double all_s = ThreadCpuSeconds() - begin_s;
+    return {.all_s = all_s, .running_s = all_s, .reached = fraction};
   };
   const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
   const Rate* rate =
@@ -297,9 +299,9 @@ double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
     });
   }
   const auto run = [&](double) -> PilotCost {
-    const CpuLimit all(budget_.most_s);
+    const double begin_s = ThreadCpuSeconds();
     const std::vector<Record> records = TimeTogether(own, group, 1);
-    return {.all_s = all.cpu_s(),
+    return {.all_s = ThreadCpuSeconds() - begin_s,
             .running_s = sum(records,
                              [](const Record& record) {
                                const double rhs_s = 1e-9 * record.Number("rhs_ns_median");

@@ -120,6 +120,7 @@ namespace {
 double CostOf(const Case& entry) { return entry.ensemble * ExpectedSteps(entry); }
 
 constexpr double kPatience = 2.0, kGrace_s = 2.0;  ///< LimitsOfRuns
+constexpr double kRecording_s = 30.0;              ///< for recordings, which no run counts
 
 }  // namespace
 
@@ -142,6 +143,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
     return std::vector<Record>{std::move(record)};
   };
   ProcessLimits limits = LimitsOfRuns(entry.limits, runs * entry.method.threads);
+  if (entry.method.execution != Execution::kLibrary) limits.cpu_s += kRecording_s;
   // of an ensemble the members share calls; fused code may have other bits in lanes than alone
   const bool has_lanes = entry.method.execution == Execution::kGenerated && runs == 1;
   return {
@@ -345,9 +347,10 @@ std::size_t Runner::Run(const std::string& what, std::vector<Piece> all, int job
   const auto together = [&](std::size_t first) -> std::size_t {
     const std::string& lanes = pieces[first].lanes;
     std::size_t last = first + 1;
-    while (!lanes.empty() && last < pieces.size() && pieces[last].lanes == lanes) ++last;
-    const std::size_t of_job = (last - first - 1) / static_cast<std::size_t>(jobs) + 1;
-    return std::min<std::size_t>(kLanes, of_job);
+    const std::size_t most =
+        std::min(pieces.size(), first + static_cast<std::size_t>(kLanes * jobs));
+    while (!lanes.empty() && last < most && pieces[last].lanes == lanes) ++last;
+    return (last - first - 1) / static_cast<std::size_t>(jobs) + 1;
   };
   const auto started = [&](std::size_t i) { progress.Start(i); };
   const auto waited = [&] { progress.Look(); };

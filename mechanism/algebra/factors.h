@@ -43,6 +43,7 @@ class CholeskyFactor : public Eigen::LLT<Matrix> {
   template <class Input>
   CholeskyFactor& compute(const Input& A) {
     this->m_matrix = A;
+    this->m_l1_norm = 0;  // unused
     this->m_isInitialized = true;
     this->m_info = InPlace(this->m_matrix) ? Eigen::Success : Eigen::NumericalIssue;
     return *this;

@@ -26,8 +26,7 @@ int System<Space, S>::FirmRank([[maybe_unused]] const Kinematics<Space, S>& at) 
 
 template <class Space, class S>
 bool System<Space, S>::IsSingular() const {
-  return solver_->conditioning().is_regularized &&
-         FirmRank(kinematics()) < drives_->usual_rank();
+  return solver_->conditioning().is_regularized && FirmRank(kinematics()) < drives_->usual_rank();
 }
 
 /// Steps ahead along the speeds by some widths of regularization. Constraints that are dependent
@@ -94,7 +93,8 @@ Outcome System<Space, S>::JudgeDrives() {
     }
   }
   if (drives_->Followed(kinematics(), udot_, *feedback_)) return Outcome::kFinished;
-  const bool is_singular = options_.solver == SolverKind::kRankRevealing && IsSingular();
+  const bool is_singular = std::is_same_v<S, double> &&  // other scalars have no spectrum
+                           options_.solver == SolverKind::kRankRevealing && IsSingular();
   return is_singular ? Outcome::kSingular : Outcome::kInconsistentMotion;
 }
 

@@ -121,11 +121,11 @@ class LoopSolver {
 
   int size_ = 0;
   Form form_ = Form::kNone;
-  std::vector<Part> parts_;          ///< the joints
-  std::vector<S> scales_;            ///< K of each joint, K^-1 if geometric, by columns
-  MatrixX<S> small_;                 ///< L as in lower_triangle.h, for small sizes
+  std::vector<Part> parts_;              ///< the joints
+  std::vector<S> scales_;                ///< K of each joint, K^-1 if geometric, by columns
+  MatrixX<S> small_;                     ///< L as in lower_triangle.h, for small sizes
   CholeskyFactor<MatrixX<S>> cholesky_;  ///< L elsewhere
-  MatrixX<S> directions_;            ///< U
+  MatrixX<S> directions_;                ///< U
   VectorX<S> eigenvalues_, inverse_norms_;
   DirectionWeights<S> weights_;
   std::shared_ptr<LoopScratch<S>> scratch_;

@@ -474,12 +474,15 @@ TEST(GeneratedDerivativeTest, AModeKeepsItsBranchesWhileAnotherIsInUse) {
   EXPECT_LT(generated.misses(), 8000 / 20);
 }
 
-/// More runs than lanes, with three sets of masses. Some take a branch that is not compiled.
+/// More runs than lanes, with three sets of masses. Tables of torques differ where the first branch
+/// does not reach. Some runs take a branch that is not compiled.
 TEST(LanesTest, RunsSideBySideHaveTheBitsThatTheyHaveAlone) {
   constexpr int kRuns = 2 * kLanes + 3;
   for (const std::string& formulation : kFormulations) {
     const auto derivatives = [&](int run, SideBySide* beside, std::int64_t* misses) {
-      const MechanismDescription description = Varied(Shipped("four-bar"), 1 + run % 3);
+      MechanismDescription description = Varied(Shipped("four-bar"), 1 + run % 3);
+      description.forces.emplace_back(
+          JointTorque{0, TimeTable{{0.0, 0.35, 0.9}, {1.0, 2.0, 3.0 + 0.137 * run}, false}});
       const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
       const harness::BenchmarkState state = harness::ComputeState(description, Coordinates::kJoint);
       const auto system = harness::MakeFormulation<Planar>(formulation, mechanism,
@@ -496,7 +499,7 @@ TEST(LanesTest, RunsSideBySideHaveTheBitsThatTheyHaveAlone) {
       for (int call = 0; call < 5 + run; ++call) {
         y.back() += 1e-3 * (run + 1);
         if (call == 2 && run % 3 == 0) std::fill_n(y.begin(), mechanism.num_q(), 0.0);
-        EXPECT_EQ(system->Derivative(0.0, y, ydot), Outcome::kFinished);
+        EXPECT_EQ(system->Derivative(0.1 * call, y, ydot), Outcome::kFinished);
         all.insert(all.end(), ydot.begin(), ydot.end());
       }
       *misses = system->compiled()->misses();

@@ -36,7 +36,7 @@ struct Budget {
 // clang-format off
 constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
-    {"mechanism/algebra",       { 2074,  22,   0},  1900},
+    {"mechanism/algebra",       { 2077,  22,   0},  1900},
     {"mechanism/description",   { 2134,  28,   1},  1750},
     {"mechanism/model",         { 3009,  22,   2},  2300},
     {"mechanism/loops",         { 3252,  23,   2},  1900},
@@ -52,16 +52,16 @@ constexpr Budget kBudgets[] = {
     {"harness/store",           { 1656,   8,   3},  1300},
     {"harness/config",          { 6310,  24,  11},  4000},
     {"harness/analysis",        { 2117,   8,   9},  1200},
-    {"harness/generate",        { 2372,  12,   7},  1230},
+    {"harness/generate",        { 2373,  12,   7},  1230},
     {"harness/integrator",      { 1388,   7,   5},   900},
     {"harness/reference",       {  913,   4,   4},   800},
     {"harness/trajectory",      { 2495,   9,  12},  1750},
     {"harness/observers",       { 1147,   4,   7},  1000},
-    {"harness/run",             { 1799,  12,  14},  1700},
+    {"harness/run",             { 1803,  12,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
     {"harness/isolation",       {  795,   2,   4},   790},
     {"harness/timing",          { 1357,  10,   7},  1050},
-    {"harness/suite",           { 2362,  10,  15},  1500},
+    {"harness/suite",           { 2367,  10,  15},  1500},
     {"harness/cluster",         {  491,   2,   5},   420},
     {"harness/advise",          {  651,   2,   8},   650},
     {"harness/tables",          { 2017,  10,   5},  1500},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 8425,  26,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {93175, 508, 242}, 62000}
+    {"",                        {93192, 508, 242}, 62000}
 };
 // clang-format on
 

@@ -78,6 +78,7 @@ TEST(SideBySide, EachRunHasItsOwnTime) {
   };
   std::vector<double> cpu_s(3), wall_s(3);
   double compiling_s = 0.0;
+  const double begin_s = WallSeconds();
   RunSideBySide(3, 1, [&](int run, SideBySide& beside) {
     CounterOf(beside);
     const CpuLimit time(1.0);
@@ -91,12 +92,13 @@ TEST(SideBySide, EachRunHasItsOwnTime) {
     cpu_s[static_cast<std::size_t>(run)] = time.cpu_s();
     wall_s[static_cast<std::size_t>(run)] = time.wall_s();
   });
+  // the sums hold however long other work of the machine interrupts the runs
+  const double all_s = WallSeconds() - begin_s;
   EXPECT_GE(compiling_s, 0.03);
+  EXPECT_LE(wall_s[0] + wall_s[1] + wall_s[2] + compiling_s, all_s + 1e-6);
   for (const int run : {0, 1, 2}) {
     const auto at = static_cast<std::size_t>(run);
-    // in proportion to the wall time, which other work of the machine may lengthen
     EXPECT_GE(wall_s[at], 0.019 * run);
-    EXPECT_LT(cpu_s[at], 0.02 * run + 0.019);
     EXPECT_LE(cpu_s[at], wall_s[at] + 1e-3);
   }
 }

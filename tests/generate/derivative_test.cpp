@@ -20,6 +20,7 @@
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/forward_jacobian.h"
+#include "tests/contract/generators.h"
 
 namespace loopbench::generate {
 namespace {
@@ -200,9 +201,10 @@ void ForAllShipped(Coordinates set, auto see) {
 }
 
 /// Elsewhere, where every comparison has its outcome, a graph gives the bits of the text itself.
-void ExpectBitsOfTheText(Coordinates set) {
+struct BitsOfTheText {
   int compared = 0, branched = 0, refused = 0;
-  ForAllShipped(set, [&](auto library, const std::string& what) {
+
+  void operator()(const auto& library, const std::string& what) {
     SCOPED_TRACE(what);
     const std::vector<double> y = library.Near(1e-6);
     std::vector<double> x = {0.01};
@@ -218,13 +220,48 @@ void ExpectBitsOfTheText(Coordinates set) {
       EXPECT_TRUE(ok);
       ExpectSameBits(found, RecordFunction(library.subject(), library.start(), 0.01, y).numbers);
     } catch (const NotCovered& why) {
-      EXPECT_NE(std::string(why.what()).find("factorisation that iterates"), std::string::npos);
+      const std::string reason = why.what();
+      EXPECT_TRUE(reason.find("factorisation that iterates") != std::string::npos ||
+                  reason.find("counted from the last step") != std::string::npos)
+          << reason;
       ++refused;
     }
-  });
+  }
+};
+
+void ExpectBitsOfTheText(Coordinates set) {
+  BitsOfTheText bits;
+  ForAllShipped(set, [&](auto library, const std::string& what) { bits(library, what); });
   // pivots of equal size, in absolute coordinates above all, change with every state
-  EXPECT_GT(compared, 2 * branched);
-  EXPECT_LT(refused, 12);
+  EXPECT_GT(bits.compared, 2 * bits.branched);
+  EXPECT_LT(bits.refused, 12);
+}
+
+/// Ten in the plane, ten in space: chains, trees, and loops that share bodies.
+TEST(RecordedFunctionTest, RandomMechanismsHaveTheBitsOfTheText) {
+  BitsOfTheText bits;
+  for (int k = 0; k < 20; ++k) {
+    const bool is_planar = k % 2 == 0;
+    const SpaceKind space = is_planar ? SpaceKind::kPlanar : SpaceKind::kSpatial;
+    const auto seed = static_cast<std::uint64_t>(k);
+    const MechanismDescription description =
+        k % 3 == 0   ? loopbench::testing::RandomChain(is_planar ? 3 + k / 3 : 7, space, seed)
+        : k % 3 == 1 ? loopbench::testing::RandomTree(2 + k / 3, space, seed)
+                     : loopbench::testing::RandomGraph(1 + k % 2, space, seed);
+    for (const std::string& formulation : kFormulations) {
+      for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+        const std::string what = fmt::format("{} {} {}", k, formulation, ToString(set));
+        if (is_planar) {
+          bits(Library<Planar>(description, formulation, Enforcement::kVelocity, set), what);
+        } else {
+          bits(Library<Spatial>(description, formulation, Enforcement::kVelocity, set), what);
+        }
+      }
+    }
+  }
+  // 18 of 120 right-hand sides are not covered, each for a named reason
+  EXPECT_GE(bits.compared, 95);
+  EXPECT_LE(bits.refused, 18);
 }
 
 TEST(RecordedFunctionTest, AllShippedMechanismsHaveTheBitsOfTheTextInJointCoordinates) {

@@ -16,27 +16,10 @@ include(CMakePackageConfigHelpers)
 # What runs is one Debian package, what others build with another (cmake/package.cmake).
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
 
-# What Eigen's types look like in memory depends on -march: 32-byte alignment with AVX, 16 without. The
-# libraries are built with the default of their -march, and this says it to whoever includes their
-# headers, so that -march itself need not be forced on them. (In this build it would change nothing.)
-if(NOT "${LOOPBENCH_ALIGNMENT_OF}" STREQUAL "${LOOPBENCH_MARCH}")
-  get_target_property(eigen Eigen3::Eigen INTERFACE_INCLUDE_DIRECTORIES)
-  file(WRITE ${CMAKE_BINARY_DIR}/alignment.cpp
-    "#include <Eigen/src/Core/util/Macros.h>\n#include <Eigen/src/Core/util/ConfigureVectorization.h>\n"
-    "alignment EIGEN_MAX_ALIGN_BYTES EIGEN_MAX_STATIC_ALIGN_BYTES\n")
-  execute_process(COMMAND ${CMAKE_CXX_COMPILER} -march=${LOOPBENCH_MARCH} -std=c++20 -I${eigen} -E -P alignment.cpp
-    WORKING_DIRECTORY ${CMAKE_BINARY_DIR} OUTPUT_VARIABLE text ERROR_VARIABLE error)
-  if(NOT text MATCHES "alignment ([0-9]+) ([0-9]+)" OR NOT CMAKE_MATCH_1 EQUAL CMAKE_MATCH_2)
-    message(FATAL_ERROR "no alignment of Eigen's types for -march=${LOOPBENCH_MARCH}: ${CMAKE_MATCH_0}\n${error}")
-  endif()
-  set(LOOPBENCH_ALIGNMENT ${CMAKE_MATCH_1} CACHE INTERNAL "Alignment of Eigen's types [bytes]")
-  set(LOOPBENCH_ALIGNMENT_OF ${LOOPBENCH_MARCH} CACHE INTERNAL "The -march that it belongs to")
-endif()
 target_include_directories(loopbench_mechanism INTERFACE
   $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/loopbench>)
-target_compile_definitions(loopbench_mechanism INTERFACE
-  $<INSTALL_INTERFACE:EIGEN_MAX_ALIGN_BYTES=${LOOPBENCH_ALIGNMENT}>
-  $<INSTALL_INTERFACE:EIGEN_MAX_STATIC_ALIGN_BYTES=${LOOPBENCH_ALIGNMENT}>)
+# Eigen's types look the same in memory for every -march only without Eigen's vector code.
+target_compile_definitions(loopbench_mechanism INTERFACE $<INSTALL_INTERFACE:EIGEN_DONT_VECTORIZE>)
 target_compile_features(loopbench_mechanism INTERFACE cxx_std_20)
 
 set(installed loopbench_mechanism ${LOOPBENCH_FORMULATION_LIBRARIES} loopbench_generate loopbench_harness)

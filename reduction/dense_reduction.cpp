@@ -263,6 +263,13 @@ void DenseReduction<Space, S>::AppendMode(std::vector<int>& mode) const {
   mode.insert(mode.end(), rows_.begin(), rows_.end());
 }
 
+template <class Space, class S>
+void DenseReduction<Space, S>::TakeMode(std::span<const int> mode) {
+  const auto end = std::ranges::find(mode, -1);
+  SetPartition({{mode.begin() + 1, end}, {end + 1, mode.end()}, S(1)});
+  outgrown_ = mode.front() != 0;
+}
+
 #define LOOPBENCH_INSTANTIATE(Space, S) template class DenseReduction<Space, S>;
 LOOPBENCH_FOR_EACH_SPACE_AND_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

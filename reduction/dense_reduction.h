@@ -67,6 +67,7 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   void Start(const Kinematics<Space, S>& kinematics) override;
   bool Review(const Kinematics<Space, S>& kinematics) override;
   void AppendMode(std::vector<int>& mode) const override;
+  void TakeMode(std::span<const int> mode) override;
 
  private:
   /// LU of J_D, J being current; the ratio of its pivots, with rotations as lengths.

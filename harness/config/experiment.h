@@ -25,9 +25,12 @@ namespace loopbench::harness {
 /// Source of Jacobians for the Newton iteration of implicit profiles.
 enum class JacobianKind { kForward, kFiniteDifference };
 
-/// Evaluation of right-hand sides: by the library, or by code generated from it
-/// (harness/generate/), without or with fused multiply-add.
-enum class Execution { kLibrary, kGenerated, kGeneratedFma };
+/// Evaluation of right-hand sides: by the library, with or without its fast paths, or by code
+/// generated from it (harness/generate/), without or with fused multiply-add. Without fast paths
+/// and without fused multiply-add bits are equal.
+enum class Execution { kLibrary, kGeneral, kGenerated, kGeneratedFma };
+
+inline bool IsGenerated(Execution execution) { return execution >= Execution::kGenerated; }
 
 /// Names in files and tables, by value of the enum.
 template <class Enum>
@@ -41,8 +44,8 @@ inline constexpr std::array<std::string_view, 2> kNames<JacobianKind> = {"forwar
                                                                          "finite-difference"};
 
 template <>
-inline constexpr std::array<std::string_view, 3> kNames<Execution> = {"library", "generated",
-                                                                      "generated-fma"};
+inline constexpr std::array<std::string_view, 4> kNames<Execution> = {"library", "general",
+                                                                      "generated", "generated-fma"};
 
 /// Floating-point type of a run, narrowest first (harness/precision/).
 enum class Scalar { kFloat, kDouble, kLongDouble, kFloat128 };

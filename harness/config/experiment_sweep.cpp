@@ -382,8 +382,8 @@ const Fields<MethodLists>& MethodFields() {
        {"threads", IntegerList(&MethodLists::threads, 1, kMaxThreads),
         "Threads for one right-hand side. Results are bitwise equal for any number."},
        {"execution", Choices(&MethodLists::executions, NamesOf<Execution>(), "an execution"),
-        "Right-hand sides by the library, or by C code generated from it, without or with fused "
-        "multiply-add (docs/generated-code.md)."},
+        "Right-hand sides by the library, with or without fast paths (general), or by C code "
+        "generated from it, without or with fused multiply-add (docs/operation-counts.md)."},
        {"alpha", NumberSchema(kNotNegative),
         "Gain on velocity violations [1/s]; baumgarte only, together with beta."},
        {"beta", NumberSchema(kNotNegative),

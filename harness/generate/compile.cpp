@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -37,8 +38,9 @@ std::vector<std::string> Compiler() {
 
 }  // namespace
 
-std::string RunCompiler(const std::vector<std::string>& arguments) {
-  std::vector<std::string> words = {"timeout", std::to_string(kCompilerSeconds)};
+std::string RunCompiler(const std::vector<std::string>& arguments, int seconds) {
+  // "timeout" ends it politely, a second later in any case
+  std::vector<std::string> words = {"timeout", "--kill-after=1", std::to_string(seconds)};
   const std::vector<std::string> compiler = Compiler();
   words.insert(words.end(), compiler.begin(), compiler.end());
   words.insert(words.end(), arguments.begin(), arguments.end());
@@ -47,8 +49,8 @@ std::string RunCompiler(const std::vector<std::string>& arguments) {
   if (result.error == 0 && result.status == 127) {
     throw NotCovered(fmt::format("no C compiler: '{}' not found (CC names another)", name));
   }
-  if (result.error == 0 && result.status == 124) {
-    throw NotCovered(fmt::format("{} took more than {} s", name, kCompilerSeconds));
+  if (result.error == 0 && (result.status == 124 || result.status == 128 + SIGKILL)) {
+    throw NotCovered(fmt::format("{} took more than {} s", name, seconds));
   }
   const std::string failure = result.Failure(name);
   if (!failure.empty()) throw NotCovered("C compiler: " + failure);

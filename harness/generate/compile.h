@@ -31,8 +31,8 @@ inline constexpr const char* kCompilerFlags[] = {
 enum class Contraction { kNone, kFused };
 
 /// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no
-/// compiler or if it fails.
-std::string RunCompiler(const std::vector<std::string>& arguments);
+/// compiler, if it fails, or if it takes more than `seconds`.
+std::string RunCompiler(const std::vector<std::string>& arguments, int seconds = kCompilerSeconds);
 
 /// The function that a text defines (print_c.h); it stays loaded until the process ends.
 struct CompiledBranch {

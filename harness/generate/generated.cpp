@@ -23,7 +23,7 @@ constexpr std::size_t kMaxBranches = 8, kMaxModes = 16;
 struct SharedBranches {
   using Codes = std::vector<std::shared_ptr<const Code>>;
   Codes all;
-  std::map<std::vector<double>, Codes> of_mode;
+  std::map<std::pair<Quantity, std::vector<double>>, Codes> of_mode;
 };
 
 /// Calls of compiled functions by runs of one thread, kLanes runs at once.
@@ -178,11 +178,12 @@ GeneratedDerivative<Space>::GeneratedDerivative(const RecordingSubject& subject,
   subject_.with_work = system.size() > system.state_size();
   x_.assign(static_cast<std::size_t>(system.size()) + 1, 0.0);
   FindMode();
-  mode_->misses_left = kFirstMisses;
+  Function& derivative = mode_->functions[Quantity::kDerivative];
+  derivative.misses_left = kFirstMisses;
   x_[0] = mode_->start.t;
   system.ToState(mode_->start.q, mode_->start.u, std::span(x_).subspan(1));
   const harness::ForeignWork work(seconds_);
-  AddBranch();
+  AddBranch(Quantity::kDerivative, derivative);
 }
 
 template <class Space>
@@ -204,21 +205,22 @@ void GeneratedDerivative<Space>::FindMode() {
   key_ = scratch_;
   if (modes_.size() >= kMaxModes && !modes_.contains(key_)) modes_.clear();
   mode_ = &modes_[key_];
-  if (mode_->branches.empty()) {
+  if (branches() == 0) {
     mode_->start = {system_.kinematics().time(), system_.q(), system_.u()};
+    system_.solver().AppendMode(mode_->start.mode);
   }
 }
 
 template <class Space>
-void GeneratedDerivative<Space>::AddBranch() {
+void GeneratedDerivative<Space>::AddBranch(Quantity quantity, Function& function) {
   const auto holds = [&](const std::shared_ptr<const Code>& code) {
     return code->recorded.graph.Holds(code->recorded.graph.Values(x_));
   };
   const auto add = [&](std::shared_ptr<const Code> code) {
-    mode_->branches.insert(mode_->branches.begin(), Branch{std::move(code)});
+    function.branches.insert(function.branches.begin(), Branch{std::move(code)});
   };
   if (lane_ != nullptr && lane_->shared() != nullptr) {
-    const SharedBranches::Codes& shared = lane_->shared()->of_mode[key_];
+    const SharedBranches::Codes& shared = lane_->shared()->of_mode[{quantity, key_}];
     const auto known = std::ranges::find_if(shared, holds);
     if (known != shared.end()) return add(*known);
   }
@@ -233,6 +235,7 @@ void GeneratedDerivative<Space>::AddBranch() {
     described.joints[out.joint].released = out.directions;
     described.joints[out.joint].moving = out.moving;
   }
+  subject_.quantity = quantity;
   RecordedFunction recorded =
       RecordFunction(subject_, mode_->start, x_[0], {x_.begin() + 1, x_.end()});
   for (int i = 0; i < system_.num_state_speeds(); ++i) {
@@ -248,7 +251,7 @@ void GeneratedDerivative<Space>::AddBranch() {
     return known->recorded.key;
   });
   if (code == all.end()) code = all.insert(code, Compile(std::move(recorded), in_lanes_));
-  SharedBranches::Codes& shared = of_mode[key_];
+  SharedBranches::Codes& shared = of_mode[{quantity, key_}];
   if (std::ranges::find(shared, *code) == shared.end()) shared.push_back(*code);
   add(*code);
 }
@@ -276,14 +279,31 @@ bool GeneratedDerivative<Space>::Call(const Code& code, std::span<double> result
 }
 
 template <class Space>
-bool GeneratedDerivative<Space>::CallDerivative(const Code& code, std::span<double> ydot) {
-  return in_lanes_ ? lane_->Call(code, x_, ydot.first(x_.size() - 1)) : Call(code, ydot);
-}
-
-template <class Space>
 void GeneratedDerivative<Space>::SetInputs(double t, std::span<const double> y) {
   x_[0] = t;
   std::ranges::copy(y, x_.begin() + 1);
+}
+
+template <class Space>
+bool GeneratedDerivative<Space>::Compute(Quantity quantity, std::span<double> results) {
+  Function& function = mode_->functions[quantity];
+  auto& [branches, misses_left, attempts] = function;
+  for (std::size_t i = 0; i < branches.size(); ++i) {
+    const Code& code = *branches[i].code;
+    if (!(in_lanes_ ? lane_->Call(code, x_, results) : Call(code, results))) continue;
+    if (i > 0) std::swap(branches[0], branches[i]);
+    return true;
+  }
+  if (quantity == Quantity::kDerivative) ++misses_;
+  if (--misses_left > 0 || branches.size() >= kMaxBranches) return false;
+  misses_left = kFirstMisses << std::min(++attempts, kMaxDoublings);
+  const harness::ForeignWork work(seconds_);
+  try {
+    AddBranch(quantity, function);
+  } catch (const NotCovered&) {
+    return false;  // it counts as a miss
+  }
+  return false;
 }
 
 template <class Space>
@@ -291,20 +311,22 @@ bool GeneratedDerivative<Space>::Evaluate(double t, std::span<const double> y,
                                           std::span<double> ydot) {
   if (y.size() + 1 != x_.size() || ydot.size() < y.size()) return false;
   SetInputs(t, y);
-  auto& [start, branches, misses_left, attempts] = *mode_;
-  for (std::size_t i = 0; i < branches.size(); ++i) {
-    if (!CallDerivative(*branches[i].derivative, ydot)) continue;
-    if (i > 0) std::swap(branches[0], branches[i]);
-    return true;
-  }
-  ++misses_;
-  if (--misses_left > 0 || branches.size() >= kMaxBranches) return false;
-  misses_left = kFirstMisses << std::min(++attempts, kMaxDoublings);
-  const harness::ForeignWork work(seconds_);
-  try {
-    AddBranch();
-  } catch (const NotCovered&) {
-    return false;  // it counts as a miss
+  return Compute(Quantity::kDerivative, ydot.first(y.size()));
+}
+
+template <class Space>
+bool GeneratedDerivative<Space>::Project(ProjectionStep step, double t, std::span<const double> q,
+                                         std::span<const double> u, std::span<double> results) {
+  if (q.size() + u.size() >= x_.size()) return false;
+  SetInputs(t, q);
+  std::ranges::copy(u, x_.begin() + 1 + std::ssize(q));
+  switch (step) {
+    case ProjectionStep::kMismatch:
+      return Compute(Quantity::kMismatch, results);
+    case ProjectionStep::kPositions:
+      return Compute(Quantity::kPositionStep, results);
+    case ProjectionStep::kSpeeds:
+      return Compute(Quantity::kSpeedStep, results);
   }
   return false;
 }
@@ -314,8 +336,8 @@ bool GeneratedDerivative<Space>::Jacobian(double t, std::span<const double> y,
                                           std::span<double> jacobian) {
   if (y.size() + 1 != x_.size()) return false;
   SetInputs(t, y);
-  for (Branch& branch : mode_->branches) {
-    const RecordedFunction& recorded = branch.derivative->recorded;
+  for (Branch& branch : mode_->functions[Quantity::kDerivative].branches) {
+    const RecordedFunction& recorded = branch.code->recorded;
     const bool is_known = branch.jacobian != nullptr || branch.has_no_jacobian;
     if (!is_known && recorded.graph.Holds(recorded.graph.Values(x_))) {
       const harness::ForeignWork work(seconds_);

@@ -1,4 +1,5 @@
-// A system's right-hand side as generated code: recorded, compiled, loaded, called.
+// A system's right-hand side, and the steps of level projection, as generated code: recorded,
+// compiled, loaded, called.
 //
 // A recording is valid if all its comparisons have their recorded outcomes (graph.h). Otherwise the
 // library evaluates; after several such evaluations the branch of the current state is recorded
@@ -47,37 +48,49 @@ class GeneratedDerivative final : public CompiledDerivative {
 
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
   bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) override;
+  bool Project(ProjectionStep step, double t, std::span<const double> q, std::span<const double> u,
+               std::span<double> results) override;
   void StepAccepted() override { FindMode(); }
   std::int64_t misses() const override { return misses_; }
   double seconds() const override { return seconds_; }
 
-  /// Branches that are compiled for the current mode.
-  int branches() const { return static_cast<int>(mode_->branches.size()); }
+  /// Branches of a function that are compiled for the current mode: dy/dt, or a step of level
+  /// projection.
+  int branches(Quantity quantity = Quantity::kDerivative) const {
+    const auto found = mode_->functions.find(quantity);
+    return found == mode_->functions.end() ? 0 : static_cast<int>(found->second.branches.size());
+  }
   /// Modes with branches.
   int modes() const { return static_cast<int>(modes_.size()); }
 
  private:
   /// Makes mode_ the mode of the system.
   void FindMode();
+  struct Function;
   /// Adds the branch at x_, of the batch or recorded.
-  void AddBranch();
+  void AddBranch(Quantity quantity, Function& function);
   /// Puts time and state where compiled functions read them.
   void SetInputs(double t, std::span<const double> y);
+  /// Returns false if no branch of the function is valid at x_. After several such calls that of x_
+  /// is added.
+  bool Compute(Quantity quantity, std::span<double> results);
   bool Call(const Code& code, std::span<double> results);
-  bool CallDerivative(const Code& code, std::span<double> ydot);
   std::shared_ptr<const Code> Compile(RecordedFunction recorded, bool in_lanes);
 
   struct Branch {
-    std::shared_ptr<const Code> derivative;     ///< for lanes if in_lanes_
-    std::shared_ptr<const Code> jacobian = {};  ///< compiled at its first use
+    std::shared_ptr<const Code> code;           ///< for lanes if in_lanes_
+    std::shared_ptr<const Code> jacobian = {};  ///< of dy/dt, compiled at its first use
     bool has_no_jacobian = false;               ///< it is too long
   };
-  using ModeKey = std::vector<double>;  ///< released directions, gains, choices of the solver
-  struct Mode {
-    RecordingStart start;          ///< where the system came into it
+  struct Function {
     std::vector<Branch> branches;  ///< last used branch first
     int misses_left = 0;           ///< until the next branch is recorded
     int attempts = 0;              ///< recordings
+  };
+  using ModeKey = std::vector<double>;  ///< released directions, gains, choices of the solver
+  struct Mode {
+    RecordingStart start;  ///< where the system came into it
+    std::map<Quantity, Function> functions;
   };
 
   RecordingSubject subject_;

@@ -12,6 +12,7 @@
 #include "harness/text/hash.h"
 //
 #include "lagrange/lagrange.h"
+#include "mechanism/formulation/projection_steps.h"
 #include "mechanism/formulation/system.h"
 #include "odca/odca.h"
 #include "reduction/reduction.h"
@@ -51,6 +52,7 @@ class Recorder {
     u_ = Constants(start.u);
     if (system_->Start(start.t, q_, u_) != Outcome::kFinished)
       throw NotCovered("it does not start");
+    if (!start.mode.empty()) system_->solver().TakeMode(start.mode);
     system_->IntegrateWork(subject.with_work);
   }
 
@@ -125,37 +127,45 @@ class Recorder {
         break;
       }
       case Quantity::kCorrection:
-        Correct();
-        values.assign(y.size(), Recorded(0.0));
-        system_->ToState(state_->q(), state_->u(), values);
-        break;
+      case Quantity::kPositionStep:
+      case Quantity::kSpeedStep:
+        return Corrected(y.size());
+      case Quantity::kMismatch: {
+        Correction<Recorded> largest;
+        VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_equations());
+        PositionViolation(kinematics, violation, largest);
+        return {largest.rotation, largest.shift};
+      }
     }
     return values;
   }
 
-  /// One Newton step of level projection (level_position.cpp) from the system's state.
-  void Correct() {
-    state_.emplace(mechanism_, system_->solver());
-    state_->kinematics().SetTime(system_->kinematics().time());
-    state_->kinematics().CountTurnsLike(system_->kinematics());
-    state_->SetPositions(system_->q());
-    state_->SetSpeeds(system_->u());
-    Correction<Recorded> largest;
-    VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_equations());
-    VectorX<Recorded> change = VectorX<Recorded>::Zero(mechanism_.num_u());
-    VectorX<Recorded> q = system_->q(), step = q;
-    const VectorX<Recorded> u = system_->u();
-    if (violation.size() == 0 || change.size() == 0) return;
-    PositionViolation(state_->kinematics(), violation, largest);
-    Require(state_->Correct(violation, change));
-    mechanism_.Rates(q, change, step);
-    q += step;
-    mechanism_.Normalise(q);
-    state_->SetPositions(q);
-    state_->SetSpeeds(u);
-    SpeedViolation(state_->kinematics(), violation);
-    Require(state_->Correct(violation, change));
-    state_->SetSpeeds(u + change);
+  /// The steps of level projection from the system's state: both or one of them.
+  std::vector<Recorded> Corrected(std::size_t size) {
+    FactoredState<Space, Recorded> state(mechanism_, system_->solver());
+    state.Follow(system_->kinematics());
+    state.SetPositions(system_->q());
+    state.SetSpeeds(system_->u());
+    LibrarySteps<Space, Recorded> steps(mechanism_);
+    if (steps.has_constraints() && subject_.quantity != Quantity::kSpeedStep) {
+      Correction<Recorded> largest;
+      Require(steps.Measure(state, largest));
+      Require(steps.Step(state));
+    }
+    if (steps.has_constraints() && subject_.quantity != Quantity::kPositionStep) {
+      Require(steps.CorrectSpeeds(state));
+    }
+    if (subject_.quantity == Quantity::kCorrection) {
+      std::vector<Recorded> values(size, Recorded(0.0));
+      system_->ToState(state.q(), state.u(), values);
+      return values;
+    }
+    if (system_->solver().conditioning().is_regularized) {
+      throw NotCovered("constraints are regularized where a step of the projection is recorded");
+    }
+    const bool is_speeds = subject_.quantity == Quantity::kSpeedStep;
+    const VectorX<Recorded>& result = is_speeds ? state.u() : state.q();
+    return {result.begin(), result.end()};
   }
 
   static void Require(Outcome outcome) {
@@ -201,7 +211,6 @@ class Recorder {
   const RecordingSubject& subject_;
   Mechanism<Space, Recorded> mechanism_;
   std::unique_ptr<System<Space, Recorded>> system_;
-  std::optional<FactoredState<Space, Recorded>> state_;
   VectorX<Recorded> q_, u_;
 };
 

@@ -27,6 +27,11 @@ enum class Quantity {
   kPoses,
   kViolation,   ///< of each constraint row: of positions [m, rad], then of speeds [m/s, rad/s]
   kCorrection,  ///< the state after one Newton step toward the constraints, positions then speeds
+  // Steps of level projection (mechanism/formulation/compiled_derivative.h), where constraints are
+  // regular.
+  kMismatch,
+  kPositionStep,
+  kSpeedStep,
 };
 
 /// A formulation of a mechanism. `options.general` is always taken as set.
@@ -54,6 +59,8 @@ struct RecordingSubject {
 struct RecordingStart {
   double t = 0.0;
   Eigen::VectorXd q, u;
+  /// Choices of its solver before (ConstraintSolver::AppendMode()); empty: it chooses here.
+  std::vector<int> mode = {};
 };
 
 /// Nodes of intermediate results on the way to dy/dt. A stage depends on earlier ones.

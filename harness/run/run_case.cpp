@@ -237,9 +237,11 @@ Record RunCase(const Experiment& experiment, const Case& entry, const Reference*
 
 namespace {
 
-/// Returns a hash of the last state: equal hashes mean equal runs.
+/// Returns a hash of the last state, without the sign of zeros: equal hashes mean equal runs.
 std::string StateHash(std::span<const double> y) {
-  return Fnv1a({reinterpret_cast<const char*>(y.data()), y.size_bytes()});
+  std::vector<double> numbers(y.begin(), y.end());
+  for (double& number : numbers) number += 0.0;
+  return Fnv1a({reinterpret_cast<const char*>(numbers.data()), y.size_bytes()});
 }
 
 template <class Space>
@@ -297,7 +299,7 @@ class Runner {
     for (const auto& observer : observers_) observer->Trace(traces);
     WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
                 run.record);
-    if (case_.method.execution != Execution::kLibrary) {
+    if (IsGenerated(case_.method.execution)) {
       run.record.Set("library_evaluations", library_evaluations_);
       run.record.Set("compile_s", compile_s_);
     }

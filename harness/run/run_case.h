@@ -66,7 +66,7 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
 template <class Space>
 void GiveExecution(const Method& method, const MechanismDescription& description,
                    System<Space, double>& system, const void* mechanism = nullptr) {
-  if (method.execution == Execution::kLibrary) return;
+  if (!IsGenerated(method.execution)) return;
   system.UseCompiled(std::make_unique<generate::GeneratedDerivative<Space>>(
       generate::RecordingSubject{.description = description,
                                  .coordinates = method.coordinates,

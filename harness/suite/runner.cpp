@@ -143,7 +143,7 @@ Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
     return std::vector<Record>{std::move(record)};
   };
   ProcessLimits limits = LimitsOfRuns(entry.limits, runs * entry.method.threads);
-  if (entry.method.execution != Execution::kLibrary) limits.cpu_s += kRecording_s;
+  if (IsGenerated(entry.method.execution)) limits.cpu_s += kRecording_s;
   // of an ensemble the members share calls; fused code may have other bits in lanes than alone
   const bool has_lanes = entry.method.execution == Execution::kGenerated && runs == 1;
   return {

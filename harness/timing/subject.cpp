@@ -37,6 +37,11 @@ BenchmarkState ComputeStateIn(const MechanismDescription& description, Coordinat
     const auto formulation = MakeFormulation<Space>(method, mechanism);
     state.outcome = formulation->Start(0.0, start.q, start.u);
     if (state.outcome != Outcome::kFinished) return state;
+    if (formulation->state_size() == 0) {
+      state.outcome = Outcome::kInexpressible;
+      state.message = "prescribed motions leave no state to integrate";
+      return state;
+    }
     std::vector<double> y(formulation->state_size());
     formulation->ToState(start.q, start.u, y);
     IntegratorOptions options;

@@ -154,7 +154,9 @@ class SubjectIn final : public Subject {
   void Reset() {
     formulation_ = MakeFormulation<Space>(case_.method, mechanism_);
     formulation_->Start(0.0, start_.q, start_.u);
-    y_.resize(formulation_->state_size());
+    // where prescribed motions leave no state, only the work is integrated
+    formulation_->IntegrateWork(formulation_->state_size() == 0);
+    y_.assign(static_cast<std::size_t>(formulation_->size()), 0.0);
     ydot_.resize(y_.size());
     formulation_->ToState(start_.q, start_.u, y_);
     if (!peer_) GiveExecution<Space>(case_.method, description_, *formulation_, &result_);

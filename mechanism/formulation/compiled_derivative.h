@@ -1,10 +1,18 @@
-// A right-hand side compiled ahead of time for one system (harness/generate/).
+// A right-hand side compiled ahead of time for one system (harness/generate/), and the steps of
+// level projection.
 #pragma once
 
 #include <cstdint>
 #include <span>
 
 namespace loopbench {
+
+/// Functions of level projection at positions and speeds (level_position.cpp).
+enum class ProjectionStep {
+  kMismatch,   ///< largest violations of rotations [rad] and of points [m]
+  kPositions,  ///< positions after one Newton step
+  kSpeeds,     ///< speeds after their step
+};
 
 class CompiledDerivative {
  public:
@@ -17,6 +25,11 @@ class CompiledDerivative {
   /// Writes d(dy/dt)/dy of the first `jacobian.size() / y.size()` numbers of y, column after
   /// column. Returns false as Evaluate() does, and if it cannot be compiled.
   virtual bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) = 0;
+
+  /// Writes the results of a step at time t, `q` and all speeds `u`, as the library computes them
+  /// where constraints are regular. Returns false as Evaluate() does.
+  virtual bool Project(ProjectionStep step, double t, std::span<const double> q,
+                       std::span<const double> u, std::span<double> results) = 0;
 
   /// Notes an accepted step, after which the mode of the system may be another.
   virtual void StepAccepted() = 0;

@@ -124,6 +124,8 @@ class ConstraintSolver {
   virtual bool Review(const Kinematics<Space, S>& kinematics);
   /// Appends the choices that make the mode, if there are any.
   virtual void AppendMode(std::vector<int>&) const {}
+  /// Makes these choices of a solver of the same mechanism, after Start().
+  virtual void TakeMode(std::span<const int>) {}
 
   /// Returns details of a Factor() that ended as kSingular, for messages; "" (the default) if none.
   virtual std::string WhySingular() const { return {}; }

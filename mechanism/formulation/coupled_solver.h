@@ -50,6 +50,7 @@ class CoupledSolver final : public ConstraintSolver<Space, S> {
     return inner_->Review(kinematics);
   }
   void AppendMode(std::vector<int>& mode) const override { inner_->AppendMode(mode); }
+  void TakeMode(std::span<const int> mode) override { inner_->TakeMode(mode); }
   std::string WhySingular() const override;
   std::vector<NamedCount> Counters() const override { return inner_->Counters(); }
 

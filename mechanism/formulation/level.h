@@ -18,6 +18,7 @@
 #include <optional>
 #include <utility>
 
+#include "mechanism/formulation/compiled_derivative.h"
 #include "mechanism/formulation/factored_state.h"
 #include "mechanism/formulation/options.h"
 
@@ -53,6 +54,10 @@ class Level {
   virtual bool Project(ConstraintSolver<Space, S>&, std::span<S> /*q*/, std::span<S> /*u*/) {
     return false;
   }
+
+  /// Projects the state by compiled steps, SetSpeeds() being done. Returns false (the default),
+  /// with the state as it was, if there are none for its branch: Accept() is then called.
+  virtual bool Project(CompiledDerivative&, FactoredState<Space, S>&) { return false; }
 
   /// Returns the right-hand side's type if a solver may have a fast path for it: level acceleration
   /// or level velocity. Otherwise the right-hand side is computed from its parts.

@@ -1,14 +1,61 @@
 // Level projection: after each accepted step Newton's method on the position violation, then one
 // step on the velocity violation.
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <span>
+#include <type_traits>
 
 #include "mechanism/algebra/instantiate.h"
 #include "mechanism/formulation/level.h"
+#include "mechanism/formulation/projection_steps.h"
 
 namespace loopbench {
 
 namespace {
+
+/// The steps of projection_steps.h by compiled functions: kInexpressible where one is not compiled.
+/// The state changes last.
+template <class Space>
+class CompiledSteps {
+ public:
+  CompiledSteps(CompiledDerivative& compiled, const FactoredState<Space, double>& state)
+      : compiled_(compiled), q_(state.q()), before_(q_), u_(state.u()) {}
+
+  Outcome Measure(const FactoredState<Space, double>& state, Correction<double>& now) {
+    std::array<double, 2> sizes;
+    if (!Project(ProjectionStep::kMismatch, state, sizes)) return Outcome::kInexpressible;
+    now.rotation = sizes[0];
+    now.shift = sizes[1];
+    return Outcome::kFinished;
+  }
+  Outcome Step(const FactoredState<Space, double>& state) {
+    before_ = q_;
+    return Project(ProjectionStep::kPositions, state, Span(q_)) ? Outcome::kFinished
+                                                                : Outcome::kInexpressible;
+  }
+  void Undo(const FactoredState<Space, double>&) { q_.swap(before_); }
+  Outcome CorrectSpeeds(FactoredState<Space, double>& state) {
+    if (!Project(ProjectionStep::kSpeeds, state, Span(u_))) return Outcome::kInexpressible;
+    state.SetPositions(q_);
+    state.SetSpeeds(u_);
+    return Outcome::kFinished;
+  }
+
+ private:
+  static std::span<double> Span(VectorX<double>& x) {
+    return {x.data(), static_cast<std::size_t>(x.size())};
+  }
+  bool Project(ProjectionStep step, const FactoredState<Space, double>& state,
+               std::span<double> results) {
+    const VectorX<double>& u = state.u();
+    return compiled_.Project(step, state.kinematics().time(), Span(q_),
+                             {u.data(), static_cast<std::size_t>(u.size())}, results);
+  }
+
+  CompiledDerivative& compiled_;
+  VectorX<double> q_, before_, u_;
+};
 
 template <class Space, class S>
 class PositionLevel final : public Level<Space, S> {
@@ -17,78 +64,59 @@ class PositionLevel final : public Level<Space, S> {
       // round-off of poses that pass through all bodies
       : goal_(S(4) * std::numeric_limits<S>::epsilon() * S(mechanism.num_bodies())),
         length_(mechanism.length()),
-        violation_(VectorX<S>::Zero(mechanism.num_equations())),
-        change_(VectorX<S>::Zero(mechanism.num_u())),
-        q_(VectorX<S>::Zero(mechanism.num_q())),
-        moved_(q_),
-        step_(q_),
-        u_(change_) {
+        steps_(mechanism) {
     this->right_hand_side_ = SpeedsUsed::kGiven;
   }
 
   bool Project(ConstraintSolver<Space, S>& solver, std::span<S> q, std::span<S> u) override {
-    if (!has_constraints()) return false;
+    if (!steps_.has_constraints()) return false;
     const auto correction = solver.Project(q, u, goal_ * length_);
     if (correction) this->correction_ = *correction;
     return correction.has_value();
   }
 
+  bool Project(CompiledDerivative& compiled, FactoredState<Space, S>& state) override {
+    if constexpr (std::is_same_v<S, double>) {
+      CompiledSteps<Space> steps(compiled, state);
+      return steps_.has_constraints() && Iterate(steps, state) == Outcome::kFinished;
+    }
+    return false;
+  }
+
   Accepted Accept(FactoredState<Space, S>& state, S) override {
-    if (!has_constraints()) return Accepted::kAsItWas;
-    Outcome outcome = ProjectPositions(state);
-    if (outcome == Outcome::kFinished) outcome = ProjectSpeeds(state);
+    if (!steps_.has_constraints()) return Accepted::kAsItWas;
+    const Outcome outcome = Iterate(steps_, state);
     const bool finite = state.q().allFinite() && state.u().allFinite();
     return outcome == Outcome::kFinished && finite ? Accepted::kProjected : Accepted::kFailed;
   }
 
  private:
-  bool has_constraints() const { return violation_.size() > 0 && change_.size() > 0; }
-
-  Outcome ProjectPositions(FactoredState<Space, S>& state) {
-    const Kinematics<Space, S>& kinematics = state.kinematics();
-    const Mechanism<Space, S>& mechanism = state.mechanism();
+  /// Newton's method on positions, then one step on speeds.
+  Outcome Iterate(auto& steps, FactoredState<Space, S>& state) {
     const auto size = [&](const Correction<S>& c) {
       return std::max(c.rotation, c.shift / length_);
     };
     Correction<S> now;
-    PositionViolation(kinematics, violation_, now);
-    Correction<S>& correction = Level<Space, S>::correction_;
-    correction = now;
+    Outcome outcome = steps.Measure(state, now);
+    Correction<S> correction = now;
     for (int i = 0; i < kMaxProjections && size(now) > goal_; ++i) {
-      if (const Outcome outcome = state.Correct(violation_, change_);
-          outcome != Outcome::kFinished) {
-        return outcome;
-      }
       const S before = size(now);
-      q_ = state.q();
-      mechanism.Rates(q_, change_, step_);
-      moved_ = q_ + step_;
-      mechanism.Normalise(moved_);
-      state.SetPositions(moved_);
-      PositionViolation(kinematics, violation_, now);
+      if (outcome == Outcome::kFinished) outcome = steps.Step(state);
+      if (outcome == Outcome::kFinished) outcome = steps.Measure(state, now);
+      if (outcome != Outcome::kFinished) return outcome;
       ++correction.iterations;
       if (!(size(now) < before)) {  // round-off, or a regularized direction: unchanged
-        state.SetPositions(q_);
+        steps.Undo(state);
         break;
       }
     }
-    return Outcome::kFinished;
-  }
-
-  Outcome ProjectSpeeds(FactoredState<Space, S>& state) {
-    state.SetSpeeds(state.u());
-    SpeedViolation(state.kinematics(), violation_);
-    if (const Outcome outcome = state.Correct(violation_, change_); outcome != Outcome::kFinished) {
-      return outcome;
-    }
-    u_ = state.u() + change_;
-    state.SetSpeeds(u_);
-    return Outcome::kFinished;
+    this->correction_ = correction;
+    return outcome == Outcome::kFinished ? steps.CorrectSpeeds(state) : outcome;
   }
 
   S goal_;  ///< of rotations [rad], and of shifts over length_ [m]
   S length_;
-  VectorX<S> violation_, change_, q_, moved_, step_, u_;
+  LibrarySteps<Space, S> steps_;
 };
 
 }  // namespace

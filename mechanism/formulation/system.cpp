@@ -203,8 +203,7 @@ bool System<Space, S>::MayTakeShortCut() const {
 template <class Space, class S>
 Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydot) {
   if constexpr (std::is_same_v<S, double>) {
-    const bool stays = drives_ == nullptr || !drives_->has_left_branch();
-    if (compiled_ != nullptr && stays) {
+    if (compiled_ != nullptr && StaysOnBranch()) {
       by_short_cut_ = false;
       if (!compiled_->Evaluate(t, y, ydot)) return Examine(t, y, ydot);
       derivative_version_ = -1;
@@ -294,7 +293,7 @@ bool System<Space, S>::ReplaceReleased() {
 
 template <class Space, class S>
 bool System<Space, S>::BeginStep(S t, std::span<S> y) {
-  const bool is_projected =
+  bool is_projected =
       MayTakeShortCut() && level_->Project(*solver_, y.first(mechanism_.num_q()),
                                            y.subspan(mechanism_.num_q(), mechanism_.num_u()));
   if (NeedsNoReview() && (is_projected || level_->takes_steps_as_they_are())) {
@@ -304,6 +303,9 @@ bool System<Space, S>::BeginStep(S t, std::span<S> y) {
   step_end_version_ = kinematics().position_version();
   if (Look(t, y) != Outcome::kFinished) return false;  // the next evaluation gives the reason
   const S h = t - accepted_t_;
+  if (!is_projected && compiled_ != nullptr && StaysOnBranch()) {
+    is_projected = level_->Project(*compiled_, state_);
+  }
   if (AtPassage() && !is_projected && mechanism_.num_u() > 0) {
     FactorBranch();
     // the remaining constraints of a passage must hold positions, too

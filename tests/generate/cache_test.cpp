@@ -1,7 +1,11 @@
 // The compiler and the folder of compiled code: what is found there is refused unless it is safe.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -133,6 +137,59 @@ TEST_F(CacheTest, ACompilerThatIsMissingOrFailsIsNamed) {
   EXPECT_NE(Refusal(Text(5)).find("false failed with exit code 1"), std::string::npos);
   ::unsetenv("CC");
   EXPECT_NE(Refusal("this is no C\n").find("failed with exit code 1"), std::string::npos);
+}
+
+/// It ignores the polite signal, too.
+TEST_F(CacheTest, ACompilerThatHangsIsEndedAndNamed) {
+  const fs::path script = folder_.path() / "hangs";
+  std::ofstream(script) << "#!/bin/sh\ntrap '' TERM\nwhile :; do sleep 0.1; done\n";
+  fs::permissions(script, fs::perms::owner_all);
+  ::setenv("CC", script.c_str(), 1);
+  try {
+    RunCompiler({"--version"}, 1);
+    ADD_FAILURE() << "ended by itself";
+  } catch (const NotCovered& why) {
+    EXPECT_EQ(std::string(why.what()), script.string() + " took more than 1 s");
+  }
+}
+
+/// The library fits, its checksum behind it does not.
+TEST_F(CacheTest, OnAFullDiskNothingIsKeptAndTheCodeRuns) {
+  CompileText(Text(10));
+  const fs::path kept = Kept().front();
+  rlimit before = {};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit full = before;
+  full.rlim_cur = fs::file_size(kept) - 1;
+  const auto ignored = std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &full), 0);
+  const CompiledBranch branch = CompileText(Text(11));
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, ignored);
+  EXPECT_EQ(branch.room, 11);
+  EXPECT_EQ(Kept(), std::vector{kept});
+}
+
+TEST_F(CacheTest, ProcessesThatCompileTheSameAtOnceKeepOneFile) {
+  std::vector<pid_t> children;
+  for (int i = 0; i < 6; ++i) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const CompiledBranch branch = CompileText(Text(12));
+      const double x = 3.0;
+      double y = 0.0;
+      std::_Exit(branch.function(&x, nullptr, &y, nullptr) == 1 && y == 6.0 ? 0 : 1);
+    }
+    children.push_back(child);
+  }
+  for (const pid_t child : children) {
+    int status = -1;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0);
+  }
+  ASSERT_EQ(Kept().size(), 1u);
+  EXPECT_EQ(Kept().front().extension(), ".so");
+  EXPECT_EQ(CompileText(Text(12)).room, 12);  // this process finds it whole
 }
 
 }  // namespace

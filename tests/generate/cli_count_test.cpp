@@ -1,4 +1,5 @@
 // count, and experiments with generated execution, as users call them.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,6 +79,29 @@ TEST_F(CountTest, FamiliesHaveExponentsAndCrossovers) {
   ExpectEnding(Call("count --family chain"), 2, {"found no --sizes", "3 to 1000000"});
   ExpectEnding(Call("count --family chain --sizes 2"), 2, {"found 2", "bars of a closed chain"});
   ExpectEnding(Call("count --sizes 2"), 2, {"--family"});
+}
+
+/// Reduction of a serial arm in space contains Newton-Euler, composite rigid bodies, and a solution
+/// by Cholesky. Published numbers of operations of general arms with revolute joints are upper
+/// bounds: Luh, Walker and Paul (1980); Walker and Orin (1982), method 3; a symmetric solution.
+TEST_F(CountTest, SerialArmsNeedFewerOperationsThanPublishedAlgorithms) {
+  ExpectEnding(
+      Call("count --family arm --sizes 2,3,6,10,20,40 --formulation reduction --enforcement "
+           "acceleration --coordinates joint --format jsonl --out arms.jsonl"),
+      0, {});
+  int rows = 0;
+  for (const Record& row : ReadRecords(folder_ / "arms.jsonl")) {
+    const auto number = [&](const char* key) { return std::get<std::int64_t>(*row.Find(key)); };
+    const std::int64_t n = number("bodies");
+    EXPECT_LE(number("multiplications"),
+              (150 * n - 48) + (12 * n * n + 56 * n - 27) + (n * n * n + 9 * n * n + 2 * n) / 6)
+        << n;
+    EXPECT_LE(number("additions"),
+              (131 * n - 48) + (7 * n * n + 67 * n - 53) + (n * n * n + 6 * n * n - 7 * n) / 6)
+        << n;
+    ++rows;
+  }
+  EXPECT_EQ(rows, 6);
 }
 
 TEST_F(CountTest, PartsOfACountAddUp) {
@@ -160,6 +184,35 @@ TEST_F(CountTest, GeneratedExecutionIsAFactorOfExperiments) {
   EXPECT_NE(table.text.find("odca,,finished,,"), std::string::npos) << table.text;
 }
 
+/// Whole runs have equal bits, except for the sign of zeros, in general and generated code.
+TEST_F(CountTest, GeneratedRunsHaveTheBitsOfGeneralOnes) {
+  Write("bits.json", fmt::format(R"({{
+    "name": "bits", "tolerances": [1e-8],
+    "problems": [{{"mechanism": "{0}/andrews-squeezer.json", "horizon": 0.01}},
+                 {{"mechanism": "{0}/bennett.json", "horizon": 0.3}},
+                 {{"mechanism": "{0}/flyball-governor.json", "horizon": 0.1}},
+                 {{"mechanism": "{0}/slider-crank.json", "horizon": 0.5}}],
+    "methods": [{{"formulation": ["odca", "lagrange", "reduction"],
+                 "enforcement": ["acceleration", "velocity", "projection"],
+                 "execution": ["general", "generated"]}}],
+    "timing": {{"repeats": 0}}}})",
+                                 (kConfigs / "mechanisms").string()));
+  Call("run bits.json --jobs 2 --out out");
+  std::map<std::string, std::string> hashes;
+  int compared = 0;
+  for (const Record& row : ReadRecords(folder_ / "out")) {
+    if (row.Text("outcome") == "unsupported") continue;
+    EXPECT_EQ(row.Text("outcome"), "finished") << row.Text("message");
+    const std::string key =
+        row.Text("mechanism") + " " + row.Text("formulation") + " " + row.Text("enforcement");
+    const auto [other, is_first] = hashes.emplace(key, row.Text("state_hash"));
+    if (is_first) continue;
+    EXPECT_EQ(other->second, row.Text("state_hash")) << key;
+    ++compared;
+  }
+  EXPECT_GE(compared, 33);
+}
+
 /// Projections stay in the library; drift at level projection is round-off.
 TEST_F(CountTest, GeneratedRightHandSidesServeLevelPosition) {
   Write("position.json", R"({
@@ -174,6 +227,31 @@ TEST_F(CountTest, GeneratedRightHandSidesServeLevelPosition) {
     EXPECT_LT(std::get<double>(*row.Find("drift_position_max")), 1e-14);
     EXPECT_LE(std::get<std::int64_t>(*row.Find("library_evaluations")), 3);
   }
+}
+
+/// A pendulum whose angle is prescribed: the work of its drive is all that is integrated.
+TEST_F(CountTest, AMechanismWithoutStateRunsInEachExecution) {
+  Write("driven.json", R"({
+    "name": "driven", "space": "planar", "gravity": [0.0, -9.81], "ground": {"points": {"O": [0.0, 0.0]}},
+    "bodies": [{"name": "bar", "mass": 1.3, "inertia": 0.7, "points": {"A": [0.6, 0.0]}}],
+    "joints": [{"name": "J", "type": "revolute", "from": {"body": "ground", "at": "O"},
+                "to": {"body": "bar", "at": "A"},
+                "motion": {"type": "harmonic", "amplitude": 0.5, "omega": 2.0}}]})");
+  Write("run.json", R"({
+    "name": "run", "tolerances": [1e-8], "problems": [{"mechanism": "driven.json", "horizon": 0.5}],
+    "methods": [{"formulation": ["odca", "lagrange", "reduction"],
+                 "enforcement": ["acceleration", "projection"],
+                 "execution": ["library", "general", "generated"]}],
+    "timing": {"repeats": 1}})");
+  ExpectEnding(Call("run run.json --out out"), 0, {});
+  int rows = 0;
+  for (const Record& row : ReadRecords(folder_ / "out")) {
+    EXPECT_EQ(row.Text("outcome"), "finished") << row.Text("message");
+    ++rows;
+  }
+  EXPECT_EQ(rows, 2 * 18);
+  ExpectEnding(Call("count driven.json --coordinates joint"), 2,
+               {"not recorded", "prescribed motions leave no state to integrate"});
 }
 
 TEST_F(CountTest, WhatIsNotGeneratedEndsByName) {

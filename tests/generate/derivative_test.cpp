@@ -168,18 +168,49 @@ TEST(CountsTest, APendulumHasTheOperationsThatAHandCounts) {
   }
 }
 
-/// O-DCA has no sum whose order Eigen chooses: bits are those of double.
-TEST(RecordedFunctionTest, ODcaOfTheFourBarHasTheBitsOfTheLibraryElsewhereToo) {
-  for (const Enforcement level : kLevels) {
-    Library<Planar> library(Shipped("four-bar"), "odca", level);
-    const RecordedFunction recorded = RecordFunction(library.subject(), library.start());
-    const std::vector<double> y = library.Near(1e-3);
-    std::vector<double> x = {0.5};
-    x.insert(x.end(), y.begin(), y.end());
-    bool ok = true;
-    ExpectSameBits(Evaluate(recorded, x, &ok), library.Examine(0.5, y));
-    EXPECT_TRUE(ok) << ToString(level);
-  }
+/// One join of the paper: two bars P and Q that float in the plane, and the pin between them. With
+/// r from a centre of mass to the pin, c is +-[-r_y, 1, 0] and +-[r_x, 0, 1]. By hand, by
+/// equations:
+///
+///   angle and speed of Q                          2 +
+///   c, s                                          4 sines
+///   r of both, along the bars                     4 *
+///   n = w x (w x r) of both                       8 *
+///   (12)   c0 = n_Q - n_P                         2 +
+///   (1-4)  r_y / I, r_x / I of both               4 *          1 / I and 1 / m are constants
+///   (16)   r_y (r_y / I) + 1 / m, r_x (r_y / I),
+///          r_x (r_x / I) + 1 / m of both          6 *, 4 +
+///          X, the sum of both                     3 +
+///   (17)   X = L L^T                              2 sqrt, 2 /, 2 *, 1 +
+///   (21)   s = L^-1 c0                            3 *, 1 +
+///   (17)   phi = -L^-T s                          3 *, 1 +
+///   (18)   moments c phi on both                  4 *, 2 +
+///   (1-4)  acceleration of P, angular one of Q    4 *
+///   (7)    udot of the pin                        1 +
+///
+/// The longest path: angle, sine, r (3); r_y / I, its product, X (3, 7); the first pivot, its root
+/// and quotient, L_21, its square, the second pivot, root, quotient (14); s_2, phi_2, phi_1 (19);
+/// the moment (21), / I, udot.
+TEST(CountsTest, OneJoinHasTheOperationsThatAHandCounts) {
+  MechanismDescription bars;
+  bars.gravity.setZero();
+  bars.bodies.push_back(Bar("P", 1.4, 3.0, 0.7));
+  bars.bodies.push_back(Bar("Q", 1.2, 1.7, 0.4));
+  JointDescription free;  // at the centre of mass of P
+  free.name = "free";
+  free.type = JointType::kFree;
+  free.to = {1, {0.7, 0.0, 0.0}, Eigen::Vector3d::Zero()};
+  bars.joints = {free, Revolute("pin", 1, {1.4, 0.0, 0.0}, 2, {0.0, 0.0, 0.0})};
+  const RecordingStart start = {.q = Eigen::Vector4d(0.3, 0.2, 0.1, 0.7),
+                                .u = Eigen::Vector4d(0.5, 0.2, 0.3, 1.1)};
+  FormulationOptions options;
+  options.solver = SolverKind::kAsPublished;
+  const MethodCounts counts =
+      CountsOf(RecordFunction({.description = bars, .options = options}, start));
+  const OperationCounts by_hand = {
+      .additions = 17, .multiplications = 38, .divisions = 2, .roots = 2, .sines = 4};
+  EXPECT_EQ(counts.result, by_hand);
+  EXPECT_EQ(counts.depth, 23);
 }
 
 /// Calls see(library, name) for all shipped mechanisms, formulations and recorded levels.
@@ -200,11 +231,12 @@ void ForAllShipped(Coordinates set, auto see) {
   }
 }
 
-/// Elsewhere, where every comparison has its outcome, a graph gives the bits of the text itself.
+/// Elsewhere, where every comparison has its outcome, a graph gives the bits of the text itself,
+/// both in double and in the recording scalar.
 struct BitsOfTheText {
   int compared = 0, branched = 0, refused = 0;
 
-  void operator()(const auto& library, const std::string& what) {
+  void operator()(auto&& library, const std::string& what) {
     SCOPED_TRACE(what);
     const std::vector<double> y = library.Near(1e-6);
     std::vector<double> x = {0.01};
@@ -219,6 +251,7 @@ struct BitsOfTheText {
       ExpectSameBits(Evaluate(keeping, x, &ok), found);
       EXPECT_TRUE(ok);
       ExpectSameBits(found, RecordFunction(library.subject(), library.start(), 0.01, y).numbers);
+      ExpectSameBits(found, library.Examine(0.01, y));
     } catch (const NotCovered& why) {
       const std::string reason = why.what();
       EXPECT_TRUE(reason.find("factorisation that iterates") != std::string::npos ||
@@ -476,39 +509,76 @@ TEST(GeneratedDerivativeTest, WhereAComparisonFlipsTheLibraryEvaluatesWithEqualR
   EXPECT_EQ(system.compiled()->misses(), 1);
 }
 
-/// Reduction exchanges its partition several times in a turn of the crank. Eigen's sums in double
-/// have another order than recorded ones: 1e-12 of the largest number for some hundred roundings.
+/// Reduction exchanges its partition several times in a turn of the crank; Bennett's linkage
+/// releases other directions.
 TEST(GeneratedDerivativeTest, AModeKeepsItsBranchesWhileAnotherIsInUse) {
-  Library<Spatial> library(Shipped("spatial-four-bar"), "reduction", Enforcement::kPosition);
-  Library<Spatial> other(Shipped("spatial-four-bar"), "reduction", Enforcement::kPosition);
-  System<Spatial, double>&system = library.system(), &uncompiled = other.system();
-  system.UseCompiled(std::make_unique<GeneratedDerivative<Spatial>>(library.subject(), system));
-  std::vector<double> y = library.y(), at(y.size()), k(y.size()), sum(y.size()), expected(y.size());
-  constexpr double kStep = 5e-3;
-  for (int step = 0; step < 2000; ++step) {
-    // Runge and Kutta's method of order 4
-    std::ranges::fill(sum, 0.0);
-    for (const auto& [share, weight] : {std::pair{0.0, 1.0}, {0.5, 2.0}, {0.5, 2.0}, {1.0, 1.0}}) {
-      for (std::size_t i = 0; i < y.size(); ++i) at[i] = y[i] + share * kStep * k[i];
-      const double t = kStep * (step + share);
-      ASSERT_EQ(system.Derivative(t, at, k), Outcome::kFinished);
-      ASSERT_EQ(uncompiled.Derivative(t, at, expected), Outcome::kFinished);
-      const double largest =
-          std::abs(*std::ranges::max_element(expected, {}, [](double x) { return std::abs(x); }));
-      for (std::size_t i = 0; i < y.size(); ++i) {
-        ASSERT_NEAR(k[i], expected[i], 1e-12 * largest) << step;
-        sum[i] += weight * k[i];
+  for (const auto& [name, level] : {std::pair{"spatial-four-bar", Enforcement::kPosition},
+                                    {"bennett", Enforcement::kAcceleration}}) {
+    SCOPED_TRACE(name);
+    Library<Spatial> library(Shipped(name), "reduction", level);
+    Library<Spatial> other(Shipped(name), "reduction", level);
+    System<Spatial, double>&system = library.system(), &uncompiled = other.system();
+    system.UseCompiled(std::make_unique<GeneratedDerivative<Spatial>>(library.subject(), system));
+    std::vector<double> y = library.y(), at(y.size()), k(y.size()), sum(y.size()),
+                        expected(y.size());
+    constexpr double kStep = 5e-3;
+    for (int step = 0; step < 2000; ++step) {
+      // Runge and Kutta's method of order 4
+      std::ranges::fill(sum, 0.0);
+      for (const auto& [share, weight] :
+           {std::pair{0.0, 1.0}, {0.5, 2.0}, {0.5, 2.0}, {1.0, 1.0}}) {
+        for (std::size_t i = 0; i < y.size(); ++i) at[i] = y[i] + share * kStep * k[i];
+        const double t = kStep * (step + share);
+        ASSERT_EQ(system.Derivative(t, at, k), Outcome::kFinished);
+        ASSERT_EQ(uncompiled.Derivative(t, at, expected), Outcome::kFinished);
+        ASSERT_TRUE(std::ranges::equal(k, expected)) << step;
+        for (std::size_t i = 0; i < y.size(); ++i) sum[i] += weight * k[i];
       }
+      for (std::size_t i = 0; i < y.size(); ++i) y[i] += kStep / 6.0 * sum[i];
+      std::vector<double> same = y;
+      system.BeginStep(kStep * (step + 1), y);
+      uncompiled.BeginStep(kStep * (step + 1), same);
+      ASSERT_TRUE(std::ranges::equal(y, same)) << step;
     }
-    for (std::size_t i = 0; i < y.size(); ++i) y[i] += kStep / 6.0 * sum[i];
-    std::vector<double> same = y;
-    system.BeginStep(kStep * (step + 1), y);
-    uncompiled.BeginStep(kStep * (step + 1), same);
+    const auto& generated = dynamic_cast<const GeneratedDerivative<Spatial>&>(*system.compiled());
+    EXPECT_EQ(system.diagnostics().mode_changes, uncompiled.diagnostics().mode_changes);
+    EXPECT_GT(generated.modes(), 1);
+    EXPECT_LT(generated.misses(), 8000 / 20);
   }
-  const auto& generated = dynamic_cast<const GeneratedDerivative<Spatial>&>(*system.compiled());
-  EXPECT_EQ(system.diagnostics().mode_changes, uncompiled.diagnostics().mode_changes);
-  EXPECT_GT(system.diagnostics().mode_changes, 4 * generated.modes());
-  EXPECT_LT(generated.misses(), 8000 / 20);
+}
+
+/// Explicit Euler's steps, whose drift needs several Newton steps each.
+template <class Space>
+void ExpectBitsOfProjections(const std::string& name) {
+  for (const std::string& formulation : kFormulations) {
+    SCOPED_TRACE(name + " " + formulation);
+    Library<Space> library(Shipped(name), formulation, Enforcement::kPosition);
+    Library<Space> other(Shipped(name), formulation, Enforcement::kPosition);
+    System<Space, double>&system = library.system(), &uncompiled = other.system();
+    system.UseCompiled(std::make_unique<GeneratedDerivative<Space>>(library.subject(), system));
+    std::vector<double> y = library.y(), same = y, rates(y.size());
+    constexpr double kStep = 1e-3;
+    const auto step = [&](System<Space, double>& by, int k, std::vector<double>& state) {
+      ASSERT_EQ(by.Derivative(kStep * k, state, rates), Outcome::kFinished);
+      for (std::size_t i = 0; i < state.size(); ++i) state[i] += kStep * rates[i];
+      ASSERT_TRUE(by.BeginStep(kStep * (k + 1), state));
+    };
+    for (int k = 0; k < 100; ++k) {
+      step(system, k, y);
+      step(uncompiled, k, same);
+      ExpectSameBits(y, same);
+      EXPECT_EQ(system.level().correction().iterations, uncompiled.level().correction().iterations);
+    }
+    const auto& generated = dynamic_cast<const GeneratedDerivative<Space>&>(*system.compiled());
+    EXPECT_GT(generated.branches(Quantity::kMismatch), 0);
+    EXPECT_GT(generated.branches(Quantity::kPositionStep), 0);
+    EXPECT_GT(generated.branches(Quantity::kSpeedStep), 0);
+  }
+}
+
+TEST(GeneratedDerivativeTest, StepsOfLevelProjectionHaveTheBitsOfTheLibrary) {
+  ExpectBitsOfProjections<Planar>("seven-bar");
+  ExpectBitsOfProjections<Spatial>("bennett");
 }
 
 /// More runs than lanes, with three sets of masses. Tables of torques differ where the first branch

@@ -210,5 +210,28 @@ TEST(LanesTest, EachLaneHasTheBitsOfItsGraph) {
   }
 }
 
+TEST(PrintCTest, ConstantsThatAreNoFiniteNumbersStayAsTheyAre) {
+  RecordedFunction recorded;
+  recorded.graph = Graph(true);
+  {
+    const Recording recording(recorded.graph, CastsAs::kNumber);
+    const Recorded x = Recorded::Input(1.0);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const double infinity = std::numeric_limits<double>::infinity();
+    EXPECT_FALSE(x < Recorded(nan));
+    recorded.outputs = {(x * Recorded(nan)).node, (x + Recorded(infinity)).node,
+                        (x - Recorded(infinity)).node};
+  }
+  const std::vector<double> constants = ConstantsOf(recorded);
+  const CompiledBranch branch = CompileBranch("no numbers", [&] { return PrintLibrary(recorded); });
+  const double x = 2.0, infinity = std::numeric_limits<double>::infinity();
+  double y[3], w[16];
+  ASSERT_LE(branch.room, 16);
+  EXPECT_EQ(branch.function(&x, constants.data(), y, w), 1);
+  EXPECT_TRUE(std::isnan(y[0]));
+  EXPECT_EQ(y[1], infinity);
+  EXPECT_EQ(y[2], -infinity);
+}
+
 }  // namespace
 }  // namespace loopbench::generate

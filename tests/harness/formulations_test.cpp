@@ -71,7 +71,7 @@ TEST(FormulationsTest, ARowThatCannotBeIsRefused) {
     row.color = color;
     refuses(row);
   }
-  EXPECT_THROW(RegisterFormulation(Echo(), EIGEN_MAX_STATIC_ALIGN_BYTES / 2),
+  EXPECT_THROW(RegisterFormulation(Echo(), EIGEN_MAX_STATIC_ALIGN_BYTES + 16),
                std::invalid_argument);
   EXPECT_EQ(FormulationNames(), kBuiltIn);
 }

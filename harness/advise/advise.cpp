@@ -56,8 +56,9 @@ class BenchIn final : public TrialBench {
     // a short run is soon disturbed, and searches go by its time
     if (bare.wall_s < kShortTrial_s) Remeasure(&trial);
     ErrorMeter meter({problem_.user, compiled_, problem_.points}, 0, problem_.reference);
-    // interpolation doubles the cost of a run
-    if (Run(choice, 10 * cpu_s, &meter).outcome != Outcome::kFinished) return trial;
+    // interpolation doubles the cost of a run, and more at many times of a short one
+    if (Run(choice, std::max(10 * cpu_s, kLongTrial_s), &meter).outcome != Outcome::kFinished)
+      return trial;
     Record record;
     meter.Write(record);
     trial.error = record.Number("error_position_max");

@@ -19,6 +19,7 @@
 #include "harness/isolation/processes.h"
 #include "harness/record/record.h"
 #include "harness/run/case_identity.h"
+#include "harness/run/run_case.h"
 #include "harness/tables/fit.h"
 #include "harness/text/files.h"
 #include "harness/text/terminal.h"
@@ -60,18 +61,10 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
   rounded.u.array() -= kRounding;
   const auto counts = generate::CountsOf(generate::RecordFunction(subject, start));
   const auto other = generate::CountsOf(generate::RecordFunction(subject, rounded));
-  const generate::OperationCounts& of = counts.result;
-  row.Set("flops", of.flops());
-  row.Set("additions", of.additions);
-  row.Set("multiplications", of.multiplications);
-  row.Set("divisions", of.divisions);
-  row.Set("roots", of.roots);
-  row.Set("sines", of.sines);
-  row.Set("other", of.other);
+  SetOperations(counts, row);
   row.Set("kinematics", counts.kinematics.flops());
   row.Set("forces", counts.forces.flops());
   row.Set("solve", counts.solve.flops());
-  row.Set("depth", std::int64_t{counts.depth});
   row.Set("solve_depth", std::int64_t{counts.solve_depth});
   row.Set("comparisons", counts.comparisons);
   row.Set("flops_compared", counts.compared.flops());

@@ -20,7 +20,6 @@
 #include "harness/run/side_by_side.h"
 #include "harness/text/hash.h"
 #include "harness/trajectory/trajectory.h"
-#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
 
@@ -235,6 +234,33 @@ Record RunCase(const Experiment& experiment, const Case& entry, const Reference*
   return record;
 }
 
+void SetOperations(const generate::MethodCounts& counts, Record& record) {
+  const generate::OperationCounts& of = counts.result;
+  record.Set("flops", of.flops());
+  record.Set("additions", of.additions);
+  record.Set("multiplications", of.multiplications);
+  record.Set("divisions", of.divisions);
+  record.Set("roots", of.roots);
+  record.Set("sines", of.sines);
+  record.Set("other", of.other);
+  record.Set("depth", std::int64_t{counts.depth});
+}
+
+void WriteOperations(const Method& method, const MechanismDescription& description,
+                     const Start<double>& start, Record& record) {
+  try {
+    const generate::RecordingSubject subject{
+        .description = description,
+        .coordinates = method.coordinates,
+        .formulation = method.formulation,
+        .options = {
+            .enforcement = method.enforcement, .solver = method.solver, .gains = method.gains}};
+    const auto recorded = generate::RecordFunction(subject, {.q = start.q, .u = start.u});
+    SetOperations(generate::CountsOf(recorded), record);
+  } catch (const std::exception&) {  // too long, or another program's; the run goes on
+  }
+}
+
 namespace {
 
 /// Returns a hash of the last state, without the sign of zeros: equal hashes mean equal runs.
@@ -297,6 +323,7 @@ class Runner {
     }
     Traces traces;
     for (const auto& observer : observers_) observer->Trace(traces);
+    for (const auto& [key, count] : operations_.items()) run.record.Set(key, count);
     WriteCounts(result, traces.projection_steps, FindProfile(case_.integrator)->is_implicit,
                 run.record);
     if (IsGenerated(case_.method.execution)) {
@@ -432,6 +459,7 @@ class Runner {
       library_evaluations_ = compiled->misses();
       compile_s_ = compiled->seconds();
     }
+    if (!IsMember() && !peer) WriteOperations(case_.method, description_, start, operations_);
     y_.resize(n);
     if (run.outcome != Outcome::kFinished) {
       const std::string why = formulation->Why();
@@ -464,7 +492,7 @@ class Runner {
   std::int64_t looked_ = 0, looked_by_then_ = 0;  ///< regularized, outside steps; at last step
   std::int64_t library_evaluations_ = 0;          ///< instead of generated code
   double compile_s_ = 0.0;                        ///< [s], to record and compile
-  Record final_poses_;
+  Record final_poses_, operations_;
   std::vector<double> y_;
 };
 

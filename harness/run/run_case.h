@@ -19,6 +19,7 @@
 #include "harness/run/side_by_side.h"
 #include "harness/trajectory/trajectory.h"
 #include "mechanism/formulation/forward_jacobian.h"
+#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
 
@@ -90,6 +91,13 @@ void GiveExecution(const Method& method, const MechanismDescription& description
     result->message = why.what();
   }
 }
+
+/// Sets flops, numbers of operations by kind, and depth, as `loopbench count` has them.
+void SetOperations(const generate::MethodCounts& counts, Record& record);
+
+/// The same for a method's right-hand side next to a start. Nothing where it cannot be recorded.
+void WriteOperations(const Method& method, const MechanismDescription& description,
+                     const Start<double>& start, Record& record);
 
 /// Method, tolerances and limits of a case, and the stop times of its mechanism.
 IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times);

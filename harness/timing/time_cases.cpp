@@ -110,6 +110,9 @@ class SubjectIn final : public Subject {
     record.Set("bodies", std::int64_t{bodies});
     record.Set("joints", joints);
     record.Set("loops", std::int64_t{mechanism_.num_loops()});
+    if (!peer_ && start_.outcome == Outcome::kFinished) {
+      WriteOperations(case_.method, description_, start_, record);
+    }
     // Derivative() may have taken a fast path without a rank
     if (formulation_ && formulation_->Examine(0.0, y_, ydot_) == Outcome::kFinished) {
       const int dof = mechanism_.num_joint_speeds() - formulation_->diagnostics().rank;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -17,10 +18,13 @@
 namespace loopbench::harness::reference {
 namespace passages_test {
 
-/// Where the tip of the first crank is at the end.
+/// Where the tip of the first crank is at the end: infinitely far if a step met a position in line.
 Eigen::Vector3d Tip(int windows, const Method& method, double rtol, double horizon) {
   const MechanismDescription ladder = Ladder(windows, std::numbers::pi / 2, -1.0);
   const Simulation run = Simulate(ladder, method, Options("ode45", rtol), horizon);
+  if (run.result.outcome == Outcome::kSingular) {
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  }
   EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   EXPECT_EQ(run.result.t_reached, horizon);
   const int crank = BodyNamed(ladder, "crank0");
@@ -43,6 +47,7 @@ class Passages : public testing::TestWithParam<std::string> {
 /// How near a step comes to a position in line is chance, and with it what is lost there: of 41
 /// tolerances around 1e-10 each formulation kept the energy to 1.7e-7 J, which moves the tip by
 /// some 1e-7 m, at 23 to 30, and at 2 to 7 it left the branch, which runs mark (warnings_test.cpp).
+/// Reduction, whose partition has no pivot in line, ends as `singular` at 2 of 41.
 /// Which ones these are, round-off decides. The test is of the median of nine.
 TEST_P(Passages, TenOfTheNFourBarOfTwo) {
   std::vector<Eigen::Vector3d> tips;

@@ -95,7 +95,8 @@ void GiveExecution(const Method& method, const MechanismDescription& description
 /// Sets flops, numbers of operations by kind, and depth, as `loopbench count` has them.
 void SetOperations(const generate::MethodCounts& counts, Record& record);
 
-/// The same for a method's right-hand side next to a start. Nothing where it cannot be recorded.
+/// Records a method's right-hand side next to a start and sets its operations. Sets nothing if it
+/// cannot be recorded.
 void WriteOperations(const Method& method, const MechanismDescription& description,
                      const Start<double>& start, Record& record);
 

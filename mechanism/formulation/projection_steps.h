@@ -5,6 +5,7 @@
 
 namespace loopbench {
 
+/// Steps from the state's positions and speeds, evaluated by the library.
 template <class Space, class S>
 class LibrarySteps {
  public:

@@ -150,6 +150,7 @@ class System final : public Ode<S> {
   /// Factors at the current positions. If directions are regularized, examines positions beside
   /// (passage.h): carries the forces of a branch, or regularizes less at regular positions.
   Outcome FactorBranch();
+  /// Returns true until a drive leaves the branch that compiled code has.
   bool StaysOnBranch() const { return drives_ == nullptr || !drives_->has_left_branch(); }
   bool AtPassage() const { return options_.enforcement == Enforcement::kPosition; }
   /// udot_ and, unless null, lambda at the current state, with the shares of released directions.

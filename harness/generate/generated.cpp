@@ -291,6 +291,7 @@ bool GeneratedDerivative<Space>::Compute(Quantity quantity, std::span<double> re
   for (std::size_t i = 0; i < branches.size(); ++i) {
     const Code& code = *branches[i].code;
     if (!(in_lanes_ ? lane_->Call(code, x_, results) : Call(code, results))) continue;
+    if (quantity == Quantity::kDerivative) is_regularized_ = code.recorded.is_regularized;
     if (i > 0) std::swap(branches[0], branches[i]);
     return true;
   }
@@ -320,15 +321,9 @@ bool GeneratedDerivative<Space>::Project(ProjectionStep step, double t, std::spa
   if (q.size() + u.size() >= x_.size()) return false;
   SetInputs(t, q);
   std::ranges::copy(u, x_.begin() + 1 + std::ssize(q));
-  switch (step) {
-    case ProjectionStep::kMismatch:
-      return Compute(Quantity::kMismatch, results);
-    case ProjectionStep::kPositions:
-      return Compute(Quantity::kPositionStep, results);
-    case ProjectionStep::kSpeeds:
-      return Compute(Quantity::kSpeedStep, results);
-  }
-  return false;
+  constexpr Quantity kOfStep[] = {Quantity::kMismatch, Quantity::kPositionStep,
+                                  Quantity::kSpeedStep};
+  return Compute(kOfStep[static_cast<int>(step)], results);
 }
 
 template <class Space>

@@ -47,6 +47,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   ~GeneratedDerivative() override;
 
   bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) override;
+  bool is_regularized() const override { return is_regularized_; }
   bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) override;
   bool Project(ProjectionStep step, double t, std::span<const double> q, std::span<const double> u,
                std::span<double> results) override;
@@ -103,6 +104,7 @@ class GeneratedDerivative final : public CompiledDerivative {
   ModeKey key_, scratch_;  ///< of mode_
   std::vector<int> choices_;
   std::vector<double> x_, room_;  ///< time and state; intermediate values
+  bool is_regularized_ = false;
   std::int64_t misses_ = 0;
   double seconds_ = 0.0;
 };

@@ -80,7 +80,11 @@ class Recorder {
       recorded.outputs.push_back(NodeOf(value, graph));
       recorded.numbers.push_back(value.number);
     }
-    if (subject_.quantity == Quantity::kDerivative) AddStages(recorded);
+    if (subject_.quantity == Quantity::kDerivative) {
+      recorded.is_regularized =
+          mechanism_.num_u() > 0 && system_->solver().conditioning().is_regularized;
+      AddStages(recorded);
+    }
     recorded.structure = graph.Structure(recorded.outputs);
     const std::vector<double> constants = ConstantsOf(recorded);
     recorded.key = recorded.structure +

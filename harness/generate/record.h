@@ -77,6 +77,7 @@ struct RecordedFunction {
   std::vector<int> inputs, outputs;  ///< nodes
   std::vector<double> numbers;       ///< the recorded values of the outputs
   std::vector<int> carried_speeds;   ///< of the state, indices into u
+  bool is_regularized = false;       ///< the solver regularized constraints for dy/dt
   Stages stages;                     ///< of dy/dt alone
   std::string structure;             ///< Graph::Structure() of the outputs
   std::string key;                   ///< functions of a mechanism with equal keys are equal

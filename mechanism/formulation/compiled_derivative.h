@@ -22,6 +22,9 @@ class CompiledDerivative {
   /// branch that is not compiled; then `ydot` is unspecified and the system evaluates its own text.
   virtual bool Evaluate(double t, std::span<const double> y, std::span<double> ydot) = 0;
 
+  /// Returns true if the last Evaluate() that returned true regularized constraints.
+  virtual bool is_regularized() const = 0;
+
   /// Writes d(dy/dt)/dy of the first `jacobian.size() / y.size()` numbers of y, column after
   /// column. Returns false as Evaluate() does, and if it cannot be compiled.
   virtual bool Jacobian(double t, std::span<const double> y, std::span<double> jacobian) = 0;

@@ -207,6 +207,7 @@ Outcome System<Space, S>::Derivative(S t, std::span<const S> y, std::span<S> ydo
       by_short_cut_ = false;
       if (!compiled_->Evaluate(t, y, ydot)) return Examine(t, y, ydot);
       derivative_version_ = -1;
+      if (compiled_->is_regularized()) ++regularized_evaluations_;
       return outcome_ = Outcome::kFinished;
     }
   }

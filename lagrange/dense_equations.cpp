@@ -23,7 +23,7 @@ DenseEquations<Space, S>::DenseEquations(const Mechanism<Space, S>& mechanism, S
     augmented_.setZero(n + m, n + m);
     rhs_.setZero(n + m);
     solution_.setZero(n + m);
-    lu_ = Eigen::PartialPivLU<MatrixX<S>>(n + m);
+    lu_ = PivotedLu<S>(n + m);
   } else {
     W_.setZero(n, m);
     response_.setZero(m, m);
@@ -56,9 +56,8 @@ Outcome DenseEquations<Space, S>::FactorAugmented(const Kinematics<Space, S>& ki
   augmented_.topRightCorner(n, m) = J_.transpose();
   augmented_.bottomLeftCorner(m, n) = J_;
   augmented_.bottomRightCorner(m, m).setZero();
-  lu_.compute(augmented_);
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-  const S rcond = pivots.minCoeff() / pivots.maxCoeff();
+  lu_.Factor(augmented_);
+  const S rcond = lu_.PivotRatio();
   found.rank = LoopRank(mechanism_, 0);
   found.rcond = static_cast<double>(rcond);
   // a pivot below a few eps of the largest is round-off of the elimination
@@ -118,7 +117,8 @@ void DenseEquations<Space, S>::Solve(const VectorX<S>& given, const VectorX<S>& 
   if (kind_ == SolverKind::kAsPublished) {
     rhs_.head(n) = force;
     rhs_.tail(m) = target;
-    solution_ = lu_.solve(rhs_);
+    solution_ = rhs_;
+    lu_.Solve(solution_);
     x = solution_.head(n);
     if (lambda != nullptr) *lambda = -solution_.tail(m);
     return;

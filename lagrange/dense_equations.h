@@ -13,7 +13,7 @@
 // Velocity level: u - M^-1 J^T S^+ J u, the projection in the metric of M.
 #pragma once
 
-#include "mechanism/algebra/factors.h"
+#include "mechanism/algebra/pivoted_lu.h"
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/loops/loop_solver.h"
@@ -50,7 +50,7 @@ class DenseEquations {
   VectorX<S> lambda_, zero_, missed_, change_;
   MatrixX<S> augmented_;
   VectorX<S> rhs_, solution_;
-  Eigen::PartialPivLU<MatrixX<S>> lu_;
+  PivotedLu<S> lu_;
   CholeskyFactor<MatrixX<S>> mass_factor_;
   LoopSolver<S> loop_;
 };

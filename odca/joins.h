@@ -88,17 +88,6 @@ template <class Space, class Width, class Call>
     return WithSize<Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
   }
 }
-/// Calls `call` with 0 .. size-1, unrolled if the size is a constant.
-template <class Size, class Call>
-[[gnu::always_inline]] inline void Repeat(Size size, const Call& call) {
-  const int n = size;
-  if constexpr (kIsKnown<Size>) {
-    LOOPBENCH_UNROLL
-    for (int i = 0; i < n; ++i) call(i);
-  } else {
-    for (int i = 0; i < n; ++i) call(i);
-  }
-}
 /// Returns the numbers of a block, a constant if both of its sides are constants.
 template <class Rows, class Columns>
 auto Product(Rows rows, Columns columns) {

@@ -54,6 +54,10 @@ void Sweep<Space, S>::Correct(std::span<const Acceleration<Space, S>> b,
       start_[n] = b.empty() ? Acceleration<Space, S>::Zero() : b[n + 1];
     }
     S* slot = b_.data() + leaf.slot;
+    if (b.empty() && leaf.hold.joint < 0) {
+      std::fill_n(slot, leaf.width, S(0));
+      continue;
+    }
     if (leaf.is_body) {
       LOOPBENCH_UNROLL
       for (int d = 0; d < Space::kDim; ++d) slot[d] = start_[n][d];

@@ -34,9 +34,9 @@ class Sweep {
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
   const Joins<Space, S>& joins() const { return joins_; }
 
-  /// Computes `A` of each body from `b`, the free acceleration of each body (index = body), its
-  /// wrench M b, and `c0`, Space::kDim numbers per mechanism joint. Requires Assemble(). Allocates
-  /// nothing.
+  /// Computes `A` of each body from `b`, the free acceleration of each body (index = body; empty if
+  /// zero), its wrench M b, and `c0`, Space::kDim numbers per mechanism joint. Requires Assemble().
+  /// Allocates nothing.
   void Solve(std::span<const Acceleration<Space, S>> b, std::span<const Wrench<Space, S>> wrenches,
              std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
 

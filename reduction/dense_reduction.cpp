@@ -80,11 +80,10 @@ void DenseReduction<Space, S>::SetPartition(const Partition<S>& partition) {
   MB_.setZero(n, f);
   reduced_.setZero(f, f);
   rows_rhs_.setZero(rows_.size());
-  dependent_speeds_.setZero(r);
   independent_speeds_.setZero(f);
   pivot_scale_.setZero(r);
   for (int k = 0; k < r; ++k) pivot_scale_[k] = speed_scale_[dependent_[k]];
-  lu_ = Eigen::PartialPivLU<MatrixX<S>>(r);
+  lu_ = PivotedLu<S>(r);
   if (f > 0) reduced_factor_.compute(MatrixX<S>::Identity(f, f).eval());
 }
 
@@ -97,9 +96,8 @@ S DenseReduction<Space, S>::FactorDependencies() {
     for (int i = 0; i < r; ++i) J_D_(k, i) = J_(rows_[k], dependent_[i]);
     for (int i = 0; i < J_I_.cols(); ++i) J_I_(k, i) = J_(rows_[k], independent_[i]);
   }
-  lu_.compute(J_D_);
-  const auto pivots = lu_.matrixLU().diagonal().cwiseAbs().cwiseProduct(pivot_scale_);
-  return pivots.minCoeff() / pivots.maxCoeff();
+  lu_.Factor(J_D_);
+  return lu_.PivotRatio(&pivot_scale_);
 }
 
 template <class Space, class S>
@@ -135,7 +133,8 @@ bool DenseReduction<Space, S>::FactorPartition(const Kinematics<Space, S>& kinem
   const S least = null_space_ ? S(kSuspicious) : S(16) * std::numeric_limits<S>::epsilon();
   if (!(rcond >= least)) return false;
   // B of (2), in the order of u
-  if (J_I_.size() > 0) solved_ = lu_.solve(J_I_);
+  solved_ = J_I_;
+  lu_.Solve(solved_);
   for (int i = 0; i < J_I_.cols(); ++i) B_(independent_[i], i) = S(1);
   for (int k = 0; k < r; ++k) B_.row(dependent_[k]) = -solved_.row(k);
   return true;
@@ -171,8 +170,8 @@ bool DenseReduction<Space, S>::CompleteSpeeds(Kinematics<Space, S>& kinematics, 
   if (mechanism_.drives().empty() || dependent_.empty()) return true;
   SpeedBias(kinematics, zero_, bias_);
   for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = bias_[rows_[k]];
-  dependent_speeds_ = lu_.solve(rows_rhs_);
-  for (std::size_t k = 0; k < dependent_.size(); ++k) u[dependent_[k]] -= dependent_speeds_[k];
+  lu_.Solve(rows_rhs_);
+  for (std::size_t k = 0; k < dependent_.size(); ++k) u[dependent_[k]] -= rows_rhs_[k];
   return true;
 }
 
@@ -181,8 +180,8 @@ void DenseReduction<Space, S>::Dependent(const VectorX<S>& target, VectorX<S>& x
   x.setZero();
   if (dependent_.empty()) return;
   for (std::size_t k = 0; k < rows_.size(); ++k) rows_rhs_[k] = target[rows_[k]];
-  dependent_speeds_ = lu_.solve(rows_rhs_);
-  for (std::size_t k = 0; k < dependent_.size(); ++k) x[dependent_[k]] = dependent_speeds_[k];
+  lu_.Solve(rows_rhs_);
+  for (std::size_t k = 0; k < dependent_.size(); ++k) x[dependent_[k]] = rows_rhs_[k];
 }
 
 template <class Space, class S>
@@ -229,11 +228,8 @@ void DenseReduction<Space, S>::SolveForces(const VectorX<S>& force, const Vector
   lambda.setZero();
   if (dependent_.empty()) return;
   for (std::size_t k = 0; k < dependent_.size(); ++k) rows_rhs_[k] = residual_[dependent_[k]];
-  // lu_.transpose().solve() by its parts: its permutation in place would allocate
-  lu_.matrixLU().template triangularView<Eigen::Upper>().transpose().solveInPlace(rows_rhs_);
-  lu_.matrixLU().template triangularView<Eigen::UnitLower>().transpose().solveInPlace(rows_rhs_);
-  dependent_speeds_.noalias() = lu_.permutationP().transpose() * rows_rhs_;
-  for (std::size_t k = 0; k < rows_.size(); ++k) lambda[rows_[k]] = dependent_speeds_[k];
+  lu_.SolveTransposed(rows_rhs_);
+  for (std::size_t k = 0; k < rows_.size(); ++k) lambda[rows_[k]] = rows_rhs_[k];
 }
 
 template <class Space, class S>

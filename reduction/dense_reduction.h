@@ -24,7 +24,7 @@
 
 #include <memory>
 
-#include "mechanism/algebra/factors.h"
+#include "mechanism/algebra/pivoted_lu.h"
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/loops/tree_dynamics.h"
@@ -89,10 +89,10 @@ class DenseReduction final : public ConstraintSolver<Space, S> {
   bool mass_is_current_ = false;
   bool outgrown_ = false;  ///< the rank exceeds the partition's
   MatrixX<S> M_, J_, J_D_, J_I_, solved_, B_, MB_, reduced_;
-  VectorX<S> zero_, c_, residual_, rows_rhs_, dependent_speeds_, independent_speeds_, bias_;
+  VectorX<S> zero_, c_, residual_, rows_rhs_, independent_speeds_, bias_;
   VectorX<S> speed_scale_;  ///< one over the mechanism's length for rotations, else 1
   VectorX<S> pivot_scale_;  ///< of dependent speeds
-  Eigen::PartialPivLU<MatrixX<S>> lu_;
+  PivotedLu<S> lu_;
   CholeskyFactor<MatrixX<S>> reduced_factor_;
   std::unique_ptr<NullSpace<Space, S>> null_space_;  ///< null at velocity level and as published
   bool uses_null_space_ = false;                     ///< since the last Factor()

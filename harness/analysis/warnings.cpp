@@ -12,6 +12,7 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/analysis/model_warnings.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/published_series.h"
@@ -315,6 +316,15 @@ bool IsAtRest(const Record& record) {
   return record.Number("energy_scale") <= speed * speed;
 }
 
+/// The distance from a singular configuration within which drift may have changed the branch. Loops
+/// that are open by e miss a singular configuration by about sqrt(2 e / L), with links of length L.
+/// At most the distance of mechanisms that are called nearly singular.
+double DistanceOfBranches(const Record& record) {
+  const double open = record.Number("drift_position_max") / record.Number("link_length");
+  const double missed = 2.0 * std::sqrt(open);
+  return missed > kRankRatio ? std::min(missed, kNearSingularRatio) : kRankRatio;
+}
+
 /// Returns true if the run came too near a singular configuration for its level to keep the branch.
 /// Records of large mechanisms lack the distance, but count regularized evaluations.
 bool PassedSingularPosition(const Record& record) {
@@ -322,7 +332,7 @@ bool PassedSingularPosition(const Record& record) {
   if (record.Number("singularity_crossings") > 0) return true;
   const double distance = record.Number("singularity_distance_min");
   if (std::isnan(distance)) return record.Number("regularized_evaluations") > 0;
-  return distance < kRankRatio;
+  return distance < DistanceOfBranches(record);
 }
 
 /// Regularized, which bends the motion by more than tolerances, although no position at which steps

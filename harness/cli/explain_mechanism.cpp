@@ -385,6 +385,8 @@ class StartText {
         q[i] = kinematics_.drives()[drive].value;
       } else if (joint.in_tree()) {
         q[i] = start_.q[next++];
+      } else if (joint.kind->num_u == 1) {
+        q[i] = kinematics_.JointCoordinate(static_cast<int>(&joint - mechanism_.joints().data()));
       }
     }
     return q;

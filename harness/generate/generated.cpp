@@ -200,6 +200,8 @@ void GeneratedDerivative<Space>::FindMode() {
   const BaumgarteGains& gains = system_.level().gains();
   scratch_.assign({gains.alpha, gains.beta});
   scratch_.insert(scratch_.end(), choices_.begin(), choices_.end());
+  const std::vector<double>& turns = system_.kinematics().whole_turns();
+  scratch_.insert(scratch_.end(), turns.begin(), turns.end());
   if (mode_ != nullptr && key_ == scratch_) return;
   const harness::ForeignWork work(seconds_);  // graphs are large
   key_ = scratch_;
@@ -208,6 +210,7 @@ void GeneratedDerivative<Space>::FindMode() {
   if (branches() == 0) {
     mode_->start = {system_.kinematics().time(), system_.q(), system_.u()};
     system_.solver().AppendMode(mode_->start.mode);
+    mode_->start.whole_turns = turns;
   }
 }
 

@@ -53,6 +53,7 @@ class Recorder {
     if (system_->Start(start.t, q_, u_) != Outcome::kFinished)
       throw NotCovered("it does not start");
     if (!start.mode.empty()) system_->solver().TakeMode(start.mode);
+    if (!start.whole_turns.empty()) system_->TakeWholeTurns(start.whole_turns);
     system_->IntegrateWork(subject.with_work);
   }
 

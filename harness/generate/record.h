@@ -61,6 +61,7 @@ struct RecordingStart {
   Eigen::VectorXd q, u;
   /// Choices of its solver before (ConstraintSolver::AppendMode()); empty: it chooses here.
   std::vector<int> mode = {};
+  std::vector<double> whole_turns = {};  ///< of angles of cut joints (Kinematics)
 };
 
 /// Nodes of intermediate results on the way to dy/dt. A stage depends on earlier ones.

@@ -150,6 +150,7 @@ void UserMechanism<Space>::Measure(int index, double* q, double* u) const {
   const Pose<Space, double> X_FM = Compose(Inverse(Compose(poses[joint.from], joint.X_PF)),
                                            Compose(poses[joint.to], joint.X_QM));
   joint.kind->coordinates(X_FM, q, joint.kind->parameter);
+  if (joint.kind->num_u == 1) q[0] = kinematics_.JointCoordinate(index);
   const Velocity<Space, double>& V = kinematics_.joints()[index].V_rel;
   for (int i = 0; i < joint.kind->num_u; ++i) {
     u[i] = joint.kind->inverse_H_squared * DirectionOfSpeed(index, i).dot(V);

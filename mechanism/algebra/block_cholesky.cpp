@@ -140,39 +140,53 @@ double* BlockCholesky::OffDiagonal(int i, int j) {
 
 // kRows below: rows of every block, 0 where they differ. Diagonals of L hold their reciprocals.
 
+namespace {
+
+template <int kRows, class Call>
+[[gnu::always_inline]] inline auto WithRows(int rows, const Call& call) {
+  if constexpr (kRows > 0) {
+    return call(std::integral_constant<int, kRows>());
+  } else {
+    return WithSize<2, 3, 5>(rows, call);
+  }
+}
+
+}  // namespace
+
 /// A_ij -= L_ik L_jk^T for all columns k to the left that have a row in j.
-template <int kRows>
-void BlockCholesky::Eliminate(int j) {
+template <int kRows, class Size>
+void BlockCholesky::Eliminate(int j, Size n) {
   const Column& column = columns_[j];
-  const int n = kRows > 0 ? kRows : column.rows;
   const Below *first = below_.data() + column.first_row, *end = first + column.num_rows;
   number_of_[j] = column.first_number;
   for (const Below* row = first; row != end; ++row) number_of_[row->column] = row->number;
   for (int l = column.first_left; l < column.first_left + column.num_left; ++l) {
     const Column& left = columns_[left_[l].column];
-    const int m = kRows > 0 ? kRows : left.rows;
     const Below *row = &below_[left_[l].place],
                 *last = below_.data() + left.first_row + left.num_rows;
     const double* L_jk = &L_[row->number];
-    for (; row != last; ++row) {
-      const int h = kRows > 0 ? kRows : columns_[row->column].rows;
-      const double* L_ik = &L_[row->number];
-      double* A_ij = &L_[number_of_[row->column]];
-      for (int a = 0; a < h; ++a) {
-        for (int b = 0; b < n; ++b) {
-          double sum = A_ij[a * n + b];
-          for (int c = 0; c < m; ++c) sum -= L_ik[a * m + c] * L_jk[b * m + c];
-          A_ij[a * n + b] = sum;
+    WithRows<kRows>(left.rows, [&](auto m) {
+      for (; row != last; ++row) {
+        const int h = kRows > 0 ? kRows : columns_[row->column].rows;
+        const double* L_ik = &L_[row->number];
+        double* A_ij = &L_[number_of_[row->column]];
+        for (int a = 0; a < h; ++a) {
+          for (int b = 0; b < n; ++b) {
+            double sum = A_ij[a * n + b];
+            Repeat(m, [&](int c) { sum -= L_ik[a * m + c] * L_jk[b * m + c]; });
+            A_ij[a * n + b] = sum;
+          }
         }
       }
-    }
+    });
   }
 }
 
 namespace {
 
 /// The pivots of a diagonal block alone: of its factors L D L^T.
-void PivotsOf(const double* block, int n, std::array<double, kMaxRows>& pivots) {
+template <class Size>
+void PivotsOf(const double* block, Size n, std::array<double, kMaxRows>& pivots) {
   std::array<double, kMaxRows * kMaxRows> L;
   for (int c = 0; c < n; ++c) {
     for (int a = c; a < n; ++a) {
@@ -186,14 +200,13 @@ void PivotsOf(const double* block, int n, std::array<double, kMaxRows>& pivots) 
 
 }  // namespace
 
-template <int kRows>
-bool BlockCholesky::FactorColumn(int j) {
+template <int kRows, class Size>
+bool BlockCholesky::FactorColumn(int j, Size n) {
   const Column& column = columns_[j];
-  const int n = kRows > 0 ? kRows : column.rows;
   double* diagonal = &L_[column.first_number];
   std::array<double, kMaxRows> before;
   PivotsOf(diagonal, n, before);
-  Eliminate<kRows>(j);
+  Eliminate<kRows>(j, n);
   double least = 1.0;
   for (int c = 0; c < n; ++c) {
     for (int a = c; a < n; ++a) {
@@ -229,8 +242,11 @@ bool BlockCholesky::FactorColumn(int j) {
 
 bool BlockCholesky::Factor() {
   return WithSize<2, 3, 5>(uniform_, [&](auto rows) {
+    constexpr int kRows = kKnownSize<decltype(rows)>;
     for (int j = 0; j < static_cast<int>(columns_.size()); ++j) {
-      if (FactorColumn<kKnownSize<decltype(rows)>>(j)) continue;
+      if (WithRows<kRows>(columns_[j].rows, [&](auto n) { return FactorColumn<kRows>(j, n); })) {
+        continue;
+      }
       std::fill(ratios_.begin() + j + 1, ratios_.end(), 1.0);
       return false;
     }
@@ -242,46 +258,48 @@ bool BlockCholesky::Factor() {
 template <int kRows>
 void BlockCholesky::SolveColumns(double* all) const {
   for (const Column& column : columns_) {
-    const int n = kRows > 0 ? kRows : column.rows;
-    const double* diagonal = &L_[column.first_number];
-    double* x = &all[column.first];
-    for (int a = 0; a < n; ++a) {
-      double sum = x[a];
-      for (int b = 0; b < a; ++b) sum -= diagonal[a * n + b] * x[b];
-      x[a] = sum * diagonal[a * n + a];
-    }
-    const Below* row = below_.data() + column.first_row;
-    for (const Below* end = row + column.num_rows; row != end; ++row) {
-      const int h = kRows > 0 ? kRows : columns_[row->column].rows;
-      const double* block = &L_[row->number];
-      double* y = &all[columns_[row->column].first];
-      for (int a = 0; a < h; ++a) {
-        double sum = y[a];
-        for (int b = 0; b < n; ++b) sum -= block[a * n + b] * x[b];
-        y[a] = sum;
+    WithRows<kRows>(column.rows, [&](auto n) {
+      const double* diagonal = &L_[column.first_number];
+      double* x = &all[column.first];
+      for (int a = 0; a < n; ++a) {
+        double sum = x[a];
+        for (int b = 0; b < a; ++b) sum -= diagonal[a * n + b] * x[b];
+        x[a] = sum * diagonal[a * n + a];
       }
-    }
+      const Below* row = below_.data() + column.first_row;
+      for (const Below* end = row + column.num_rows; row != end; ++row) {
+        const int h = kRows > 0 ? kRows : columns_[row->column].rows;
+        const double* block = &L_[row->number];
+        double* y = &all[columns_[row->column].first];
+        for (int a = 0; a < h; ++a) {
+          double sum = y[a];
+          Repeat(n, [&](int b) { sum -= block[a * n + b] * x[b]; });
+          y[a] = sum;
+        }
+      }
+    });
   }
   for (auto column = columns_.rbegin(); column != columns_.rend(); ++column) {
-    const int n = kRows > 0 ? kRows : column->rows;
-    const double* diagonal = &L_[column->first_number];
-    double* x = &all[column->first];
-    const Below* row = below_.data() + column->first_row;
-    for (const Below* end = row + column->num_rows; row != end; ++row) {
-      const int h = kRows > 0 ? kRows : columns_[row->column].rows;
-      const double* block = &L_[row->number];
-      const double* y = &all[columns_[row->column].first];
-      for (int b = 0; b < n; ++b) {
-        double sum = x[b];
-        for (int a = 0; a < h; ++a) sum -= block[a * n + b] * y[a];
-        x[b] = sum;
+    WithRows<kRows>(column->rows, [&](auto n) {
+      const double* diagonal = &L_[column->first_number];
+      double* x = &all[column->first];
+      const Below* row = below_.data() + column->first_row;
+      for (const Below* end = row + column->num_rows; row != end; ++row) {
+        const int h = kRows > 0 ? kRows : columns_[row->column].rows;
+        const double* block = &L_[row->number];
+        const double* y = &all[columns_[row->column].first];
+        for (int b = 0; b < n; ++b) {
+          double sum = x[b];
+          for (int a = 0; a < h; ++a) sum -= block[a * n + b] * y[a];
+          x[b] = sum;
+        }
       }
-    }
-    for (int a = n - 1; a >= 0; --a) {
-      double sum = x[a];
-      for (int b = a + 1; b < n; ++b) sum -= diagonal[b * n + a] * x[b];
-      x[a] = sum * diagonal[a * n + a];
-    }
+      for (int a = n - 1; a >= 0; --a) {
+        double sum = x[a];
+        for (int b = a + 1; b < n; ++b) sum -= diagonal[b * n + a] * x[b];
+        x[a] = sum * diagonal[a * n + a];
+      }
+    });
   }
 }
 

@@ -65,10 +65,10 @@ class BlockCholesky {
     int column = 0;
     int number = 0;  ///< in L_
   };
-  template <int kRows>
-  void Eliminate(int j);
-  template <int kRows>
-  bool FactorColumn(int j);
+  template <int kRows, class Size>
+  void Eliminate(int j, Size n);
+  template <int kRows, class Size>
+  bool FactorColumn(int j, Size n);
   template <int kRows>
   void SolveColumns(double* x) const;
 

@@ -3,6 +3,8 @@
 
 #include <type_traits>
 
+#define LOOPBENCH_UNROLL _Pragma("GCC unroll 9")
+
 namespace loopbench {
 
 /// `call` with n, as a constant if it is one of `known`.
@@ -27,5 +29,17 @@ template <class Size>
 inline constexpr int kKnownSize = 0;
 template <int n>
 inline constexpr int kKnownSize<std::integral_constant<int, n>> = n;
+
+/// Calls `call` with 0 .. size-1, unrolled if the size is a constant.
+template <class Size, class Call>
+[[gnu::always_inline]] inline void Repeat(Size size, const Call& call) {
+  const int n = size;
+  if constexpr (kKnownSize<Size> != 0) {
+    LOOPBENCH_UNROLL
+    for (int i = 0; i < n; ++i) call(i);
+  } else {
+    for (int i = 0; i < n; ++i) call(i);
+  }
+}
 
 }  // namespace loopbench

@@ -7,11 +7,12 @@
 #include <cmath>
 #include <concepts>
 
+#include "mechanism/algebra/known_size.h"
+
 namespace loopbench {
 
 /// The small functions run several times per body and evaluation; a call costs more than they do.
 #define LOOPBENCH_INLINE [[gnu::always_inline]] inline
-#define LOOPBENCH_UNROLL _Pragma("GCC unroll 9")
 
 /// Matrix of rows x columns numbers, stored by columns. Not initialised by default.
 template <class S, int rows, int columns = 1>

@@ -40,6 +40,7 @@ int ForwardJacobian<Space>::evaluations() const {
 template <class Space>
 void ForwardJacobian<Space>::Evaluate(Eigen::Ref<MatrixX<double>> jacobian) {
   kinematics_.SetTime(system_.kinematics().time());
+  kinematics_.CountTurnsLike(system_.kinematics());
   if (const auto& released = system_.kinematics().released(); released != kinematics_.released()) {
     kinematics_.Release(released);
   }

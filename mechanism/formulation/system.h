@@ -54,6 +54,9 @@ class System final : public Ode<S> {
   ConstraintSolver<Space, S>& solver() { return *solver_; }
   const Level<Space, S>& level() const { return *level_; }
 
+  /// Continues planar angles of cut joints like another system of the mechanism (Kinematics).
+  void TakeWholeTurns(std::span<const double> turns) { state_.kinematics().TakeWholeTurns(turns); }
+
   /// Called once with a consistent start at time t, before anything else.
   Outcome Start(S t, const VectorX<S>& q, const VectorX<S>& u);
 

@@ -20,6 +20,7 @@ BodyEquations<Space, S>::BodyEquations(const Mechanism<Space, S>& mechanism)
 /// the body, where the inertia is constant.
 template <class Space, class S>
 void BodyEquations<Space, S>::SetFree(const Kinematics<Space, S>& kinematics, bool turning) {
+  has_force_ = true;
   for (int body = 1; body < mechanism_.num_bodies(); ++body) {
     const Inertia<Space, S>& inertia = mechanism_.bodies()[body];
     Angular<Space, S> alpha = inertia.rotational_inverse * wrenches_[body].angular;
@@ -46,11 +47,9 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
     const Joint<Space, S>& joint = mechanism_.joints()[index];
     c0_[index].head(joint.num_constraints()) = -target.segment(joint.row, joint.num_constraints());
   }
+  has_force_ = force.size() > 0;
+  if (!has_force_) return;
   for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
-  if (force.size() == 0) {
-    for (Acceleration<Space, S>& b : b_) b.setZero();
-    return;
-  }
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
     const JointState<Space, S>& state = kinematics.joints()[step.joint];
@@ -107,8 +106,7 @@ void BodyEquations<Space, S>::SetState(const Kinematics<Space, S>& kinematics,
 template <class Space, class S>
 void BodyEquations<Space, S>::SetMissed(const Kinematics<Space, S>& kinematics) {
   known_.setZero();
-  for (Acceleration<Space, S>& b : b_) b.setZero();
-  for (Wrench<Space, S>& wrench : wrenches_) wrench.setZero();
+  has_force_ = false;
   for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
 }

@@ -35,7 +35,11 @@ class BodyEquations {
   /// Sets the velocity violation of `kinematics` as the only load.
   void SetMissed(const Kinematics<Space, S>& kinematics);
 
-  std::span<const Acceleration<Space, S>> b() const { return b_; }
+  /// Empty if no force acts.
+  std::span<const Acceleration<Space, S>> b() const {
+    return has_force_ ? std::span<const Acceleration<Space, S>>(b_)
+                      : std::span<const Acceleration<Space, S>>();
+  }
   /// M b, without the rounding errors of b.
   std::span<const Wrench<Space, S>> wrenches() const { return wrenches_; }
   std::span<const Components<Space, S>> c0() const { return c0_; }
@@ -55,6 +59,7 @@ class BodyEquations {
   std::vector<Wrench<Space, S>> wrenches_;
   std::vector<Acceleration<Space, S>> b_, A_;
   std::vector<Components<Space, S>> c0_;
+  bool has_force_ = false;
   VectorX<S> known_;  ///< part of x that does not come from A
 };
 

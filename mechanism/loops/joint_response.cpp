@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "mechanism/algebra/known_size.h"
 #include "mechanism/loops/loop_solver.h"
 
 namespace loopbench {
@@ -142,12 +143,14 @@ bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, M
   X_.SetZero();
   for (const Pair& pair : pairs_) {
     const Side &first = sides_[pair.first], &second = sides_[pair.second];
-    double* number = pair.block;
-    for (int i = 0; i < first.rows; ++i) {
-      for (int k = 0; k < second.rows; ++k) {
-        *number++ += c_[first.first + i].dot(Mc_[second.first + k]);
+    const Wrench<Space, double>* c = &c_[first.first];
+    const Acceleration<Space, double>* Mc = &Mc_[second.first];
+    WithSize<2, 3, 5>(second.rows, [&](auto columns) {
+      for (int i = 0; i < first.rows; ++i) {
+        const int last = pair.first == pair.second ? i + 1 : int{columns};
+        for (int k = 0; k < last; ++k) pair.block[i * columns + k] += c[i].dot(Mc[k]);
       }
-    }
+    });
   }
   const bool is_positive = X_.Factor();
   rcond_ = 1.0;
@@ -182,11 +185,14 @@ void JointResponse<Space>::Solve(std::span<const Acceleration<Space, double>> b,
   for (std::size_t k = 0, row = 0; k < joints_.size(); ++k) {
     for (int i = 0; i < X_.rows(static_cast<int>(k)); ++i) x_[row++] = -c0[joints_[k]][i];
   }
-  for (const Side& side : sides_) {
-    for (int i = 0; i < side.rows; ++i) x_[side.row + i] -= c_[side.first + i].dot(b[side.body]);
+  std::ranges::fill(A, Acceleration<Space, double>::Zero());
+  if (!b.empty()) {
+    for (const Side& side : sides_) {
+      for (int i = 0; i < side.rows; ++i) x_[side.row + i] -= c_[side.first + i].dot(b[side.body]);
+    }
+    std::ranges::copy(b, A.begin());
   }
   X_.Solve(x_.data());
-  std::ranges::copy(b, A.begin());
   for (const Side& side : sides_) {
     for (int i = 0; i < side.rows; ++i) {
       A[side.body] += Mc_[side.first + i] * x_[side.row + i];

@@ -33,7 +33,7 @@ class JointResponse {
   /// Returns false if rank or digits are uncertain, or a number is not finite. Equations are solved
   /// with physical masses.
   bool Factor(const Kinematics<Space, double>& kinematics, Masses masses = Masses::kPhysical);
-  /// A of all bodies, and phi().
+  /// A of all bodies, and phi(). An empty b is zero.
   void Solve(std::span<const Acceleration<Space, double>> b,
              std::span<const Components<Space, double>> c0,
              std::span<Acceleration<Space, double>> A);

@@ -41,10 +41,40 @@ S Dot(const MatrixX<S>& A, int i, const MatrixX<S>& B, int j) {
   return sum;
 }
 
-/// Rotations count as lengths.
-template <class Space, class S>
-S ScaleOf(const Direction<Space, S>& direction, S length) {
-  return direction.angular.squaredNorm() > S(0) ? length : S(1);
+/// y = A x for the first columns of A, as many as x has. As for Dot(), Eigen's overhead exceeds the
+/// work.
+template <class S, class X, class Y>
+void Multiply(const MatrixX<S>& A, const X& x, Y&& y) {
+  y.setZero();
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    const S *a = A.data() + j * A.rows(), factor = x[j];
+    for (Eigen::Index i = 0; i < A.rows(); ++i) y[i] += a[i] * factor;
+  }
+}
+/// y = A^T x for the first columns of A, as many as y has.
+template <class S, class X, class Y>
+void MultiplyTransposed(const MatrixX<S>& A, const X& x, Y&& y) {
+  for (Eigen::Index j = 0; j < y.size(); ++j) {
+    const S* a = A.data() + j * A.rows();
+    S sum(0);
+    for (Eigen::Index i = 0; i < A.rows(); ++i) sum += a[i] * x[i];
+    y[j] = sum;
+  }
+}
+
+/// sum += direction * s.
+template <class Space, class S, class Kind>
+LOOPBENCH_INLINE void Add(const DirectionParts& parts, const Direction<Space, S>& direction,
+                          const S& s, SpatialVector<Space, S, Kind>& sum) {
+  if (parts.turns) sum.angular += direction.angular * s;
+  if (parts.shifts) sum.linear += direction.linear * s;
+}
+template <class Space, class S, class Kind>
+LOOPBENCH_INLINE S Dot(const DirectionParts& parts, const Direction<Space, S>& direction,
+                       const SpatialVector<Space, S, Kind>& V) {
+  if (!parts.shifts) return direction.angular.dot(V.angular);
+  if (!parts.turns) return direction.linear.dot(V.linear);
+  return direction.dot(V);
 }
 
 }  // namespace
@@ -55,6 +85,7 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
   const int m = r_ + d_;
   rows_.setZero(H_, m);
   row_scale_.setOnes(m);
+  inverse_scale_ = row_scale_;
   column_scale_.setOnes(H_ + D_);
   gram_.setIdentity(r_, r_);
   T_.setZero(r_, d_);
@@ -112,7 +143,8 @@ void SelfStress<Space, S>::Span() {
                          .D_column = in_joints ? -1 : D_,
                          .num_u = joints[j].num_u(),
                          .num_columns = in_joints ? joints[j].num_u() : Space::kDim,
-                         .rate = {}};
+                         .parts = {},
+                         .own_rates = {}};
         forest_.push_back(child);
         H_ += joints[j].num_u();
         if (!in_joints) D_ += joints[j].num_constraints();
@@ -129,25 +161,43 @@ void SelfStress<Space, S>::Span() {
                       .num_released = joints[j].num_released,
                       .num_drives = joints[j].num_drives,
                       .links = LinksOf(j),
+                      .parts = {},
                       .basis = {},
-                      .rate = {}});
+                      .own_rates = {}});
     r_ += joints[j].num_constraints();
     d_ += joints[j].num_released;
   }
   r_ += mechanism_->num_moving_rows();
   d_ -= mechanism_->num_moving_rows();
-  Arrange(mechanism_->released());
 }
 
+/// Rotations count as lengths.
 template <class Space, class S>
-void SelfStress<Space, S>::Arrange(const std::vector<Released>& released) {
-  arranged_ = released;
+void SelfStress<Space, S>::Arrange(const Kinematics<Space, S>& kinematics) {
+  is_arranged_ = true;
+  arranged_ = kinematics.released();
   rows_.setZero();  // other columns may belong to a moving row
   int next_moving = r_ - mechanism_->num_moving_rows(), next = r_;
-  for (const Released& out : released) {
+  for (const Released& out : arranged_) {
     Loop& loop = *std::ranges::find(loops_, out.joint, &Loop::joint);
     for (std::size_t q = 0; q < out.directions.size(); ++q) {
       loop.rows_released[q] = out.IsMoving(out.directions[q]) ? next_moving++ : next++;
+    }
+  }
+  const S length = mechanism_->length(), per_length = S(1) / length;
+  for (Loop& loop : loops_) {
+    loop.parts = kinematics.PartsOf(loop.joint);
+    for (int k = 0; k < loop.directions(); ++k) {
+      const bool turns = loop.parts[loop.num_u + k].turns;
+      row_scale_[loop.row(k)] = turns ? length : S(1);
+      inverse_scale_[loop.row(k)] = turns ? per_length : S(1);
+    }
+  }
+  for (const int child : forest_) {
+    Edge& edge = edges_[child];
+    edge.parts = kinematics.PartsOf(edge.joint);
+    for (int i = 0; i < edge.num_columns; ++i) {
+      column_scale_[ColumnOf(edge, i)] = edge.parts[i].turns ? per_length : S(1);
     }
   }
 }
@@ -160,7 +210,7 @@ auto SelfStress<Space, S>::LinksOf(int joint) const -> std::vector<Link> {
     const bool on_Q = edges_[to_Q].depth >= edges_[to_P].depth;
     int& body = on_Q ? to_Q : to_P;
     const Edge& edge = edges_[body];
-    links.push_back({body, S(on_Q ? edge.sign : -edge.sign), {}, {}});
+    links.push_back({body, on_Q != (edge.sign > 0), {}, {}});
     body = edge.parent;
   }
   return links;
@@ -169,26 +219,20 @@ auto SelfStress<Space, S>::LinksOf(int joint) const -> std::vector<Link> {
 /// D^T S(p - p_j) H_j of all joints j between the two sides of the loop's joint at p.
 template <class Space, class S>
 void SelfStress<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Loop& loop) {
-  const S length = mechanism_->length();
   const Linear<Space, S> p = kinematics.JointPoint(loop.joint);
   loop.basis = kinematics.joints()[loop.joint].basis;
-  const auto D = std::span(loop.basis).subspan(static_cast<std::size_t>(loop.num_u));
-  for (int k = 0; k < loop.directions(); ++k) {
-    row_scale_[loop.row(k)] = ScaleOf<Space, S>(D[k], length);
-  }
   for (Link& link : loop.links) {
     const Edge& edge = edges_[link.child];
-    const JointState<Space, S>& state = kinematics.joints()[edge.joint];
     link.arm = p - kinematics.JointPoint(edge.joint);
-    for (int i = 0; i < edge.num_columns; ++i) {
+    for (int i = 0; i < edge.num_u; ++i) {
       const int column = ColumnOf(edge, i);
-      const S scale = column_scale_[column] = S(1) / ScaleOf<Space, S>(state.basis[i], length);
-      if (i >= edge.num_u) continue;
-      const Velocity<Space, S> V =
-          ShiftMotion<Space, S>(Velocity<Space, S>(state.basis[i] * (link.sign * scale)), link.arm);
+      const S scale = link.is_reversed ? S(-column_scale_[column]) : column_scale_[column];
+      Velocity<Space, S> V = Velocity<Space, S>::Zero();
+      Add(edge.parts[i], kinematics.joints()[edge.joint].basis[i], scale, V);
+      V = ShiftMotion<Space, S>(V, link.arm);
       for (int k = 0; k < loop.directions(); ++k) {
-        const int row = loop.row(k);
-        rows_(column, row) = row_scale_[row] * D[k].dot(V);
+        const int row = loop.row(k), d = loop.num_u + k;
+        rows_(column, row) = row_scale_[row] * Dot(loop.parts[d], loop.basis[d], V);
       }
     }
   }
@@ -204,11 +248,10 @@ void SelfStress<Space, S>::FillRates(const Kinematics<Space, S>& kinematics) {
   };
   for (const int child : forest_) {
     Edge& edge = edges_[child];
-    kinematics.BasisRate(edge.joint, kinematics.joints()[edge.joint].basis, edge.num_columns,
-                         edge.rate);
+    kinematics.OwnRates(edge.joint, edge.parts, edge.num_columns, edge.own_rates);
   }
   for (Loop& loop : loops_) {
-    kinematics.BasisRate(loop.joint, loop.basis, Space::kDim, loop.rate);
+    kinematics.OwnRates(loop.joint, loop.parts, Space::kDim, loop.own_rates);
     const Linear<Space, S> p_rate = speed(loop.joint);
     for (Link& link : loop.links) link.arm_rate = p_rate - speed(edges_[link.child].joint);
   }
@@ -232,7 +275,7 @@ S SelfStress<Space, S>::FactorRows() {
 
 template <class Space, class S>
 bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
-  if (kinematics.released() != arranged_) Arrange(kinematics.released());
+  if (!is_arranged_ || kinematics.released() != arranged_) Arrange(kinematics);
   for (Loop& loop : loops_) FillRows(kinematics, loop);
   const S pivot = r_ > 0 ? FactorRows() : S(1);
   for (int q = 0; q < d_ && D_ > 0; ++q) {
@@ -281,6 +324,15 @@ std::vector<Released> SelfStress<Space, S>::Choose(const Kinematics<Space, S>& k
 }
 
 template <class Space, class S>
+template <class Kind>
+SpatialVector<Space, S, Kind> SelfStress<Space, S>::TurnWithP(
+    const Kinematics<Space, S>& kinematics, int joint,
+    const SpatialVector<Space, S, Kind>& V) const {
+  const Angular<Space, S>& w = kinematics.motions()[mechanism_->joints()[joint].from].angular;
+  return {CrossAngular<S>(w, V.angular), Cross<S>(w, V.linear)};
+}
+
+template <class Space, class S>
 template <bool kRates>
 void SelfStress<Space, S>::Times(const Kinematics<Space, S>& kinematics, const VectorX<S>& x,
                                  VectorX<S>& rows) const {
@@ -290,21 +342,27 @@ void SelfStress<Space, S>::Times(const Kinematics<Space, S>& kinematics, const V
       const Edge& edge = edges_[link.child];
       const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
       Velocity<Space, S> at = Velocity<Space, S>::Zero(), at_rate = at;
-      for (int i = 0; i < edge.num_columns; ++i) {
+      for (int i = kRates ? 0 : edge.num_u; i < edge.num_columns; ++i) {
         const int column = ColumnOf(edge, i);
-        const S speed = link.sign * x[column] * column_scale_[column];
-        at += basis[i] * speed;
-        if constexpr (kRates) at_rate += edge.rate[i] * speed;
+        const S speed = x[column] * column_scale_[column];
+        Add(edge.parts[i], basis[i], speed, at);
+        if (kRates && edge.parts[i].moves) Add(edge.parts[i], edge.own_rates[i], speed, at_rate);
       }
-      V += ShiftMotion<Space, S>(at, link.arm);
-      if constexpr (!kRates) continue;
-      V_rate += ShiftMotion<Space, S>(at_rate, link.arm);
-      V_rate.linear += Cross<S>(at.angular, link.arm_rate);
+      if constexpr (kRates) {
+        at_rate = ShiftMotion<Space, S>(at_rate + TurnWithP(kinematics, edge.joint, at), link.arm);
+        at_rate.linear += Cross<S>(at.angular, link.arm_rate);
+      }
+      at = ShiftMotion<Space, S>(at, link.arm);
+      link.is_reversed ? V -= at : V += at;
+      if constexpr (kRates) link.is_reversed ? V_rate -= at_rate : V_rate += at_rate;
     }
+    // (w x D) . V = -D . (w x V)
+    if constexpr (kRates) V_rate -= TurnWithP(kinematics, loop.joint, V);
     for (int k = 0; k < loop.directions(); ++k) {
       const int row = loop.row(k), i = loop.num_u + k;
-      rows[row] = row_scale_[row] *
-                  (kRates ? loop.rate[i].dot(V) + loop.basis[i].dot(V_rate) : loop.basis[i].dot(V));
+      S sum = Dot(loop.parts[i], loop.basis[i], kRates ? V_rate : V);
+      if (kRates && loop.parts[i].moves) sum += Dot(loop.parts[i], loop.own_rates[i], V);
+      rows[row] = row_scale_[row] * sum;
     }
   }
 }
@@ -317,20 +375,27 @@ void SelfStress<Space, S>::TransposedTimes(const Kinematics<Space, S>& kinematic
   for (const Loop& loop : loops_) {
     Wrench<Space, S> F = Wrench<Space, S>::Zero(), F_rate = F;
     for (int k = 0; k < loop.directions(); ++k) {
+      const int i = loop.num_u + k;
       const S force = row_scale_[loop.row(k)] * z[loop.row(k)];
-      F += Wrench<Space, S>(loop.basis[loop.num_u + k] * force);
-      if constexpr (kRates) F_rate += Wrench<Space, S>(loop.rate[loop.num_u + k] * force);
+      Add(loop.parts[i], loop.basis[i], force, F);
+      if (kRates && loop.parts[i].moves) Add(loop.parts[i], loop.own_rates[i], force, F_rate);
     }
+    if constexpr (kRates) F_rate += TurnWithP(kinematics, loop.joint, F);
     for (const Link& link : loop.links) {
       const Edge& edge = edges_[link.child];
       const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
       const Wrench<Space, S> at = ShiftForce<Space, S>(F, link.arm);
-      Wrench<Space, S> at_rate = ShiftForce<Space, S>(F_rate, link.arm);
-      if constexpr (kRates) at_rate.angular += Moment<S>(link.arm_rate, F.linear);
-      for (int i = 0; i < edge.num_columns; ++i) {
+      Wrench<Space, S> at_rate = at;
+      if constexpr (kRates) {
+        at_rate = ShiftForce<Space, S>(F_rate, link.arm) - TurnWithP(kinematics, edge.joint, at);
+        at_rate.angular += Moment<S>(link.arm_rate, F.linear);
+      }
+      for (int i = kRates ? 0 : edge.num_u; i < edge.num_columns; ++i) {
         const int column = ColumnOf(edge, i);
-        const S part = kRates ? edge.rate[i].dot(at) + basis[i].dot(at_rate) : basis[i].dot(at);
-        columns[column] += link.sign * column_scale_[column] * part;
+        S part = Dot(edge.parts[i], basis[i], at_rate);
+        if (kRates && edge.parts[i].moves) part += Dot(edge.parts[i], edge.own_rates[i], at);
+        part *= column_scale_[column];
+        link.is_reversed ? columns[column] -= part : columns[column] += part;
       }
     }
   }
@@ -342,7 +407,8 @@ void SelfStress<Space, S>::Measure(const Kinematics<Space, S>& kinematics) {
     const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(loop.joint);
     for (int k = 0; k < loop.directions(); ++k) {
       const int row = loop.row(k);
-      e_c_[row] = row_scale_[row] * loop.basis[loop.num_u + k].dot(mismatch);
+      const int i = loop.num_u + k;
+      e_c_[row] = row_scale_[row] * Dot(loop.parts[i], loop.basis[i], mismatch);
     }
   }
   for (const int child : forest_) {
@@ -352,20 +418,22 @@ void SelfStress<Space, S>::Measure(const Kinematics<Space, S>& kinematics) {
     const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(edge.joint);
     for (int k = 0; k < state.rows(); ++k) {
       const int row = edge.D_column + k;
-      e_t_[row] = state.D(k).dot(mismatch) / column_scale_[H_ + row];
+      const DirectionParts& parts = edge.parts[edge.num_u + k];
+      e_t_[row] = Dot(parts, state.D(k), mismatch) * (parts.turns ? mechanism_->length() : S(1));
     }
   }
 }
 
 template <class Space, class S>
 void SelfStress<Space, S>::ProjectOnStress(VectorX<S>& z_t, VectorX<S>& z_c) {
-  along_ = z_c.tail(d_);
-  along_.noalias() -= T_.transpose().lazyProduct(z_c.head(r_));
-  if (D_ > 0) along_.noalias() += W_t_.transpose().lazyProduct(z_t);
+  MultiplyTransposed(T_, z_c, along_);
+  MultiplyTransposed(W_t_, z_t, missed_);
+  for (int q = 0; q < d_; ++q) along_[q] = z_c[r_ + q] - along_[q] + missed_[q];
   SolveBoth(C_, along_.data());
+  Multiply(T_, along_, z_c.head(r_));
+  Multiply(W_t_, along_, z_t);
+  for (int k = 0; k < r_; ++k) z_c[k] = -z_c[k];
   z_c.tail(d_) = along_;
-  z_c.head(r_).noalias() = -T_.lazyProduct(along_);
-  if (D_ > 0) z_t.noalias() = W_t_.lazyProduct(along_);
 }
 
 template <class Space, class S>
@@ -380,14 +448,14 @@ const VectorX<S>& SelfStress<Space, S>::Feedback(const Kinematics<Space, S>& kin
     e_c_ -= z_c_;
   }
   SolveBoth(gram_, e_c_.data());
-  x_.head(H_).noalias() = rows_.leftCols(r_).lazyProduct(e_c_.head(r_));
+  Multiply(rows_, e_c_.head(r_), x_.head(H_));
   // W (-W'^T e), from the rates of loops; rates of J_t vanish
   Times<true>(kinematics, x_, z_c_);
   z_t_.setZero();
   ProjectOnStress(z_t_, z_c_);
   // z = W' W'^T e: J^T z = J'^T W (-W'^T e) and W^T z = 0
   TransposedTimes<true>(kinematics, z_c_, y_);
-  z_c_.head(r_).noalias() = rows_.leftCols(r_).transpose().lazyProduct(y_.head(H_));
+  MultiplyTransposed(rows_, y_, z_c_.head(r_));
   z_c_.tail(d_).setZero();
   SolveBoth(gram_, z_c_.data());
   if (D_ > 0) {
@@ -433,12 +501,12 @@ const VectorX<S>& SelfStress<Space, S>::ShareOfAccelerations(
 
 template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::ForceOfStress(const VectorX<S>& lambda) {
-  if (D_ > 0) return force_;
+  if (!needs_multipliers()) return force_;
   e_c_.setZero();
   for (const Loop& loop : loops_) {
     for (int k = 0; k < loop.num_imposed; ++k) {
       const int row = loop.imposed + k;
-      e_c_[row] = lambda[mechanism_->joints()[loop.joint].row + k] / row_scale_[row];
+      e_c_[row] = lambda[mechanism_->joints()[loop.joint].row + k] * inverse_scale_[row];
       if (k < loop.num_drives) continue;
       for (const int q : loop.rows_released) {
         if (q >= r_) e_c_[q] += T_(row, q - r_) * e_c_[row];
@@ -447,7 +515,7 @@ const VectorX<S>& SelfStress<Space, S>::ForceOfStress(const VectorX<S>& lambda) 
   }
   for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
     const int row = r_ - mechanism_->num_moving_rows() + i;
-    e_c_[row] = lambda[FirstMovingEquation() + i] / row_scale_[row];
+    e_c_[row] = lambda[FirstMovingEquation() + i] * inverse_scale_[row];
   }
   ProjectOnStress(e_t_, e_c_);
   force_.setZero();
@@ -484,12 +552,12 @@ void SelfStress<Space, S>::ToRows(const VectorX<S>& forest, const VectorX<S>& lo
       for (const int q : loop.rows_released) {
         if (k >= loop.num_drives && q >= r_) sum += T_(row, q - r_) * loops[q];
       }
-      rows[mechanism_->joints()[loop.joint].row + k] = sum / row_scale_[row];
+      rows[mechanism_->joints()[loop.joint].row + k] = sum * inverse_scale_[row];
     }
   }
   for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
     const int row = r_ - mechanism_->num_moving_rows() + i;
-    rows[FirstMovingEquation() + i] = loops[row] / row_scale_[row];
+    rows[FirstMovingEquation() + i] = loops[row] * inverse_scale_[row];
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];

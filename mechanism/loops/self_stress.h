@@ -68,7 +68,7 @@ class SelfStress {
           const int row = loop.rows_released[q];
           if (row < r_) continue;
           const S share =
-              T_(loop.imposed + k, row - r_) * row_scale_[row] / row_scale_[loop.imposed + k];
+              T_(loop.imposed + k, row - r_) * row_scale_[row] * inverse_scale_[loop.imposed + k];
           basis[loop.num_u + k] += basis[loop.num_u + loop.num_imposed + q] * Any(share);
         }
       }
@@ -85,22 +85,26 @@ class SelfStress {
   /// mass. Feedback() must have been called.
   const VectorX<S>& ShareOfAccelerations(const Kinematics<Space, S>& kinematics,
                                          std::span<const Acceleration<Space, S>> A);
+  /// Returns true if multipliers have a part along W that must be removed.
+  bool needs_multipliers() const { return D_ == 0; }
   /// -J^T W W^T lambda: the generalised force that takes the part along W from multipliers lambda
-  /// of the imposed rows. Empty in absolute coordinates.
+  /// of the imposed rows. Empty, and without use of lambda, unless needs_multipliers().
   const VectorX<S>& ForceOfStress(const VectorX<S>& lambda);
 
  private:
+  using Parts = std::array<DirectionParts, Space::kDim>;
   /// A joint of the spanning forest, at its child: parent and child are bodies.
   struct Edge {
     int joint = -1, parent = kGround, sign = 1, depth = 0;
     int column = 0, D_column = -1;  ///< first columns of J_H and J_D; -1 in joint coordinates
     int num_u = 0, num_columns = 0;
-    Basis<Space, S> rate;  ///< of its directions
+    Parts parts;
+    Basis<Space, S> own_rates;  ///< OwnRates() of its directions
   };
   /// A joint of the forest on the loop between the two sides of a closing joint.
   struct Link {
     int child = 0;
-    S sign = S(1);
+    bool is_reversed = false;
     Linear<Space, S> arm, arm_rate;  ///< from it to the point of the loop's joint
   };
   /// A joint that closes a loop. Rows of loops are imposed ones, moving ones, then released ones.
@@ -109,7 +113,8 @@ class SelfStress {
     std::vector<int> rows_released;  ///< of its released directions: moving or not imposed
     int num_u = 0, num_imposed = 0, num_released = 0, num_drives = 0;
     std::vector<Link> links;
-    Basis<Space, S> basis, rate;  ///< as UpdatePosition() has it
+    Parts parts;
+    Basis<Space, S> basis, own_rates;  ///< as UpdatePosition() has it
 
     int row(int direction) const {
       return direction < num_imposed ? imposed + direction : rows_released[direction - num_imposed];
@@ -120,8 +125,8 @@ class SelfStress {
     return mechanism_->num_rows() + mechanism_->num_coordinate_couplings();
   }
   void Span();
-  /// Sets the rows of released directions.
-  void Arrange(const std::vector<Released>& released);
+  /// Sets rows, parts and scales for the released directions of `kinematics`.
+  void Arrange(const Kinematics<Space, S>& kinematics);
   std::vector<Link> LinksOf(int joint) const;
   /// Column of J for column i of a joint's [H D].
   int ColumnOf(const Edge& edge, int i) const {
@@ -131,10 +136,14 @@ class SelfStress {
   void FillRates(const Kinematics<Space, S>& kinematics);
   /// gram_ and T_; the least pivot over the trace.
   S FactorRows();
-  /// J x by the rows of loops, or J' x.
+  /// Rates of directions that are fixed in P, times numbers with the sum V.
+  template <class Kind>
+  SpatialVector<Space, S, Kind> TurnWithP(const Kinematics<Space, S>& kinematics, int joint,
+                                          const SpatialVector<Space, S, Kind>& V) const;
+  /// J x by the rows of loops for x without a part along H, or J' x.
   template <bool kRates>
   void Times(const Kinematics<Space, S>& kinematics, const VectorX<S>& x, VectorX<S>& rows) const;
-  /// J^T z, or J'^T z.
+  /// Columns D of J^T z, or all of J'^T z.
   template <bool kRates>
   void TransposedTimes(const Kinematics<Space, S>& kinematics, const VectorX<S>& z,
                        VectorX<S>& columns) const;
@@ -151,13 +160,14 @@ class SelfStress {
   std::vector<Edge> edges_;  ///< by child body
   std::vector<int> forest_;  ///< children of the forest's joints
   std::vector<Loop> loops_;
-  bool is_exact_ = false;
+  bool is_exact_ = false, is_arranged_ = false;
   std::vector<Released> arranged_;
-  int r_ = 0, d_ = 0;                    ///< imposed (with moving) and released rows of loops
-  int H_ = 0, D_ = 0;                    ///< columns of J_H and J_D
-  MatrixX<S> rows_;                      ///< J_H transposed; rows and columns in scale
-  VectorX<S> row_scale_, column_scale_;  ///< factors of rows, and of columns: 1 / length
-  MatrixX<S> gram_, T_, C_, W_t_;        ///< gram_ and C_ = W^T W hold Cholesky factors
+  int r_ = 0, d_ = 0;  ///< imposed (with moving) and released rows of loops
+  int H_ = 0, D_ = 0;  ///< columns of J_H and J_D
+  MatrixX<S> rows_;    ///< J_H transposed; rows and columns in scale
+  /// Factors of rows and their inverses, and of columns: 1 / length.
+  VectorX<S> row_scale_, inverse_scale_, column_scale_;
+  MatrixX<S> gram_, T_, C_, W_t_;  ///< gram_ and C_ = W^T W hold Cholesky factors
   VectorX<S> e_t_, e_c_, x_, y_, z_t_, z_c_, missed_, along_, feedback_, share_, force_;
 };
 

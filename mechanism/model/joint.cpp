@@ -29,15 +29,34 @@ std::deque<JointKind<Space, S>>& KindsOf() {
   return kinds;
 }
 
-/// Columns of H are as long at every pose.
+/// A pose without special values.
 template <class Space, class S>
-void SetLengthOfH(JointKind<Space, S>* kind) {
-  if (kind->basis == nullptr || kind->num_u == 0) return;
+Pose<Space, S> SomePose() {
   Pose<Space, S> X;
-  X.p = Linear<Space, S>::Unit(0);
-  Basis<Space, S> basis;
-  kind->basis(X, basis, kind->parameter);
-  kind->inverse_H_squared = S(1) / basis[0].squaredNorm();
+  if constexpr (Space::kRot == 1) {
+    X.SetAngle(S(0.4));
+  } else {
+    const S q[] = {S(0.8), S(0.2), S(0.4), S(0.4)};
+    X.R = FromQuaternion(q);
+  }
+  for (int i = 0; i < Space::kLin; ++i) X.p[i] = S(0.3) + S(0.2) * S(i);
+  return X;
+}
+
+/// Columns of H are as long at every pose, and screws are screws at every pose.
+template <class Space, class S>
+void ExamineBasis(JointKind<Space, S>* kind) {
+  for (const auto directions : {kind->exact_basis, kind->basis}) {
+    if (directions == nullptr) continue;
+    Basis<Space, S> basis;
+    directions(SomePose<Space, S>(), basis, kind->parameter);
+    for (int i = 0; i < Space::kDim; ++i) {
+      const bool turns = kind->axes[i] < Space::kRot;
+      if (turns ? !basis[i].linear.isZero() : !basis[i].angular.isZero()) kind->has_screws = true;
+    }
+    if (directions != kind->basis || kind->num_u == 0) continue;
+    kind->inverse_H_squared = S(1) / basis[0].squaredNorm();
+  }
 }
 
 }  // namespace
@@ -45,7 +64,7 @@ void SetLengthOfH(JointKind<Space, S>* kind) {
 template <class Space, class S>
 void AddKind(JointType type, const JointKind<Space, S>& kind) {
   KindsOf<Space, S>().resize(static_cast<std::size_t>(type));
-  SetLengthOfH(&KindsOf<Space, S>().emplace_back(kind));
+  ExamineBasis(&KindsOf<Space, S>().emplace_back(kind));
 }
 
 template <class Space, class S>
@@ -61,7 +80,7 @@ template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter) {
   JointKind<Space, S> kind = KindOf<Space, S>(type);
   kind.parameter = parameter;
-  SetLengthOfH(&kind);
+  ExamineBasis(&kind);
   return kind;
 }
 

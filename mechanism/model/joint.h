@@ -63,6 +63,9 @@ struct JointKind {
 
   /// Parameter of the kinds helical (pitch [m/rad]) and rod (length [m]); 0 for others.
   S parameter = S(0);
+  /// True if some direction both turns and shifts. Otherwise column i of [H D] turns if axes[i] <
+  /// kRot, and shifts if not. Found from `basis` and `exact_basis`.
+  bool has_screws = false;
   /// 1 / |H|^2 of each column of H, by which u = inverse_H_squared H^T V for a relative velocity V.
   /// It is 1 in every built-in kind but the helical, whose H is [z; pitch z]; found from `basis`.
   S inverse_H_squared = S(1);

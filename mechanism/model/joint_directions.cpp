@@ -36,7 +36,13 @@ template <class Space, class S>
 void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
                 const Pose<Space, S>& X_FM, Basis<Space, S>& basis) {
   kind.basis(X_FM, basis, kind.parameter);
-  for (Direction<Space, S>& direction : basis) direction = Rotate(R, direction);
+  for (int i = 0; i < Space::kDim; ++i) {
+    const bool turns = kind.axes[i] < Space::kRot;
+    if constexpr (Space::kRot == 3) {
+      if (turns || kind.has_screws) basis[i].angular = R * basis[i].angular;
+    }
+    if (!turns || kind.has_screws) basis[i].linear = R * basis[i].linear;
+  }
 }
 
 /// Step of central differences: rounding and truncation errors are alike, 4e-11.
@@ -109,20 +115,21 @@ int Kinematics<Space, S>::DirectionOf(int index, int row) const {
 
 /// Directions of prescribed coordinates go from H to the head of D, released ones to its end.
 template <class Space, class S>
-void Kinematics<Space, S>::OrderDirections(int index, Basis<Space, S>& basis) const {
+template <class Columns>
+void Kinematics<Space, S>::OrderDirections(int index, Columns& columns) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   if (joint.num_drives == 0 && joint.num_released == 0) return;
-  const Basis<Space, S> all = basis;
+  const Columns all = columns;
   int free = 0, driven = joint.num_u();
   for (int i = 0; i < joint.kind->num_u; ++i) {
-    basis[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
+    columns[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
   }
   if (joint.num_released == 0) return;
   const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
   int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
   for (int i = 0; i < joint.kind->num_constraints(); ++i) {
     const bool is_out = std::ranges::binary_search(out, i);
-    basis[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
+    columns[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
   }
 }
 
@@ -140,35 +147,45 @@ void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_
 }
 
 template <class Space, class S>
-void Kinematics<Space, S>::BasisRate(int index, const Basis<Space, S>& basis, int count,
-                                     Basis<Space, S>& rate) const {
+std::array<DirectionParts, Space::kDim> Kinematics<Space, S>::PartsOf(int index) const {
+  const JointKind<Space, S>& kind = *mechanism_->joints()[index].kind;
+  std::array<DirectionParts, Space::kDim> parts;
+  for (int i = 0; i < Space::kDim; ++i) {
+    const bool turns = kind.axes[i] < Space::kRot;
+    parts[i].turns = turns || kind.has_screws;
+    parts[i].shifts = !turns || kind.has_screws;
+    parts[i].moves = kind.basis_rate != nullptr ? parts[i].turns : kind.basis != nullptr;
+  }
+  OrderDirections(index, parts);
+  return parts;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::OwnRates(int index, const std::array<DirectionParts, Space::kDim>& parts,
+                                    int count, Basis<Space, S>& rates) const {
   const Joint<Space, S>& joint = mechanism_->joints()[index];
   const JointState<Space, S>& state = joints_[index];
-  const Angular<Space, S>& w_P = motions_[joint.from].angular;
-  for (int i = 0; i < count; ++i) {
-    rate[i].angular = CrossAngular<S>(w_P, basis[i].angular);
-    rate[i].linear = Cross<S>(w_P, basis[i].linear);
-  }
   if (joint.kind->basis == nullptr) return;
   const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
   const Velocity<Space, S> V = Rotate<Space, S>(R_WF.transpose(), state.V_rel);
-  Basis<Space, S> ahead, behind;
   if (joint.kind->basis_rate != nullptr) {
-    joint.kind->basis_rate(joint_poses_[index], V, ahead);
-    OrderDirections(index, ahead);
-    if constexpr (Space::kRot == 3) {
-      for (int i = 0; i < count; ++i) rate[i].angular += R_WF * ahead[i].angular;
-    }
-    return;
+    joint.kind->basis_rate(joint_poses_[index], V, rates);
+  } else {
+    const S speed = state.V_rel.angular.norm() + state.V_rel.linear.norm() / mechanism_->length();
+    const S step = speed > S(0) ? S(kRelativeStep) / speed : S(1);
+    Basis<Space, S> behind;
+    joint.kind->basis(Moved(joint_poses_[index], V, step), rates, joint.kind->parameter);
+    joint.kind->basis(Moved(joint_poses_[index], V, -step), behind, joint.kind->parameter);
+    for (int i = 0; i < Space::kDim; ++i) rates[i] = (rates[i] - behind[i]) / (S(2) * step);
   }
-  const S speed = state.V_rel.angular.norm() + state.V_rel.linear.norm() / mechanism_->length();
-  if (!(speed > S(0))) return;
-  const S step = S(kRelativeStep) / speed;
-  joint.kind->basis(Moved(joint_poses_[index], V, step), ahead, joint.kind->parameter);
-  joint.kind->basis(Moved(joint_poses_[index], V, -step), behind, joint.kind->parameter);
-  for (int i = 0; i < Space::kDim; ++i) ahead[i] -= behind[i];
-  OrderDirections(index, ahead);
-  for (int i = 0; i < count; ++i) rate[i] += Rotate(R_WF, ahead[i] / (S(2) * step));
+  OrderDirections(index, rates);
+  for (int i = 0; i < count; ++i) {
+    if (!parts[i].moves) continue;
+    if constexpr (Space::kRot == 3) {
+      if (parts[i].turns) rates[i].angular = R_WF * rates[i].angular;
+    }
+    if (parts[i].shifts) rates[i].linear = R_WF * rates[i].linear;
+  }
 }
 
 /// [H D] of a joint whose directions move.
@@ -185,11 +202,12 @@ void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>&
   }
 }
 
-#define LOOPBENCH_INSTANTIATE(Space, S)                                           \
-  template void Kinematics<Space, S>::Release(const std::vector<Released>&);      \
-  template int Kinematics<Space, S>::DirectionOf(int, int) const;                 \
-  template void Kinematics<Space, S>::BasisRate(int, const Basis<Space, S>&, int, \
-                                                Basis<Space, S>&) const;          \
+#define LOOPBENCH_INSTANTIATE(Space, S)                                                      \
+  template void Kinematics<Space, S>::Release(const std::vector<Released>&);                 \
+  template int Kinematics<Space, S>::DirectionOf(int, int) const;                            \
+  template std::array<DirectionParts, Space::kDim> Kinematics<Space, S>::PartsOf(int) const; \
+  template void Kinematics<Space, S>::OwnRates(                                              \
+      int, const std::array<DirectionParts, Space::kDim>&, int, Basis<Space, S>&) const;     \
   template void Kinematics<Space, S>::FollowDirections(int, const Rotation<Space, S>&);
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE

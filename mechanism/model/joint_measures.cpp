@@ -44,18 +44,35 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   if (joint.in_tree()) {
     return joint.num_drives > 0 ? drives_[joint.first_drive].value : q_[joint.q_offset];
   }
-  S q;
-  joint.kind->coordinates(joint_poses_[index], &q, joint.kind->parameter);
+  const S q = Measured(index);
   if (joint.kind->parameter != S(0)) return q;  // the shift of a helix determines its turns
-  // Space measures an angle modulo a turn; take the one next to the last accepted.
-  if (Space::kRot == 3 && joint.kind->axes[0] < 3) {
-    const S turn = 2 * std::numbers::pi_v<S>;
-    using std::remainder;
-    S near = accepted_[index];
-    if (!accepted_speeds_.empty()) near += accepted_speeds_[index] * (time_ - accepted_time_);
-    q = near + remainder(q - near, turn);
+  if (joint.kind->axes[0] >= Space::kRot) return q;
+  // In the plane angles of bodies count turns, but not from the joint's initial value.
+  if constexpr (Space::kRot == 1) {
+    return q + (turns_are_counted_ ? whole_turns_[index] : WholeTurns(index, q));
   }
+  // Space measures an angle modulo a turn; take the one next to the last accepted.
+  using std::remainder;
+  S near = accepted_[index];
+  if (!accepted_speeds_.empty()) near += accepted_speeds_[index] * (time_ - accepted_time_);
+  return near + remainder(q - near, S(2 * std::numbers::pi_v<S>));
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::Measured(int index) const {
+  const JointKind<Space, S>& kind = *mechanism_->joints()[index].kind;
+  S q;
+  kind.coordinates(joint_poses_[index], &q, kind.parameter);
   return q;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::WholeTurns(int index, const S& measured) const {
+  using std::round;
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const S turn = 2 * std::numbers::pi_v<S>;
+  const S near = joint.num_drives > 0 ? drives_[joint.first_drive].value : accepted_[index];
+  return turn * round((near - measured) / turn);
 }
 
 template <class Space, class S>
@@ -102,8 +119,11 @@ void Kinematics<Space, S>::ForgetSteps() {
 template <class Space, class S>
 void Kinematics<Space, S>::AcceptStep() {
   for (int index : mechanism_->constraints()) {
-    if (mechanism_->joints()[index].kind->num_u == 1) accepted_[index] = JointCoordinate(index);
+    if (mechanism_->joints()[index].kind->num_u != 1) continue;
+    if (!turns_are_counted_) whole_turns_[index] = WholeTurns(index, Measured(index));
+    accepted_[index] = JointCoordinate(index);
   }
+  turns_are_counted_ = true;
   if (accepted_speeds_.empty()) return;
   for (const Coupling<S>& coupling : mechanism_->couplings()) {
     for (const auto& [joint, ratio] : coupling.parts) accepted_speeds_[joint] = JointSpeed(joint);
@@ -125,12 +145,14 @@ void Kinematics<Space, S>::CountTurns() {
 }
 
 template <class Space, class S>
-void Kinematics<Space, S>::CountTurnsLike(const Kinematics& other) {
-  if (turns_.empty()) return;
-  accepted_ = other.accepted_;
-  accepted_speeds_ = other.accepted_speeds_;
-  turns_ = other.turns_;
-  accepted_time_ = other.accepted_time_;
+template <class T>
+void Kinematics<Space, S>::CountTurnsLike(const Kinematics<Space, T>& other) {
+  accepted_.assign(other.accepted_.begin(), other.accepted_.end());
+  accepted_speeds_.assign(other.accepted_speeds_.begin(), other.accepted_speeds_.end());
+  turns_.assign(other.turns_.begin(), other.turns_.end());
+  whole_turns_.assign(other.whole_turns_.begin(), other.whole_turns_.end());
+  accepted_time_ = S(other.accepted_time_);
+  turns_are_counted_ = other.turns_are_counted_;
 }
 
 template <class Space, class S>
@@ -183,5 +205,7 @@ VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
   template VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics&) const;
 LOOPBENCH_FOR_EACH_SPACE_AND_MODEL_SCALAR(LOOPBENCH_INSTANTIATE)
 #undef LOOPBENCH_INSTANTIATE
+template void Kinematics<Planar, Dual>::CountTurnsLike(const Kinematics<Planar, double>&);
+template void Kinematics<Spatial, Dual>::CountTurnsLike(const Kinematics<Spatial, double>&);
 
 }  // namespace loopbench

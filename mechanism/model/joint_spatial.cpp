@@ -77,7 +77,8 @@ struct Kinds {
       basis_F[i] = axes[i] == 0   ? Turn(tilt.about_x)
                    : axes[i] == 1 ? Turn(tilt.about_y)
                    : axes[i] == 2 ? Turn(tilt.z_M)
-                                  : Direction<Spatial, S>::Unit(axes[i]) * length;
+                                  : Direction<Spatial, S>::Zero();
+      if (axes[i] > 2) basis_F[i][axes[i]] = length;
     }
   }
   template <int... kAxes>

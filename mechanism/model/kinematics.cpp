@@ -65,6 +65,7 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
       accepted_(joints_.size(), S(0)),
       accepted_speeds_(mechanism.num_coordinate_couplings() == 0 ? 0 : joints_.size(), S(0)),
       turns_(mechanism.couplings().size(), S(0)),
+      whole_turns_(joints_.size(), S(0)),
       q_(VectorX<S>::Zero(mechanism.num_q())),
       u_(VectorX<S>::Zero(mechanism.num_u())) {
   SetTime(S(0));

@@ -7,6 +7,7 @@
 // along the spanning tree from Ground outwards, body after body.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,11 @@ struct JointState {
     for (int i = 0; i < count; ++i) sum += D(i) * numbers[i];
     return sum;
   }
+};
+
+/// Parts of a direction that need not be zero, and whether it moves in axes that turn with P.
+struct DirectionParts {
+  bool turns = true, shifts = true, moves = true;
 };
 
 /// The wrench at Mo of an effort along a coordinate with the direction H: its power is tau u. An
@@ -192,16 +198,20 @@ class Kinematics {
   /// coordinate).
   int DirectionOf(int joint, int row) const;
 
-  /// Rates of the first `count` columns of a joint's `basis` [H D] as UpdatePosition() has it, in
-  /// axes that turn with F and as components along ground axes. Motions must be current. Without
+  /// Parts of the columns of a joint's [H D], in their order of the last Release().
+  std::array<DirectionParts, Space::kDim> PartsOf(int joint) const;
+  /// Rates of those of the first `count` columns that move in axes that turn with P, in these axes
+  /// and as components along ground axes; others are not set. Motions must be current. Without
   /// JointKind::basis_rate they are central differences, with relative errors of 1e-10.
-  void BasisRate(int joint, const Basis<Space, S>& basis, int count, Basis<Space, S>& rate) const;
+  void OwnRates(int joint, const std::array<DirectionParts, Space::kDim>& parts, int count,
+                Basis<Space, S>& rates) const;
 
   /// Remembers the coordinates of cut joints, so that the next angles are unwrapped from here.
   /// Called at accepted steps only (the one memory of this class, part of the mode).
   void AcceptStep();
   /// Continues the measured coordinate of a joint from this value, after SetTime().
   void ContinueFrom(int joint, const S& coordinate) {
+    turns_are_counted_ = false;
     accepted_[joint] = coordinate;
     if (!accepted_speeds_.empty()) accepted_speeds_[joint] = S(0);
   }
@@ -210,7 +220,15 @@ class Kinematics {
   /// Sets the turns of measured angles so that couplings hold. Call after AcceptStep() at a start.
   void CountTurns();
   /// Continues angles from where `other` does.
-  void CountTurnsLike(const Kinematics& other);
+  template <class T>
+  void CountTurnsLike(const Kinematics<Space, T>& other);
+  /// Whole turns [rad] that planar angles of cut joints have beyond the angles of their bodies, by
+  /// joint. Part of the mode: counted at the first AcceptStep(), from the initial values.
+  const std::vector<S>& whole_turns() const { return whole_turns_; }
+  void TakeWholeTurns(std::span<const double> turns) {
+    whole_turns_.assign(turns.begin(), turns.end());
+    turns_are_counted_ = true;
+  }
 
   /// q of a mechanism with the same bodies, from body poses here (other coordinate set).
   VectorX<S> CoordinatesIn(const Mechanism<Space, S>& other) const;
@@ -218,6 +236,12 @@ class Kinematics {
   VectorX<S> SpeedsIn(const Kinematics& other) const;
 
  private:
+  template <class, class>
+  friend class Kinematics;
+  /// The coordinate of a cut joint with one, angles up to whole turns.
+  S Measured(int index) const;
+  /// Whole turns that bring a measured angle next to the last accepted one.
+  S WholeTurns(int index, const S& measured) const;
   Linear<Space, S> Arm(int body, const Linear<Space, S>& r, Masses masses) const {
     if (masses == Masses::kPhysical) return r;
     return r - poses_[body].R * mechanism_->geometric_centre(body);
@@ -229,7 +253,9 @@ class Kinematics {
   void MeasureCut(int index);
   void FollowDirections(int index, const Rotation<Space, S>& R_WF);
   void SetDirections(int index, const Rotation<Space, S>& R_WF);
-  void OrderDirections(int index, Basis<Space, S>& basis) const;
+  /// Of a kind's [H D], or of data of their columns.
+  template <class Columns>
+  void OrderDirections(int index, Columns& columns) const;
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Pose<Space, S>> poses_;
@@ -244,6 +270,8 @@ class Kinematics {
   /// accepted steps; by coupling, the turns that measured angles lack.
   std::vector<S> accepted_speeds_, turns_;
   S accepted_time_ = S(0);
+  std::vector<S> whole_turns_;
+  bool turns_are_counted_ = false;
   std::vector<Released> released_;
   std::vector<MovingRow> moving_rows_;
   VectorX<S> q_, u_;

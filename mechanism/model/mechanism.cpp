@@ -96,7 +96,8 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
     if (inertia > 0.0) rotors_.push_back({j, S(inertia)});
   }
   for (const JointValues& values : description.initial.coordinates) {
-    if (values.values.size() == 1) joints_[values.joint].initial = values.values[0];
+    const bool is_given = values.values.size() == 1 && !std::isnan(values.values[0]);
+    if (is_given) joints_[values.joint].initial = values.values[0];
   }
   forces_ = ForceElements<Space, S>(description);
   AddStopTimes();

@@ -7,6 +7,7 @@
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/row_choice.h"
+#include "mechanism/loops/scaled_loops.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench {
@@ -18,6 +19,9 @@ namespace {
 constexpr double kApart = 0.15;
 constexpr int kMaxWithTurns = 40;
 int Positions(int speeds) { return speeds <= kMaxWithTurns ? 48 : 6; }
+/// A larger rank than before needs this conditioning. Near singular configurations errors of
+/// positions grow, and may make redundant rows independent by a little more than kRankRatio.
+constexpr double kCertain = 10.0 * kRankRatio;
 /// To decide where rows must move, a walk takes one turn per freedom, but no more than these.
 constexpr int kMostTurns = 8;
 
@@ -66,7 +70,13 @@ Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>
   const bool is_large = mechanism.num_u() > kMaxWithTurns;
   const int all = enough * (is_large ? 1 : std::clamp(best.freedom(), 1, kMostTurns));
   for (int k = 1; k <= all && best.rank() < mechanism.num_rows(); ++k) {
+    const Excursion<Space> before = excursion;
     if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < best.rank()) continue;
+    if (excursion.rank() > best.rank() && excursion.conditioning() < kCertain) {
+      excursion = before;
+      excursion.TurnAnywhere();
+      continue;
+    }
     if (k > enough) {
       if (excursion.rank() == best.rank()) AddRows(excursion.rows().rows, rows);
       continue;

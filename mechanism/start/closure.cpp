@@ -329,7 +329,7 @@ class Closure {
     }
   }
 
-  /// Takes whole turns off angles, unless cut joints are measured further from their guesses then.
+  /// Takes whole turns off angles, unless the position is further from the guesses then.
   void Unwind(Vector* q) {
     Vector turned = guesses_.Unwound(*q);
     if (turned == *q) return;

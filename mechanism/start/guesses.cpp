@@ -44,10 +44,6 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
     is_held_[index] = true;
     SetColumns(mechanism.joints()[index], &fixed_);
   }
-  std::vector<bool> has_force(description.joints.size(), false);
-  for (ForceDescription force : description.forces) {
-    if (const int* joint = PartsOf(force).joint; joint != nullptr) has_force[*joint] = true;
-  }
   // A link is about twice as long as the distances in length(). Weights do not depend on the unit
   // of length, which is a power of two.
   const double per_link = units.length / (2.0 * mechanism.length());
@@ -65,8 +61,7 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
     }
     if (joint.num_u() == 0) continue;  // prescribed
     CutJoints& cut = is_held_[values.joint] ? held_ : loose_;
-    cut.values.push_back(
-        {values.joint, values.values.data(), Space::kRot == 1 && has_force[values.joint]});
+    cut.values.push_back({values.joint, values.values.data()});
     for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
       if (mechanism.DriveOf(joint, i) >= 0) continue;
       if (IsGiven(*joint.kind, values.values.data(), i)) {
@@ -127,7 +122,7 @@ VectorX<double> Guesses<Space>::Apart(const CutJoints& cut,
                                       const Kinematics<Space, double>& kinematics) const {
   VectorX<double> apart(static_cast<Eigen::Index>(cut.free.size()));
   Eigen::Index row = 0;
-  for (const auto& [index, values, turns_count] : cut.values) {
+  for (const auto& [index, values] : cut.values) {
     const Joint<Space, double>& joint = mechanism_.joints()[index];
     const auto& poses = kinematics.poses();
     const Pose<Space, double> X_WF = Compose(poses[joint.from], joint.X_PF),
@@ -137,7 +132,7 @@ VectorX<double> Guesses<Space>::Apart(const CutJoints& cut,
     std::array<double, 6> all = Difference<Space>(*joint.kind, at, values);
     for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
       if (mechanism_.DriveOf(joint, i) >= 0) continue;
-      if (IsAngle(joint, i) && !turns_count) all[i] = std::remainder(all[i], kTurn);
+      if (IsAngle(joint, i)) all[i] = std::remainder(all[i], kTurn);
       const double unit = units_.Of(kinematics.joints()[index].H(free++));
       if (IsGiven(*joint.kind, values, i)) apart[row++] = all[i] / unit;
     }

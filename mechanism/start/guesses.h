@@ -2,8 +2,7 @@
 // given.
 //
 // Tree joints differ from their guesses by coordinates, turns included; quaternions by the rotation
-// vector between both. Joints that close loops are measured, angles modulo a turn: in the plane
-// they have turns, which count if a force depends on them.
+// vector between both. Joints that close loops are measured, angles modulo a turn.
 #pragma once
 
 #include <cmath>
@@ -59,7 +58,6 @@ class Guesses {
     struct Values {
       int joint;
       const double* values;
-      bool turns_count;
     };
     std::vector<Values> values;
     std::vector<OfCutJoint> free;  ///< of all of them, in order

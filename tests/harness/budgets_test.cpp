@@ -36,26 +36,26 @@ struct Budget {
 // clang-format off
 constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
-    {"mechanism/algebra",       { 2077,  22,   0},  1900},
+    {"mechanism/algebra",       { 2230,  23,   0},  1900},
     {"mechanism/description",   { 2134,  28,   1},  1750},
-    {"mechanism/model",         { 3009,  22,   2},  2300},
-    {"mechanism/loops",         { 3252,  23,   2},  1900},
+    {"mechanism/model",         { 3104,  22,   2},  2300},
+    {"mechanism/loops",         { 3342,  23,   2},  1900},
     {"mechanism/start",         { 2144,  18,   4},   700},
-    {"mechanism/formulation",   { 2744,  24,   4},  1500},
-    {"mechanism/simplify",      { 3370,  25,   5},  2600},
+    {"mechanism/formulation",   { 2749,  24,   4},  1500},
+    {"mechanism/simplify",      { 3380,  25,   5},  2600},
     {"odca",                    { 6999,  38,   5},  3900},
     {"lagrange",                {  376,   4,   4},   350},
-    {"reduction",               { 1634,  12,   4},  1350},
+    {"reduction",               { 1628,  12,   4},  1350},
     {"harness/text",            { 1635,  13,   0},   900},
     {"harness/json",            { 2004,   9,   1},  1300},
     {"harness/record",          { 1515,  10,   3},  1200},
     {"harness/store",           { 1656,   8,   3},  1300},
     {"harness/config",          { 6313,  24,  11},  4000},
-    {"harness/analysis",        { 2117,   8,   9},  1200},
-    {"harness/generate",        { 2428,  12,   7},  1230},
+    {"harness/analysis",        { 2127,   8,   9},  1200},
+    {"harness/generate",        { 2433,  12,   7},  1230},
     {"harness/integrator",      { 1388,   7,   5},   900},
     {"harness/reference",       {  913,   4,   4},   800},
-    {"harness/trajectory",      { 2495,   9,  12},  1750},
+    {"harness/trajectory",      { 2496,   9,  12},  1750},
     {"harness/observers",       { 1147,   4,   7},  1000},
     {"harness/run",             { 1842,  12,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 8425,  26,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {93419, 509, 242}, 62000}
+    {"",                        {93772, 510, 242}, 62000}
 };
 // clang-format on
 

@@ -139,6 +139,15 @@ TEST(Warnings, SingularPassagesCountBelowLevelPosition) {
   EXPECT_EQ(With("velocity", across), "singular-crossing");
   EXPECT_EQ(With("projection", across), "");
   EXPECT_EQ(With("acceleration", {{"singularity_distance_min", 1e-4}}), "singular-crossing");
+  // drift of 4e-7 links misses a singular position by up to 1.3e-3: a parallelogram that left its
+  // flat position as an antiparallelogram
+  const auto missed = [](double distance, double drift) {
+    return With("velocity", {{"singularity_distance_min", distance},
+                             {"drift_position_max", drift},
+                             {"link_length", 0.9}});
+  };
+  EXPECT_EQ(missed(2.88e-4, 3.57e-7), "singular-crossing");
+  EXPECT_EQ(missed(2e-3, 3.57e-7), "");
   // loops too large for the distance report regularized evaluations
   EXPECT_EQ(With("acceleration", {{"singularity_distance_min", Value()},
                                   {"regularized_evaluations", std::int64_t{3}}}),

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "mechanism/description/library.h"
 #include "mechanism/loops/tree_dynamics.h"
@@ -162,6 +163,45 @@ TEST(AssemblyTest, AHeldCutJointIsReached) {
   assembled.UpdatePosition(start.q);
   EXPECT_NEAR(assembled.JointCoordinate(3), angle, 64 * kEps);
   EXPECT_LE(Mismatch(with_held, start.q), 64 * kEps);
+}
+
+/// A spring acts at the angle beside the joint's guess, or beside 0, whichever joint is cut.
+TEST(AssemblyTest, AnglesOfCutJointsCountFromTheirGuesses) {
+  constexpr double kTurn = 2.0 * std::numbers::pi, kStiffness = 10.0;
+  const MechanismDescription plain = FourBar(1.5);
+  const Joints mechanism(plain, Coordinates::kJoint);
+  const Start<double> at = Assemble(plain, mechanism);
+  // the loop closes in the plane: angles between its bars add up to 0
+  const double angles[] = {at.q[0], at.q[1], at.q[2], -at.q.sum()};
+  for (const double turns : {0.0, kTurn, -2.0 * kTurn}) {
+    for (int cut = 0; cut < 4; ++cut) {
+      for (int spring = 0; spring < 4; ++spring) {
+        MechanismDescription d = FourBar(1.5);
+        d.gravity.setZero();
+        d.joints[cut].cut = true;
+        d.initial.coordinates[0].values[0] += turns;
+        d.initial.coordinates.push_back({3, {-1.2 - turns}});
+        d.forces = {JointSpring{.joint = spring, .stiffness = kStiffness, .rest = 0.1}};
+        const Joints other(d, Coordinates::kJoint);
+        const Start<double> start = Assemble(d, other);
+        ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
+        Kinematics<Planar, double> kinematics(other);
+        kinematics.UpdatePosition(start.q);
+        kinematics.UpdateVelocity(start.u);
+        const double wound = spring == 0 ? turns : spring == 3 ? -turns : 0.0;
+        const double stretch = angles[spring] + wound - 0.1;
+        for (int steps = 0; steps < 2; ++steps) {
+          // 64 eps of angles of up to twenty
+          EXPECT_NEAR(kinematics.JointCoordinate(spring), angles[spring] + wound, 64 * kEps * 20)
+              << cut << ' ' << spring << ' ' << turns;
+          EXPECT_NEAR(ComputeEnergy(kinematics).potential, 0.5 * kStiffness * stretch * stretch,
+                      1e-11 * (1.0 + stretch * stretch))
+              << cut << ' ' << spring << ' ' << turns;
+          kinematics.AcceptStep();
+        }
+      }
+    }
+  }
 }
 
 TEST(AssemblyTest, AnUnreachableClosureNamesItsLoopAndResidual) {

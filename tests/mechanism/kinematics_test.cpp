@@ -8,7 +8,10 @@
 
 #include "mechanism/description/library.h"
 #include "mechanism/loops/tree_dynamics.h"
+#include "mechanism/simplify/compile.h"
+#include "mechanism/start/assembly.h"
 #include "tests/mechanism/samples.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace kinematics_test {
@@ -99,6 +102,70 @@ TEST(PlanarKinematicsTest, MatricesAreThoseOfTheAnglesOfAnyNumberOfBodiesAndTurn
 
 /// One answer of the oracle holds the speeds' accelerations: G udot + A_0, with A_0 from second
 /// derivatives of the poses. BodyAccelerations() adds up H udot and g along the tree instead.
+/// Parts and rates of all directions against the directions at both sides of the state.
+template <class Space>
+void ExpectDirections(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
+                      const VectorX<double>& u) {
+  const double step = 1e-6;  // central differences: truncation 1e-12, rounding eps / step = 2e-10
+  VectorX<double> qdot(mechanism.num_q());
+  mechanism.Rates(q, u, Eigen::Map<VectorX<double>>(qdot.data(), qdot.size()));
+  Kinematics<Space, double> here(mechanism), ahead(mechanism), behind(mechanism);
+  here.UpdatePosition(q);
+  here.UpdateVelocity(u);
+  ahead.UpdatePosition(q + step * qdot);
+  behind.UpdatePosition(q - step * qdot);
+  for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+    const Joint<Space, double>& joint = mechanism.joints()[j];
+    const auto parts = here.PartsOf(j);
+    Basis<Space, double> rates;
+    here.OwnRates(j, parts, Space::kDim, rates);
+    const auto& R = here.poses()[joint.from].R;
+    for (int i = 0; i < Space::kDim; ++i) {
+      const Direction<Space, double>& direction = here.joints()[j].basis[i];
+      EXPECT_TRUE(parts[i].turns || direction.angular.norm() == 0.0) << j << ' ' << i;
+      EXPECT_TRUE(parts[i].shifts || direction.linear.norm() == 0.0) << j << ' ' << i;
+      EXPECT_TRUE(joint.kind->basis != nullptr || !parts[i].moves) << j << ' ' << i;
+      if (joint.kind->basis == nullptr) continue;
+      const auto in_P = [&](const Kinematics<Space, double>& kinematics) {
+        return Rotate<Space, double>(kinematics.poses()[joint.from].R.transpose(),
+                                     kinematics.joints()[j].basis[i]);
+      };
+      const Direction<Space, double> expected =
+          Rotate<Space, double>(R, (in_P(ahead) - in_P(behind)) * (0.5 / step));
+      Direction<Space, double> found = Direction<Space, double>::Zero();
+      if (parts[i].moves && parts[i].turns) found.angular = rates[i].angular;
+      if (parts[i].moves && parts[i].shifts) found.linear = rates[i].linear;
+      // third derivatives grow with the cube of the speed
+      const double speed = 1.0 + here.joints()[j].V_rel.norm();
+      EXPECT_LE((found - expected).norm(), 1e-8 * speed * speed * speed) << j << ' ' << i;
+    }
+  }
+}
+
+TYPED_TEST(KinematicsTest, DirectionsHaveTheirPartsAndRates) {
+  testing::ForBothSets<TypeParam>(Samples<TypeParam>(),
+                                  [](const auto&, const auto& mechanism, const State& at) {
+                                    ExpectDirections<TypeParam>(mechanism, at.q, at.u);
+                                  });
+}
+
+/// Directions are exact where constraints are redundant.
+TEST(SpatialKinematicsTest, ExactDirectionsHaveTheirPartsAndRates) {
+  for (const char* name : {"bennett", "screw-jack", "sarrus"}) {
+    const MechanismDescription d = testing::Shipped(name);
+    const Compiled compiled = Compile(d, {.planar = false});
+    const MechanismDescription& part = compiled.parts.front().description;
+    for (const auto set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+      const Mechanism<Spatial, double> mechanism(part, set);
+      EXPECT_TRUE(mechanism.is_redundant());
+      const auto start = Assemble<Spatial>(part, mechanism);
+      VectorX<double> u = start.u;
+      for (int i = 0; i < u.size(); ++i) u[i] += std::cos(2.3 * i);  // not admissible
+      ExpectDirections<Spatial>(mechanism, start.q, u);
+    }
+  }
+}
+
 TYPED_TEST(KinematicsTest, AccelerationsOfBodiesAreSecondDerivativesOfTheirPoses) {
   ForAll<TypeParam>(
       [](const auto& d, const auto& mechanism, const State& at, const auto& kinematics) {

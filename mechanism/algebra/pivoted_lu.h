@@ -1,0 +1,120 @@
+// LU factors with row interchanges, P A = L U. Up to kSmallLu rows by plain loops: Eigen's blocks
+// take twice to four times as long there. Larger matrices use Eigen.
+#pragma once
+
+#include <cmath>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "mechanism/algebra/factors.h"
+
+namespace loopbench {
+
+inline constexpr int kSmallLu = 48;
+
+template <class S>
+class PivotedLu {
+ public:
+  explicit PivotedLu(int size = 0) : size_(size), swaps_(size), inverses_(size, S(0)) {
+    if (size > kSmallLu) large_ = Eigen::PartialPivLU<MatrixX<S>>(size);
+    if (size <= kSmallLu) small_.setZero(size, size);
+  }
+
+  /// `A` has the size of the constructor. No allocation.
+  void Factor(const MatrixX<S>& A) {
+    if (size_ > kSmallLu) {
+      large_.compute(A);
+      return;
+    }
+    small_ = A;
+    for (int k = 0; k < size_; ++k) {
+      swaps_[k] = LargestFrom(k);
+      if (swaps_[k] != k) {
+        for (int j = 0; j < size_; ++j) std::swap(small_(k, j), small_(swaps_[k], j));
+      }
+      inverses_[k] = S(1) / small_(k, k);
+      S* L = &small_(0, k);
+      for (int i = k + 1; i < size_; ++i) L[i] *= inverses_[k];
+      for (int j = k + 1; j < size_; ++j) {
+        S* column = &small_(0, j);
+        if constexpr (std::is_same_v<S, double>) {
+          if (column[k] == 0.0) continue;  // in absolute coordinates most numbers are zero
+        }
+        for (int i = k + 1; i < size_; ++i) column[i] -= L[i] * column[k];
+      }
+    }
+  }
+  /// The least pivot over the largest, each times its `scale` if there is one.
+  S PivotRatio(const VectorX<S>* scale = nullptr) const {
+    using std::abs;
+    using std::max;
+    using std::min;
+    S least(0), most(0);
+    for (int k = 0; k < size_; ++k) {
+      S pivot = abs(size_ > kSmallLu ? large_.matrixLU()(k, k) : small_(k, k));
+      if (scale != nullptr) pivot *= (*scale)[k];
+      least = k == 0 ? pivot : min(least, pivot);
+      most = k == 0 ? pivot : max(most, pivot);
+    }
+    return least / most;
+  }
+
+  /// x := A^-1 x, each column.
+  void Solve(Eigen::Ref<MatrixX<S>> x) const {
+    if (size_ > kSmallLu) {
+      x = large_.permutationP() * x;
+      large_.matrixLU().template triangularView<Eigen::UnitLower>().solveInPlace(x);
+      large_.matrixLU().template triangularView<Eigen::Upper>().solveInPlace(x);
+      return;
+    }
+    for (Eigen::Index column = 0; column < x.cols(); ++column) SolveSmall(x.col(column).data());
+  }
+  /// x := A^-T x.
+  void SolveTransposed(Eigen::Ref<VectorX<S>> x) const {
+    if (size_ > kSmallLu) {
+      large_.matrixLU().template triangularView<Eigen::Upper>().transpose().solveInPlace(x);
+      large_.matrixLU().template triangularView<Eigen::UnitLower>().transpose().solveInPlace(x);
+      x = large_.permutationP().transpose() * x;
+      return;
+    }
+    for (int k = 0; k < size_; ++k) {
+      for (int i = 0; i < k; ++i) x[k] -= small_(i, k) * x[i];
+      x[k] *= inverses_[k];
+    }
+    for (int k = size_ - 1; k >= 0; --k) {
+      for (int i = k + 1; i < size_; ++i) x[k] -= small_(i, k) * x[i];
+    }
+    for (int k = size_ - 1; k >= 0; --k) std::swap(x[k], x[swaps_[k]]);
+  }
+
+ private:
+  int LargestFrom(int k) const {
+    using std::abs;
+    int row = k;
+    for (int i = k + 1; i < size_; ++i) {
+      if (abs(small_(i, k)) > abs(small_(row, k))) row = i;
+    }
+    return row;
+  }
+  void SolveSmall(S* x) const {
+    for (int k = 0; k < size_; ++k) std::swap(x[k], x[swaps_[k]]);
+    for (int k = 0; k < size_; ++k) {
+      const S* L = &small_(0, k);
+      for (int i = k + 1; i < size_; ++i) x[i] -= L[i] * x[k];
+    }
+    for (int k = size_ - 1; k >= 0; --k) {
+      const S* U = &small_(0, k);
+      x[k] *= inverses_[k];
+      for (int i = 0; i < k; ++i) x[i] -= U[i] * x[k];
+    }
+  }
+
+  int size_;
+  std::vector<int> swaps_;
+  std::vector<S> inverses_;  ///< of the pivots
+  MatrixX<S> small_;
+  Eigen::PartialPivLU<MatrixX<S>> large_;
+};
+
+}  // namespace loopbench

@@ -17,8 +17,12 @@ template <class S>
 class PivotedLu {
  public:
   explicit PivotedLu(int size = 0) : size_(size), swaps_(size), inverses_(size, S(0)) {
-    if (size > kSmallLu) large_ = Eigen::PartialPivLU<MatrixX<S>>(size);
-    if (size <= kSmallLu) small_.setZero(size, size);
+    if (size > kSmallLu) {
+      large_ = Eigen::PartialPivLU<MatrixX<S>>(size);
+      permuted_.setZero(size);
+    } else {
+      small_.setZero(size, size);
+    }
   }
 
   /// `A` has the size of the constructor. No allocation.
@@ -60,22 +64,26 @@ class PivotedLu {
     return least / most;
   }
 
-  /// x := A^-1 x, each column.
-  void Solve(Eigen::Ref<MatrixX<S>> x) const {
+  /// x := A^-1 x, each column. No allocation.
+  void Solve(Eigen::Ref<MatrixX<S>> x) {
     if (size_ > kSmallLu) {
-      x = large_.permutationP() * x;
+      for (Eigen::Index column = 0; column < x.cols(); ++column) {
+        permuted_.noalias() = large_.permutationP() * x.col(column);  // in place it would allocate
+        x.col(column) = permuted_;
+      }
       large_.matrixLU().template triangularView<Eigen::UnitLower>().solveInPlace(x);
       large_.matrixLU().template triangularView<Eigen::Upper>().solveInPlace(x);
       return;
     }
     for (Eigen::Index column = 0; column < x.cols(); ++column) SolveSmall(x.col(column).data());
   }
-  /// x := A^-T x.
-  void SolveTransposed(Eigen::Ref<VectorX<S>> x) const {
+  /// x := A^-T x. No allocation.
+  void SolveTransposed(Eigen::Ref<VectorX<S>> x) {
     if (size_ > kSmallLu) {
       large_.matrixLU().template triangularView<Eigen::Upper>().transpose().solveInPlace(x);
       large_.matrixLU().template triangularView<Eigen::UnitLower>().transpose().solveInPlace(x);
-      x = large_.permutationP().transpose() * x;
+      permuted_.noalias() = large_.permutationP().transpose() * x;
+      x = permuted_;
       return;
     }
     for (int k = 0; k < size_; ++k) {
@@ -115,6 +123,7 @@ class PivotedLu {
   std::vector<S> inverses_;  ///< of the pivots
   MatrixX<S> small_;
   Eigen::PartialPivLU<MatrixX<S>> large_;
+  VectorX<S> permuted_;
 };
 
 }  // namespace loopbench

@@ -31,8 +31,7 @@ Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const Vec
     farthest = std::max({farthest, state.r_P.norm(), state.r_Q.norm()});
   }
   const double eps = std::numeric_limits<double>::epsilon();
-  // each joint is given to the accuracy, and their errors are independent; four: 16 joints on a
-  // loop
+  // joints are given to the accuracy, with independent errors; four is the root of 16 joints
   const double of_loop = accuracy * std::min(4.0, std::sqrt(std::ssize(mechanism.joints())));
   closed_ = std::max(std::max(1e-11, of_loop) * mechanism.length(), 100 * eps * farthest);
   kinematics_.AcceptStep();

@@ -185,8 +185,9 @@ void JointResponse<Space>::Solve(std::span<const Acceleration<Space, double>> b,
   for (std::size_t k = 0, row = 0; k < joints_.size(); ++k) {
     for (int i = 0; i < X_.rows(static_cast<int>(k)); ++i) x_[row++] = -c0[joints_[k]][i];
   }
-  std::ranges::fill(A, Acceleration<Space, double>::Zero());
-  if (!b.empty()) {
+  if (b.empty()) {
+    std::ranges::fill(A, Acceleration<Space, double>::Zero());
+  } else {
     for (const Side& side : sides_) {
       for (int i = 0; i < side.rows; ++i) x_[side.row + i] -= c_[side.first + i].dot(b[side.body]);
     }

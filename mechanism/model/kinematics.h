@@ -253,7 +253,7 @@ class Kinematics {
   void MeasureCut(int index);
   void FollowDirections(int index, const Rotation<Space, S>& R_WF);
   void SetDirections(int index, const Rotation<Space, S>& R_WF);
-  /// Of a kind's [H D], or of data of their columns.
+  /// Puts columns of a kind's [H D], or data for them, into the order of rows.
   template <class Columns>
   void OrderDirections(int index, Columns& columns) const;
 

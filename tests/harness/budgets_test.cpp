@@ -36,7 +36,7 @@ struct Budget {
 // clang-format off
 constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
-    {"mechanism/algebra",       { 2230,  23,   0},  1900},
+    {"mechanism/algebra",       { 2244,  23,   0},  1900},
     {"mechanism/description",   { 2134,  28,   1},  1750},
     {"mechanism/model",         { 3104,  22,   2},  2300},
     {"mechanism/loops",         { 3342,  23,   2},  1900},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 8425,  26,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {93772, 510, 242}, 62000}
+    {"",                        {93786, 510, 242}, 62000}
 };
 // clang-format on
 

@@ -39,8 +39,13 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       solver_(solver),
       places_(plan.num_nodes()),
       bodies_(plan.num_leaves()) {
+  for (const int n : plan.leaf_order()) {
+    const Leaf& leaf = plan.leaves()[n];
+    if (leaf.sides.empty()) lone_leaves_.push_back(n);
+    if (leaf.holder >= 0) places_[n].bodies = places_[leaf.holder].bodies + 1;
+  }
   const auto scratch = std::make_shared<LoopScratch<S>>(plan.largest_join());
-  int z = 0, y = 0, x = 0, c = 0, free = 0, widest = Space::kDim;
+  int z = 0, y = 0, x = 0, c = 0, free = 0, arm = 0, widest = Space::kDim;
   c_offset_.assign(mechanism.joints().size(), 0);
   loops_.reserve(plan.loop_joins());
   for (int n = 0; n < plan.num_nodes(); ++n) {
@@ -51,10 +56,11 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
     if (n < plan.num_leaves()) {
       const Leaf& leaf = plan.leaves()[n];
       place.size = leaf.width;
-      if (leaf.sides.empty()) lone_leaves_.push_back(n);
       if (leaf.hold.joint >= 0) {
         place.hold = free;
-        free += Space::kDim - leaf.hold.rows;
+        place.arm = arm;
+        free += leaf.free;
+        if (leaf.end == n) arm += leaf.free * leaf.free;
         c_offset_[leaf.hold.joint] = c;
         c += 2 * leaf.hold.rows;
       }
@@ -87,46 +93,59 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
   c_.assign(c, Wrench<Space, S>::Zero());
   Mc_.assign(c, Acceleration<Space, S>::Zero());
   free_.resize(free);
+  arms_.assign(arm, S(0));
   columns_.setZero(plan.largest_join(), widest);
 }
 
 template <class Space, class S>
-std::span<const typename Joins<Space, S>::FreeDirection> Joins<Space, S>::FreeDirections(
-    int n) const {
+auto Joins<Space, S>::Hang(int n, const HeldMotion* holder, const Wrench<Space, S>& F,
+                           const Components<Space, S>& c0,
+                           const Acceleration<Space, S>* known) const -> HeldMotion {
   const PlanSide& hold = plan_.leaves()[n].hold;
-  if (hold.joint < 0) return {};
-  return std::span(free_).subspan(places_[n].hold, Space::kDim - hold.rows);
-}
-
-template <class Space, class S>
-Acceleration<Space, S> Joins<Space, S>::HeldResponse(int n, const Wrench<Space, S>& F) const {
-  auto A = Acceleration<Space, S>::Zero();
-  for (const FreeDirection& free : FreeDirections(n)) A += free.g * free.g.dot(F);
-  return A;
-}
-
-template <class Space, class S>
-Acceleration<Space, S> Joins<Space, S>::Held(int n, const Wrench<Space, S>& F,
-                                             const Components<Space, S>& c0) const {
-  const PlanSide& hold = plan_.leaves()[n].hold;
-  const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[hold.joint];
-  auto A = Acceleration<Space, S>::Zero();
-  for (int i = 0; i < hold.rows; ++i) A -= dual[i] * c0[i];
-  const Acceleration<Space, S> held = A;
-  for (const FreeDirection& free : FreeDirections(n)) {
-    A += free.g * (free.g.dot(F) - free.Mg.dot(held));
+  HeldMotion motion{Acceleration<Space, S>::Zero(), Components<Space, S>::Zero()};
+  if (holder != nullptr) {
+    motion.given = ShiftMotion<Space, S>(holder->given, bodies_[n].from_holder);
+    motion.along = holder->along;
   }
-  return A;
+  if (!mechanism_.joints()[hold.joint].in_tree()) {
+    const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[hold.joint];
+    for (int i = 0; i < hold.rows; ++i) motion.given -= dual[i] * c0[i];
+  } else if (known != nullptr) {  // components along H do not matter
+    const auto part = ShiftMotion<Space, S>(*known, -bodies_[n].to_hold);
+    hold.at_Q ? motion.given -= part : motion.given += part;
+  }
+  WithFree(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+    Repeat(size,
+           [&](int k) { motion.along[k] += free[k].h.dot(F) - free[k].Mh.dot(motion.given); });
+  });
+  return motion;
 }
 
 template <class Space, class S>
-Components<Space, S> Joins<Space, S>::HoldingForce(int n, const Acceleration<Space, S>& A,
-                                                   const Wrench<Space, S>& F) const {
+Components<Space, S> Joins<Space, S>::AlongArm(int n, const Wrench<Space, S>& F) const {
+  return WithFree(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+    auto along = Components<Space, S>::Zero();
+    Repeat(size, [&](int k) { along[k] = free[k].h.dot(F); });
+    SolveLower(&arms_[places_[n].arm], size, &along[0]);
+    return along;
+  });
+}
+
+template <class Space, class S>
+Acceleration<Space, S> Joins<Space, S>::HeldAcceleration(int n, const Acceleration<Space, S>& given,
+                                                         const Components<Space, S>& x) const {
+  return WithFree(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+    Acceleration<Space, S> A = given;
+    Repeat(size, [&](int k) { A += free[k].h * x[k]; });
+    return A;
+  });
+}
+
+template <class Space, class S>
+Components<Space, S> Joins<Space, S>::HoldingForce(int n, const Wrench<Space, S>& holding) const {
   const PlanSide& hold = plan_.leaves()[n].hold;
-  const Wrench<Space, S> force =
-      Wrench<Space, S>(bodies_[n].rotational * A.angular, A.linear * bodies_[n].mass) - F;
   auto phi = Components<Space, S>::Zero();
-  for (int i = 0; i < hold.rows; ++i) phi[i] = Mc_[c_offset_[hold.joint] + i].dot(force);
+  for (int i = 0; i < hold.rows; ++i) phi[i] = Mc_[c_offset_[hold.joint] + i].dot(holding);
   return phi;
 }
 
@@ -190,47 +209,57 @@ void Joins<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses ma
   Repeat(rows, [&](int i) { c[i] = ShiftForce<Space, S>(state.D(i), r) * sign; });
 }
 
-/// The directions h that its joint to Ground leaves to a body, at the centre of mass, as g = T h
-/// with T^T T = (H^T M H)^-1: the response of the held body is G G^T. Then the duals of the joint's
-/// rows c, as D is orthonormal: they have the product 1 with their own c and 0 with others, so that
-/// c0 costs no solution.
+/// The directions h that the joints of its arm leave to a body, at the centre of mass: those of the
+/// holder, then those of its own joint. The arm's N is the sum of h^T M h over its bodies, and its
+/// last body's response is H N^-1 H^T. Then the duals of the joint's rows c: they have the product
+/// 1 with their own c and 0 with others, so that c0 costs no solution. D is orthonormal but for
+/// exact tilts (JointKind::exact_basis).
 template <class Space, class S>
 void Joins<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n) {
-  const PlanSide& hold = plan_.leaves()[n].hold;
+  const Leaf& leaf = plan_.leaves()[n];
+  const PlanSide& hold = leaf.hold;
   const JointState<Space, S>& state = kinematics.joints()[hold.joint];
-  const Linear<Space, S> r =
-      hold.at_Q ? kinematics.ArmQ(hold.joint, masses) : kinematics.ArmP(hold.joint, masses);
+  const auto arm = [&](bool at_Q) {
+    return at_Q ? kinematics.ArmQ(hold.joint, masses) : kinematics.ArmP(hold.joint, masses);
+  };
   Body& body = bodies_[n];
+  const Linear<Space, S>& r = body.to_hold = arm(hold.at_Q);
   body.rotational = kinematics.RotationalInertia(mechanism_.bodies(masses)[n + 1], n + 1);
   body.mass = mechanism_.bodies(masses)[n + 1].mass;
-  const auto at_centre = [&](const Direction<Space, S>& direction) {
-    return Acceleration<Space, S>(ShiftMotion<Space, S>(direction, -r));
-  };
-  for (int i = 0; i < hold.rows; ++i) {
-    Acceleration<Space, S>& dual = Mc_[c_offset_[hold.joint] + i];
-    dual = at_centre(state.D(i));
-    if (!hold.at_Q) dual = -dual;
+  if (leaf.holder >= 0) body.from_holder = arm(!hold.at_Q) - r;
+  Acceleration<Space, S>* dual = Mc_.data() + c_offset_[hold.joint];
+  for (int i = 0; i < hold.rows; ++i) dual[i] = Acceleration<Space, S>(state.D(i));
+  if constexpr (Space::kRot == 3) {
+    if (mechanism_.joints()[hold.joint].kind->basis_rate != nullptr) {  // two tilts come first
+      const Angular<Space, S>&a = state.D(0).angular, &b = state.D(1).angular;
+      const Angular<Space, S> normal = a.cross(b), scaled = normal / normal.squaredNorm();
+      dual[0].angular = b.cross(scaled);
+      dual[1].angular = scaled.cross(a);
+    }
   }
-  const int size = Space::kDim - hold.rows;
+  for (int i = 0; i < hold.rows; ++i) {
+    dual[i] = ShiftMotion<Space, S>(dual[i], -r) * (hold.at_Q ? S(1) : S(-1));
+  }
+  const int size = leaf.free, before = size - (Space::kDim - hold.rows);
+  const int all = plan_.leaves()[leaf.end].free;
   FreeDirection* free = free_.data() + places_[n].hold;
-  JointMatrix<S> T(size, size);
+  S* N = arms_.data() + places_[leaf.end].arm;
   for (int k = 0; k < size; ++k) {
     // released directions follow D
-    free[k].g = at_centre(state.basis[k < state.num_u ? k : hold.rows + k]);
-    free[k].Mg = {body.rotational * free[k].g.angular, free[k].g.linear * body.mass};
-    for (int l = 0; l <= k; ++l) T(k, l) = free[k].Mg.dot(free[l].g);
-  }
-  FactorLower(T.data(), size);
-  for (int k = 0; k < size; ++k) {
-    for (int l = 0; l < k; ++l) {
-      free[k].g -= free[l].g * T(k, l);
-      free[k].Mg -= free[l].Mg * T(k, l);
+    const int i = k - before;
+    const Acceleration<Space, S> h =
+        k < before ? free_[places_[leaf.holder].hold + k].h
+                   : Acceleration<Space, S>(state.basis[i < state.num_u ? i : hold.rows + i]);
+    free[k].h = ShiftMotion<Space, S>(h, k < before ? body.from_holder : Linear<Space, S>(-r));
+    free[k].Mh = {body.rotational * free[k].h.angular, free[k].h.linear * body.mass};
+    for (int l = 0; l <= k; ++l) {
+      S& sum = N[k + all * l];
+      sum = k < before ? sum + free[k].Mh.dot(free[l].h) : free[k].Mh.dot(free[l].h);
     }
-    free[k].g *= T(k, k);
-    free[k].Mg *= T(k, k);
   }
-  operations_ += size * kApply<Space> + size * size * size / 6 + size +
-                 3 * Space::kDim * (size * (size + 1) / 2);
+  if (leaf.end == n) FactorLower(N, size);
+  operations_ += size * kApply<Space> + Space::kDim * (size * (size + 1) / 2 + before) +
+                 (leaf.sides.empty() ? 0 : size * size * size / 6 + size);
 }
 
 /// Z of body n + 1, or C Z C^T. Z is M^-1 in ground axes, or the response of the held body. The
@@ -245,8 +274,8 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   body.per_mass = S(1) / inertia.mass;
   const bool is_held = leaf.hold.joint >= 0;
   if (is_held) FillHold(kinematics, masses, n);
-  const std::span<const FreeDirection> free = FreeDirections(n);
-  const int terms = is_held ? static_cast<int>(free.size()) : Space::kDim;
+  const FreeDirection* free = free_.data() + places_[n].hold;
+  const int terms = is_held ? leaf.free : Space::kDim;
   S* Z = Z_.data() + places_[n].z;
   int first = 0;
   for (const PlanSide& side : leaf.sides) {
@@ -263,8 +292,9 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
       Repeat(rows, [&](int i) LOOPBENCH_INLINED {
         if (!is_held) {
           Zc[i] = {body.rotational_inverse * c[i].angular, c[i].linear * body.per_mass};
-        } else {  // its components along G suffice
-          for (int k = 0; k < terms; ++k) Zc[i][k] = free[k].g.dot(c[i]);
+        } else {
+          const Components<Space, S> along = AlongArm(n, c[i]);
+          for (int k = 0; k < terms; ++k) Zc[i][k] = along[k];
         }
       });
       int before = 0;
@@ -298,7 +328,10 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   if (!leaf.is_body) return;
   Block<Space, S> block = Block<Space, S>::Zero();
   if (is_held) {
-    for (const FreeDirection& direction : free) SubtractOuter(-direction.g, direction.g, block);
+    Acceleration<Space, S> G[Space::kDim];
+    for (int k = 0; k < terms; ++k) G[k] = free[k].h;
+    SolveLower(&arms_[places_[n].arm], terms, G);
+    for (int k = 0; k < terms; ++k) SubtractOuter(-G[k], G[k], block);
   } else {
     block = DiagonalBlock<Space, S>(body.rotational_inverse, body.per_mass);
   }

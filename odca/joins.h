@@ -109,15 +109,49 @@ class Joins {
 
   /// Acceleration of leaf n by a wrench.
   Acceleration<Space, S> Response(int n, const Wrench<Space, S>& F) const {
-    if (plan_.leaves()[n].hold.joint >= 0) return HeldResponse(n, F);
+    if (plan_.leaves()[n].hold.joint >= 0) {
+      Components<Space, S> x = AlongArm(n, F);
+      ApplyArmTransposed(n, x);
+      return HeldAcceleration(n, Acceleration<Space, S>::Zero(), x);
+    }
     return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
   }
-  /// Acceleration of a leaf that is held, from the wrench on its body and c0 of its hold.
-  Acceleration<Space, S> Held(int n, const Wrench<Space, S>& F,
-                              const Components<Space, S>& c0) const;
-  /// phi of the hold of a leaf, from its acceleration and the other wrenches on it.
-  Components<Space, S> HoldingForce(int n, const Acceleration<Space, S>& A,
-                                    const Wrench<Space, S>& F) const;
+  /// A held leaf: an acceleration that satisfies its holds, and the generalised forces of all other
+  /// wrenches up to here along the arm's free directions H. The motion is given + H x with N x =
+  /// along.
+  struct HeldMotion {
+    Acceleration<Space, S> given;
+    Components<Space, S> along;
+  };
+  /// From its holder's, if there is one, for the wrench on its body and c0 of its hold; tree joints
+  /// take `known` instead, if there is one.
+  HeldMotion Hang(int n, const HeldMotion* holder, const Wrench<Space, S>& F,
+                  const Components<Space, S>& c0, const Acceleration<Space, S>* known) const;
+  /// v := L^-1 v and v := L^-T v for N = L L^T of the arm that ends at leaf n.
+  void ApplyArm(int n, Components<Space, S>& v) const {
+    WithFree(n, [&](auto size, const auto&) { SolveLower(&arms_[places_[n].arm], size, &v[0]); });
+  }
+  void ApplyArmTransposed(int n, Components<Space, S>& v) const {
+    WithFree(n, [&](auto size, const auto&) {
+      SolveLowerTransposed(&arms_[places_[n].arm], size, &v[0]);
+    });
+  }
+  /// L^-1 H^T F
+  Components<Space, S> AlongArm(int n, const Wrench<Space, S>& F) const;
+  /// The same of the rows c of a side of leaf n, as its first components.
+  const Acceleration<Space, S>* AlongArm(const PlanSide& side) const { return &Mc_[Offset(side)]; }
+  Acceleration<Space, S> HeldAcceleration(int n, const Acceleration<Space, S>& given,
+                                          const Components<Space, S>& x) const;
+  /// The wrench of its hold on a held body, from its acceleration and the other wrenches on it;
+  /// then its phi, and the opposite wrench on the holder.
+  Wrench<Space, S> HoldingWrench(int n, const Acceleration<Space, S>& A,
+                                 const Wrench<Space, S>& F) const {
+    return Wrench<Space, S>(bodies_[n].rotational * A.angular, A.linear * bodies_[n].mass) - F;
+  }
+  Components<Space, S> HoldingForce(int n, const Wrench<Space, S>& holding) const;
+  Wrench<Space, S> OnHolder(int n, const Wrench<Space, S>& holding) const {
+    return -ShiftForce<Space, S>(holding, bodies_[n].from_holder);
+  }
   /// Rows c of a joint, at the centres of mass: the wrenches on P and Q that unit forces along D
   /// make.
   const Wrench<Space, S>* c(int joint, bool at_Q, int rows) const {
@@ -174,22 +208,24 @@ class Joins {
     int x = 0;      ///< first number of X
     int loop = -1;  ///< index of the loop solver
     int hold = 0;   ///< of a held leaf, first of its free directions
+    int arm = 0;    ///< of the last leaf of an arm, first number of its N
     int bodies = 1;
   };
   /// Inertia in ground axes; the rotational one of held bodies alone.
   struct Body {
     typename Inertia<Space, S>::Matrix rotational, rotational_inverse;
     S mass = S(0), per_mass = S(0);
+    /// Of a held body: its centre of mass from the holder's, and Mo of its hold from there.
+    Linear<Space, S> from_holder, to_hold;
   };
-  /// A free direction of a held body, with T; and M times it.
+  /// A free direction of a held body, and the body's inertia times it.
   struct FreeDirection {
-    Acceleration<Space, S> g;
-    Wrench<Space, S> Mg;
+    Acceleration<Space, S> h;
+    Wrench<Space, S> Mh;
   };
   bool IsLeaf(int n) const { return n < plan_.num_leaves(); }
   enum class Pass { kPhysical, kGeometric, kRegularized };
 
-  Acceleration<Space, S> HeldResponse(int n, const Wrench<Space, S>& F) const;
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
   void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n);
   void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n);
@@ -199,7 +235,14 @@ class Joins {
   int Offset(const PlanSide& side) const {
     return c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
   }
-  std::span<const FreeDirection> FreeDirections(int n) const;
+  /// Calls `call` with the number of free directions of a held leaf, as a constant up to three, and
+  /// with these.
+  template <class Call>
+  [[gnu::always_inline]] auto WithFree(int n, const Call& call) const {
+    const FreeDirection* free = free_.data() + places_[n].hold;
+    return WithSize<1, 2, 3>(plan_.leaves()[n].free,
+                             [&](auto size) LOOPBENCH_INLINED { return call(size, free); });
+  }
   template <class Rows, class Width>
   void FormResponse(const PlanNode& node, const Place& place, Rows rows, Width width);
   template <class Rows>
@@ -222,6 +265,7 @@ class Joins {
   std::vector<Place> places_;
   std::vector<Body> bodies_;  ///< by leaf
   std::vector<FreeDirection> free_;
+  std::vector<S> arms_;  ///< N of each arm, or its factor as lower_triangle.h has it
   std::vector<S> Z_;
   std::vector<S> Y_;                        ///< Y of each node; on handles that stay then V = T Y
   std::vector<Wrench<Space, S>> c_;         ///< rows c_P, then c_Q of each joint
@@ -230,7 +274,7 @@ class Joins {
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;
   MatrixX<S> columns_;
-  std::vector<int> lone_leaves_;  ///< bodies that no joint touches
+  std::vector<int> lone_leaves_;  ///< of no node: bodies of arms before the last, or without joints
   int largest_matrix_ = 0;
   bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;

@@ -15,9 +15,13 @@ std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>& mechanism) {
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     const int rows = joint.num_constraints();
-    // the exact directions of a joint that is cut are orthogonal up to its violation; prescribed
-    // motions that contradict a loop are judged in its equations
-    const bool may_hold = joint.num_drives == 0 && (joint.in_tree() || !mechanism.is_redundant());
+    // Exact tilts (JointKind::exact_basis) are orthogonal to each other, and those of screws to H,
+    // only up to the drift. Imposed rows may stand for released ones, too. Prescribed motions that
+    // contradict a loop are judged in its equations.
+    const bool releases = joint.num_released > 0, tilts = joint.kind->basis_rate != nullptr;
+    const bool is_orthogonal =
+        tilts ? !releases && !joint.kind->has_screws : !releases || !mechanism.is_redundant();
+    const bool may_hold = joint.num_drives == 0 && (joint.in_tree() || is_orthogonal);
     if (rows > 0) joints.push_back({j, joint.from, joint.to, rows, may_hold});
   }
   return joints;
@@ -78,7 +82,11 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
 
 template <class Space, class S>
 void Odca<Space, S>::SweepTo(VectorX<S>& x, VectorX<S>* lambda) {
-  sweep_.Solve(equations_.b(), equations_.wrenches(), equations_.c0(), equations_.A());
+  sweep_.Solve({.b = equations_.b(),
+                .wrenches = equations_.wrenches(),
+                .c0 = equations_.c0(),
+                .known = equations_.known()},
+               equations_.A());
   equations_.Read(*kinematics_, x);
   if (lambda != nullptr) equations_.Read(sweep_.multipliers(), *lambda);
 }

@@ -35,16 +35,19 @@ struct Assembly {
 
 class Planner {
  public:
-  Planner(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options)
+  Planner(std::span<const Leaf> leaves, std::span<const PlanJoint> joints,
+          const PlanOptions& options)
       : joints_(joints),
         options_(options),
-        open_rows_(num_bodies, 0),
+        open_rows_(leaves.size() + 1, 0),
         closed_(joints.size(), false) {
+    const auto num_bodies = static_cast<int>(open_rows_.size());
     assemblies_.resize(num_bodies);
     assembly_of_.resize(num_bodies);
     for (int body = 1; body < num_bodies; ++body) {
       assemblies_[body].node = body - 1;
       assemblies_[body].boundary = {body};
+      assemblies_[body].reaches_ground = leaves[body - 1].hold.joint >= 0;
       assembly_of_[body] = body;
     }
     for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
@@ -253,65 +256,33 @@ long JointWork(long rows, long above, bool is_body, long numbers, long dim) {
   return 2 * force + rows * dim * numbers + dim * (rows * above + rows * (rows + 1) / 2);
 }
 
-/// Multiply-adds of a body alone with so many rows of joints, and `held` rows of its hold or 0:
-/// M^-1 C^T and C M^-1 C^T, and the vectors.
-long LeafWork(long rows, long held, bool is_body, long dim) {
+/// Multiply-adds of a leaf with so many rows of joints: M^-1 C^T and C M^-1 C^T, and the vectors.
+long LeafWork(const Leaf& leaf, long rows, bool is_body, long dim) {
   const long apply = dim * dim / 3;  // M^-1 is diagonal except for three rotations
   const long triangle = rows * (rows + 1) / 2, project = is_body ? 0 : rows * dim;
-  if (held == 0) return (rows + 1) * apply + (is_body ? 0 : dim * triangle) + project;
-  const long free = dim - held;
-  long sum = free * apply + free * free * free / 6 + free;                     // H^T M H
-  sum += 3 * dim * (free * (free + 1) / 2);                                    // and with T
+  if (leaf.hold.joint < 0) return (rows + 1) * apply + (is_body ? 0 : dim * triangle) + project;
+  const long free = leaf.free, held = leaf.hold.rows;
+  long sum = free * apply + dim * (free * (free + 1) / 2 + free - (dim - held));  // H^T M H
+  sum += rows > 0 ? free * free * free / 6 + free : 0;
   sum += rows * free * dim + (is_body ? rows * free * dim : free * triangle);  // Z
-  return sum + 2 * dim * (held + 2 * free) + apply + project;                  // vectors
-}
-
-/// Takes nodes that only hold a body to Ground from the list; the joint of each body, or -1.
-std::vector<int> HoldLeaves(int num_bodies, std::span<const PlanJoint> joints, int dim,
-                            std::vector<Draft>& drafts) {
-  const int leaves = num_bodies - 1;
-  std::vector<int> holds(num_bodies, -1), number(leaves + drafts.size());
-  std::iota(number.begin(), number.end(), 0);
-  std::vector<Draft> rest;
-  for (int n = 0; n < static_cast<int>(drafts.size()); ++n) {
-    Draft& draft = drafts[n];
-    for (int& child : draft.node.children) child = child < 0 ? child : number[child];
-    const int body = draft.node.children[0] + 1;
-    const PlanJoint& joint = joints[draft.joints.front()];
-    const bool on_ground = joint.from == 0 || joint.to == 0;
-    if (body < num_bodies && holds[body] < 0 && on_ground && !draft.node.closes_loop &&
-        joint.may_hold && 2 * joint.rows > dim) {
-      holds[body] = draft.joints.front();
-      number[leaves + n] = body - 1;
-    } else {
-      number[leaves + n] = leaves + static_cast<int>(rest.size());
-      rest.push_back(std::move(draft));
-    }
-  }
-  drafts = std::move(rest);
-  return holds;
+  return sum + 2 * dim * (held + 2 * free) + apply + project + (is_body ? 0 : free * rows);
 }
 
 /// Chooses for each body between its directions and the rows of its joints: whichever costs less
 /// over all joins with this body, given the choice of the others.
-std::vector<bool> CheapestBases(int num_bodies, std::span<const PlanJoint> joints,
-                                std::span<const int> holds, std::span<const Draft> drafts,
-                                int dim) {
-  std::vector<long> rows(num_bodies, 0), held(num_bodies, 0);
+std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const PlanJoint> joints,
+                                std::span<const Draft> drafts, int dim) {
+  const auto num_leaves = static_cast<int>(leaves.size()), num_bodies = num_leaves + 1;
+  std::vector<long> rows(num_bodies, 0);
   for (const PlanJoint& joint : joints) {
     for (int body : {joint.from, joint.to}) rows[body] += joint.rows;
   }
   std::vector<bool> is_body(num_bodies);
-  for (int body = 1; body < num_bodies; ++body) {
-    held[body] = holds[body] < 0 ? 0 : joints[holds[body]].rows;
-    rows[body] -= held[body];
-    is_body[body] = rows[body] > 2 * dim;
-  }
+  for (int body = 1; body < num_bodies; ++body) is_body[body] = rows[body] > 2 * dim;
   std::vector<std::vector<int>> joins(num_bodies);
   for (int n = 0; n < static_cast<int>(drafts.size()); ++n) {
     for (const BoundaryBody& body : drafts[n].bodies) joins[body.body].push_back(n);
   }
-  const int leaves = num_bodies - 1;
   const auto work = [&](const Draft& draft) {
     const auto width = [&](int body, long open) { return open > 0 && is_body[body] ? dim : open; };
     long numbers[2] = {0, 0}, kept = 0, above = 0;
@@ -324,7 +295,7 @@ std::vector<bool> CheapestBases(int num_bodies, std::span<const PlanJoint> joint
       for (int body : {joints[j].from, joints[j].to}) {
         if (body == 0) continue;
         const int child = std::ranges::find(draft.bodies, body, &BoundaryBody::body)->child;
-        const bool is_leaf = draft.node.children[child] < leaves;
+        const bool is_leaf = draft.node.children[child] < num_leaves;
         sum += JointWork(joints[j].rows, above, is_body[body], is_leaf ? 0 : numbers[child], dim);
       }
       above += joints[j].rows;
@@ -335,7 +306,7 @@ std::vector<bool> CheapestBases(int num_bodies, std::span<const PlanJoint> joint
     long sums[2];
     for (int choice : {0, 1}) {
       is_body[body] = choice == 1;
-      sums[choice] = LeafWork(rows[body], held[body], is_body[body], dim);
+      sums[choice] = LeafWork(leaves[body - 1], rows[body], is_body[body], dim);
       for (int n : joins[body]) sums[choice] += work(drafts[n]);
     }
     is_body[body] = sums[1] < sums[0];
@@ -364,19 +335,73 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
 
 Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start)
     : num_leaves_(num_bodies - 1) {
-  std::vector<Draft> drafts = Planner(num_bodies, joints, options).Run(start);
-  std::vector<int> holds(num_bodies, -1);
+  const std::vector<PlanJoint> others = AddHolds(joints, options);
+  std::vector<Draft> drafts = Planner(leaves_, others, options).Run(start);
   std::vector<bool> is_body(num_bodies, true);
   if (options.basis == BoundaryBasis::kCheapest) {
-    holds = HoldLeaves(num_bodies, joints, options.dim, drafts);
-    is_body = CheapestBases(num_bodies, joints, holds, drafts, options.dim);
+    is_body = CheapestBases(leaves_, others, drafts, options.dim);
   }
-  AddLeaves(joints, holds, is_body, options.dim);
-  AddNodes(joints, drafts, options.dim);
+  AddLeaves(others, is_body, options.dim);
+  AddNodes(others, drafts, options.dim);
 }
 
-void Plan::AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
-                     const std::vector<bool>& is_body, int dim) {
+/// Bodies with one joint to Ground begin arms. An arm goes on over the only other joint of its last
+/// body while it has at most d - 2 free directions; all arms grow in turn.
+std::vector<PlanJoint> Plan::AddHolds(std::span<const PlanJoint> joints,
+                                      const PlanOptions& options) {
+  leaves_.resize(static_cast<std::size_t>(num_leaves_));
+  std::vector<std::vector<int>> joints_of(num_leaves_ + 1);
+  for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
+    for (const int body : {joints[j].from, joints[j].to}) joints_of[body].push_back(j);
+  }
+  std::vector<bool> holds(joints.size(), false);
+  std::vector<int> ends;
+  const auto other = [&](int j, int body) {
+    return joints[j].from == body ? joints[j].to : joints[j].from;
+  };
+  const auto hold = [&](int body, int j) {
+    const PlanJoint& joint = joints[j];
+    const int holder = other(j, body) - 1;
+    const int free = options.dim - joint.rows + (holder < 0 ? 0 : leaves_[holder].free);
+    Leaf& leaf = leaves_[body - 1];
+    if (leaf.hold.joint >= 0 || !joint.may_hold || 2 * joint.rows <= options.dim) return;
+    if (free > options.dim - 2) return;
+    leaf.hold = {joint.index, joint.rows, joint.to == body};
+    leaf.holder = holder;
+    leaf.free = free;
+    for (int n = body - 1; n >= 0; n = leaves_[n].holder) leaves_[n].end = body - 1;
+    holds[j] = true;
+    ends.push_back(body);
+  };
+  if (options.basis == BoundaryBasis::kCheapest && options.grounding == Grounding::kEager) {
+    for (int body = 1; body <= num_leaves_; ++body) {
+      const auto on_ground = [&](int j) { return other(j, body) == 0; };
+      const std::vector<int>& all = joints_of[body];
+      if (std::ranges::count_if(all, on_ground) == 1)
+        hold(body, *std::ranges::find_if(all, on_ground));
+    }
+    for (std::size_t k = 0; k < ends.size(); ++k) {
+      const int body = ends[k];
+      const std::vector<int>& all = joints_of[body];
+      if (all.size() != 2) continue;
+      const int next = holds[all[0]] ? all[1] : all[0];
+      if (other(next, body) != 0) hold(other(next, body), next);
+    }
+  }
+  for (int n = 0; n < num_leaves_; ++n) {
+    if (leaves_[n].holder < 0) leaf_order_.push_back(n);
+  }
+  for (const int body : ends) {
+    if (leaves_[body - 1].holder >= 0) leaf_order_.push_back(body - 1);
+  }
+  std::vector<PlanJoint> others;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!holds[j]) others.push_back(joints[j]);
+  }
+  return others;
+}
+
+void Plan::AddLeaves(std::span<const PlanJoint> joints, const std::vector<bool>& is_body, int dim) {
   const auto each_side = [&](auto&& take) {
     for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
       take(joints[j].from, PlanSide{j, joints[j].rows, false});
@@ -384,18 +409,11 @@ void Plan::AddLeaves(std::span<const PlanJoint> joints, std::span<const int> hol
     }
   };
   std::vector<int> first(num_leaves_ + 2, 0);
-  each_side([&](int body, const PlanSide& side) { first[body + 1] += holds[body] != side.joint; });
+  each_side([&](int body, const PlanSide&) { ++first[body + 1]; });
   std::partial_sum(first.begin(), first.end(), first.begin());
   sides_.resize(static_cast<std::size_t>(first.back()));
   std::vector<int> next = first;
-  leaves_.resize(static_cast<std::size_t>(num_leaves_));
-  each_side([&](int body, const PlanSide& side) {
-    if (holds[body] != side.joint) {
-      sides_[next[body]++] = side;
-    } else {
-      leaves_[body - 1].hold = {joints[side.joint].index, side.rows, side.at_Q};
-    }
-  });
+  each_side([&](int body, const PlanSide& side) { sides_[next[body]++] = side; });
   for (int n = 0; n < num_leaves_; ++n) {
     Leaf& leaf = leaves_[n];
     leaf.sides = std::span(sides_).subspan(first[n + 1], first[n + 2] - first[n + 1]);
@@ -480,7 +498,10 @@ void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> dr
     handle.force = handle.is_body() ? num_rows_ + handle.width * (handle.body - 1) : row_of[j];
     if (!handle.is_body()) handle.joint = joints[j].index;
   }
-  for (PlanSide& side : sides_) side.joint = joints[side.joint].index;
+  for (PlanSide& side : sides_) {
+    side.row = row_of[side.joint];
+    side.joint = joints[side.joint].index;
+  }
   const auto cut = [](auto& all, const std::vector<std::size_t>& firsts, std::size_t n) {
     const std::size_t end = n + 1 < firsts.size() ? firsts[n + 1] : all.size();
     return std::span(all).subspan(firsts[n], end - firsts[n]);
@@ -526,8 +547,7 @@ long Plan::operations(int dim) const {
   for (const Leaf& leaf : leaves_) {
     long rows = 0;
     for (const PlanSide& side : leaf.sides) rows += side.rows;
-    const int held = leaf.hold.joint < 0 ? 0 : leaf.hold.rows;
-    sum += LeafWork(rows, held, leaf.is_body, dim);
+    sum += LeafWork(leaf, rows, leaf.is_body, dim);
   }
   for (const PlanNode& node : nodes_) {
     long numbers[2] = {0, 0}, kept = 0, above = 0;

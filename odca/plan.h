@@ -31,8 +31,8 @@ struct PlanJoint {
   int index = 0;  ///< name of the joint for the caller
   int from = 0, to = 0;
   int rows = 0;  ///< constrained directions
-  /// On Ground: its rows and the directions that it leaves free are orthogonal to each other, so
-  /// that its body may be held (Leaf).
+  /// Its rows and the directions that it leaves free are orthogonal to each other, so that a body
+  /// may be held (Leaf).
   bool may_hold = true;
 };
 
@@ -94,13 +94,17 @@ struct PlanSide {
   int joint = -1;
   int rows = 0;
   bool at_Q = false;
+  int row = 0;  ///< index of its first row in all nodes
 };
 
-/// A body alone: its handles are itself, or all of its sides. A body that a joint with few free
-/// directions holds to Ground is a leaf with this joint, which is in no node.
+/// A body alone: its handles are itself, or all of its sides. Bodies on an arm from Ground whose
+/// joints leave few directions free are held leaves: the joint towards Ground is in no node.
 struct Leaf {
   std::span<const PlanSide> sides;
-  PlanSide hold;  ///< that joint; -1 if there is none
+  PlanSide hold;    ///< that joint; -1 if there is none
+  int holder = -1;  ///< the held leaf on its other side, which has no sides; -1 is Ground
+  int end = -1;     ///< of a held leaf: the last one of its arm
+  int free = 0;     ///< free directions of the arm up to here
   bool is_body = true;
   int width = 0;
   int slot = 0;
@@ -134,6 +138,8 @@ class Plan {
   /// Inner nodes in order of execution; node number = num_leaves() + position.
   const std::vector<PlanNode>& nodes() const { return nodes_; }
   const std::vector<Leaf>& leaves() const { return leaves_; }
+  /// All leaves, holders before the leaves that they hold.
+  const std::vector<int>& leaf_order() const { return leaf_order_; }
   int num_rows() const { return num_rows_; }    ///< of all nodes
   int num_slots() const { return num_slots_; }  ///< numbers of all leaves' handles
 
@@ -148,14 +154,16 @@ class Plan {
  private:
   /// With one order of joins: by the rules (`start` 0), or body after body from `start`.
   Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start);
-  void AddLeaves(std::span<const PlanJoint> joints, std::span<const int> holds,
-                 const std::vector<bool>& is_body, int dim);
+  /// Sets the holds of all leaves; the other joints.
+  std::vector<PlanJoint> AddHolds(std::span<const PlanJoint> joints, const PlanOptions& options);
+  void AddLeaves(std::span<const PlanJoint> joints, const std::vector<bool>& is_body, int dim);
   void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts, int dim);
 
   int num_leaves_;
   int num_rows_ = 0, num_slots_ = 0;
   std::vector<PlanNode> nodes_;
   std::vector<Leaf> leaves_;
+  std::vector<int> leaf_order_;
   // the lists of all nodes, end to end in order of execution: a sweep streams them
   std::vector<Handle> handles_;
   std::vector<int> kept_;

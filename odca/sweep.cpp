@@ -13,6 +13,7 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       b_(plan.num_slots(), S(0)),
       F_(plan.num_rows() + Space::kDim * plan.num_leaves(), S(0)),
       start_(plan.num_leaves(), Acceleration<Space, S>::Zero()),
+      held_(plan.num_leaves()),
       phi_(mechanism.joints().size(), Components<Space, S>::Zero()),
       residual_(phi_),
       s_(plan.num_rows(), S(0)) {}
@@ -24,75 +25,119 @@ Outcome Sweep<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
 }
 
 template <class Space, class S>
-void Sweep<Space, S>::Solve(std::span<const Acceleration<Space, S>> b,
-                            std::span<const Wrench<Space, S>> wrenches,
-                            std::span<const Components<Space, S>> c0,
-                            std::span<Acceleration<Space, S>> A) {
+void Sweep<Space, S>::Solve(const Loads& loads, std::span<Acceleration<Space, S>> A) {
   for (Acceleration<Space, S>& acceleration : A) acceleration.setZero();  // Ground's too (33-34)
   for (Components<Space, S>& phi : phi_) phi.setZero();
-  Correct(b, wrenches, c0, A);
+  Correct(loads, A);
   if (!joins_.regularized()) return;
-  Residual(c0, A);
-  Correct({}, {}, residual_, A);
+  Residual(loads.c0, A);
+  Correct({.b = {}, .wrenches = {}, .c0 = residual_, .known = {}}, A);
 }
 
-/// At the leaves A = Z F + b (1-4, 45-46) with all forces known, including the joints' own.
+/// Bodies of an arm before the last have no handles.
 template <class Space, class S>
-void Sweep<Space, S>::Correct(std::span<const Acceleration<Space, S>> b,
-                              std::span<const Wrench<Space, S>> wrenches,
-                              std::span<const Components<Space, S>> c0,
-                              std::span<Acceleration<Space, S>> A) {
+[[gnu::always_inline]] inline void Sweep<Space, S>::UpLeaf(int n, const Loads& loads) {
+  const Leaf& leaf = plan_.leaves()[n];
+  const bool is_held = leaf.hold.joint >= 0;
+  if (is_held) {
+    const int joint = leaf.hold.joint;
+    held_[n] = joins_.Hang(n, leaf.holder < 0 ? nullptr : &held_[leaf.holder], loads.WrenchOn(n),
+                           loads.c0[joint], loads.known.empty() ? nullptr : &loads.known[joint]);
+    operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.free);
+    if (leaf.sides.empty()) return;
+    joins_.ApplyArm(n, held_[n].along);
+    start_[n] = held_[n].given;
+  } else {
+    start_[n] = loads.b.empty() ? Acceleration<Space, S>::Zero() : loads.b[n + 1];
+  }
+  S* slot = b_.data() + leaf.slot;
+  if (loads.b.empty() && !is_held) {
+    std::fill_n(slot, leaf.width, S(0));
+    return;
+  }
+  if (leaf.is_body) {
+    Components<Space, S> x = held_[n].along;
+    if (is_held) joins_.ApplyArmTransposed(n, x);
+    const auto all = is_held ? joins_.HeldAcceleration(n, start_[n], x) : start_[n];
+    LOOPBENCH_UNROLL
+    for (int d = 0; d < Space::kDim; ++d) slot[d] = all[d];
+    return;
+  }
+  for (const PlanSide& side : leaf.sides) {
+    const Wrench<Space, S>* c = joins_.c(side.joint, side.at_Q, side.rows);
+    WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
+      Repeat(rows, [&](int i) { slot[i] = c[i].dot(start_[n]); });
+      if (is_held) {
+        const Acceleration<Space, S>* along = joins_.AlongArm(side);
+        WithSize<1, 2, 3>(leaf.free, [&](auto free) LOOPBENCH_INLINED {
+          Repeat(rows, [&](int i) {
+            Repeat(free, [&](int k) { slot[i] += along[i][k] * held_[n].along[k]; });
+          });
+        });
+      }
+      slot += rows;
+    });
+    operations_ += (Space::kDim + leaf.free) * side.rows;
+  }
+}
+
+/// A = Z F + b (1-4, 45-46) with all forces known, including the joints' own. The last body of an
+/// arm solves for the whole arm.
+template <class Space, class S>
+[[gnu::always_inline]] inline void Sweep<Space, S>::DownLeaf(int n, const Loads& loads,
+                                                             std::span<Acceleration<Space, S>> A) {
+  const Leaf& leaf = plan_.leaves()[n];
+  const auto force_on = [&](int other) { return &F_[plan_.num_rows() + Space::kDim * other]; };
+  Wrench<Space, S> F;
+  LOOPBENCH_UNROLL
+  for (int d = 0; d < Space::kDim; ++d) F[d] = force_on(n)[d];
+  operations_ += Space::kDim * Space::kDim / 3;
+  if (leaf.hold.joint < 0) {
+    A[n + 1] += start_[n] + joins_.Response(n, F);
+    return;
+  }
+  Components<Space, S>& x = held_[n].along;
+  if (leaf.end == n) {
+    if (leaf.sides.empty()) joins_.ApplyArm(n, x);
+    if (leaf.is_body) x += joins_.AlongArm(n, F);
+    for (const PlanSide& side : leaf.is_body ? std::span<const PlanSide>() : leaf.sides) {
+      const Acceleration<Space, S>* along = joins_.AlongArm(side);
+      WithSize<1, 2, 3>(leaf.free, [&](auto free) LOOPBENCH_INLINED {
+        for (int i = 0; i < side.rows; ++i) {
+          Repeat(free, [&](int k) { x[k] += along[i][k] * F_[side.row + i]; });
+        }
+      });
+    }
+    joins_.ApplyArmTransposed(n, x);
+  }
+  const Acceleration<Space, S> all = joins_.HeldAcceleration(n, held_[n].given, x);
+  A[n + 1] += all;
+  const Wrench<Space, S> holding = joins_.HoldingWrench(n, all, F + loads.WrenchOn(n));
+  const Components<Space, S> phi = joins_.HoldingForce(n, holding);
+  for (int i = 0; i < leaf.hold.rows; ++i) phi_[leaf.hold.joint][i] += phi[i];
+  operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.free);
+  if (leaf.holder < 0) return;
+  held_[leaf.holder].along = x;
+  const Wrench<Space, S> reaction = joins_.OnHolder(n, holding);
+  LOOPBENCH_UNROLL
+  for (int d = 0; d < Space::kDim; ++d) force_on(leaf.holder)[d] += reaction[d];
+}
+
+template <class Space, class S>
+void Sweep<Space, S>::Correct(const Loads& loads, std::span<Acceleration<Space, S>> A) {
   const int leaves = plan_.num_leaves();
   std::ranges::fill(F_, S(0));
-  const auto wrench = [&](int n) { return b.empty() ? Wrench<Space, S>::Zero() : wrenches[n + 1]; };
-  for (int n = 0; n < leaves; ++n) {
-    const Leaf& leaf = plan_.leaves()[n];
-    if (leaf.hold.joint >= 0) {
-      start_[n] = joins_.Held(n, wrench(n), c0[leaf.hold.joint]);
-      operations_ += Space::kDim * (2 * Space::kDim - leaf.hold.rows);
-    } else {
-      start_[n] = b.empty() ? Acceleration<Space, S>::Zero() : b[n + 1];
-    }
-    S* slot = b_.data() + leaf.slot;
-    if (b.empty() && leaf.hold.joint < 0) {
-      std::fill_n(slot, leaf.width, S(0));
-      continue;
-    }
-    if (leaf.is_body) {
-      LOOPBENCH_UNROLL
-      for (int d = 0; d < Space::kDim; ++d) slot[d] = start_[n][d];
-      continue;
-    }
-    for (const PlanSide& side : leaf.sides) {
-      const Wrench<Space, S>* c = joins_.c(side.joint, side.at_Q, side.rows);
-      WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
-        Repeat(rows, [&](int i) { slot[i] = c[i].dot(start_[n]); });
-        slot += rows;
-      });
-      operations_ += Space::kDim * side.rows;
-    }
-  }
+  for (const int n : plan_.leaf_order()) UpLeaf(n, loads);
   for (int n = leaves; n < plan_.num_nodes(); ++n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
-    WithSizes<Space>(node, [&](auto rows, auto width) { Up(node, n, rows, width, c0); });
+    WithSizes<Space>(node, [&](auto rows, auto width) { Up(node, n, rows, width, loads.c0); });
   }
   for (int n = plan_.num_nodes() - 1; n >= leaves; --n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
     WithSizes<Space>(node, [&](auto rows, auto width) { Down(node, n, rows, width); });
   }
-  for (int n = 0; n < leaves; ++n) {
-    const PlanSide& hold = plan_.leaves()[n].hold;
-    Wrench<Space, S> F;
-    LOOPBENCH_UNROLL
-    for (int d = 0; d < Space::kDim; ++d) F[d] = F_[plan_.num_rows() + Space::kDim * n + d];
-    const Acceleration<Space, S> all = start_[n] + joins_.Response(n, F);
-    A[n + 1] += all;
-    operations_ += Space::kDim * Space::kDim / 3;
-    if (hold.joint < 0) continue;
-    const Components<Space, S> phi = joins_.HoldingForce(n, all, F + wrench(n));
-    for (int i = 0; i < hold.rows; ++i) phi_[hold.joint][i] += phi[i];
-    operations_ += Space::kDim * (2 * Space::kDim - hold.rows);
-  }
+  const std::vector<int>& order = plan_.leaf_order();
+  for (auto n = order.rbegin(); n != order.rend(); ++n) DownLeaf(*n, loads, A);
 }
 
 /// r = C A + c0 of every joint: D^T times the difference of the two sides of (7), without udot.

@@ -34,11 +34,20 @@ class Sweep {
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
   const Joins<Space, S>& joins() const { return joins_; }
 
-  /// Computes `A` of each body from `b`, the free acceleration of each body (index = body; empty if
-  /// zero), its wrench M b, and `c0`, Space::kDim numbers per mechanism joint. Requires Assemble().
-  /// Allocates nothing.
-  void Solve(std::span<const Acceleration<Space, S>> b, std::span<const Wrench<Space, S>> wrenches,
-             std::span<const Components<Space, S>> c0, std::span<Acceleration<Space, S>> A);
+  /// Given numbers: by body the free accelerations b (empty if zero) and the wrenches M b; by joint
+  /// c0, and for tree joints the acceleration whose components c0 are (BodyEquations::known()).
+  struct Loads {
+    std::span<const Acceleration<Space, S>> b;
+    std::span<const Wrench<Space, S>> wrenches;
+    std::span<const Components<Space, S>> c0;
+    std::span<const Acceleration<Space, S>> known;
+
+    Wrench<Space, S> WrenchOn(int n) const {
+      return b.empty() ? Wrench<Space, S>::Zero() : wrenches[n + 1];
+    }
+  };
+  /// Computes `A` of each body. Requires Assemble(). Allocates nothing.
+  void Solve(const Loads& loads, std::span<Acceleration<Space, S>> A);
 
   /// Returns phi of each mechanism joint after Solve(), the measure numbers (14) of its constraint
   /// force: components along the columns of D, which may mix moments and forces. Zero if the plan
@@ -55,10 +64,11 @@ class Sweep {
           std::span<const Components<Space, S>> c0);
   template <class Rows, class Width>
   void Down(const PlanNode& node, int n, Rows rows, Width width);
-  /// Runs up and down; adds to A and phi_. Without `b` the bodies' free accelerations are zero.
-  void Correct(std::span<const Acceleration<Space, S>> b,
-               std::span<const Wrench<Space, S>> wrenches, std::span<const Components<Space, S>> c0,
-               std::span<Acceleration<Space, S>> A);
+  /// b of the handles of a leaf. Then A from all forces on it, added.
+  void UpLeaf(int n, const Loads& loads);
+  void DownLeaf(int n, const Loads& loads, std::span<Acceleration<Space, S>> A);
+  /// Runs up and down; adds to A and phi_. Without b the bodies' free accelerations are zero.
+  void Correct(const Loads& loads, std::span<Acceleration<Space, S>> A);
   /// r = C A + c0 of every joint, in residual_.
   void Residual(std::span<const Components<Space, S>> c0,
                 std::span<const Acceleration<Space, S>> A);
@@ -67,7 +77,9 @@ class Sweep {
   Joins<Space, S> joins_;
   std::vector<S> b_;  ///< of all handles, by slot: a join changes those that stay
   std::vector<S> F_;  ///< phi of all rows, then wrenches of bodies
-  std::vector<Acceleration<Space, S>> start_;  ///< of leaves without forces of their joints
+  /// Of leaves without forces of their joints.
+  std::vector<Acceleration<Space, S>> start_;
+  std::vector<typename Joins<Space, S>::HeldMotion> held_;  ///< of held leaves
   std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;  ///< by row
   long operations_ = 0;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/analysis/structure_hints.h"
@@ -374,6 +375,7 @@ class StartText {
 
   /// Coordinates as integrated (tree joints), or as measured between the bodies (other joints).
   Values CoordinatesOf(const Joint<Space, double>& joint) const {
+    const int index = static_cast<int>(&joint - mechanism_.joints().data());
     Values q{};
     if (joint.kind->coordinates == nullptr) return q;
     const Pose<Space, double> X_WF = Compose(kinematics_.poses()[joint.from], joint.X_PF),
@@ -386,7 +388,10 @@ class StartText {
       } else if (joint.in_tree()) {
         q[i] = start_.q[next++];
       } else if (joint.kind->num_u == 1) {
-        q[i] = kinematics_.JointCoordinate(static_cast<int>(&joint - mechanism_.joints().data()));
+        q[i] = kinematics_.JointCoordinate(index);
+      } else if (!joint.kind->has_quaternion() && joint.kind->axes[i] < Space::kRot) {
+        const double guess = description_.initial.GuessOf(index, static_cast<std::size_t>(i));
+        q[i] = guess + std::remainder(q[i] - guess, 2.0 * std::numbers::pi);
       }
     }
     return q;

@@ -241,24 +241,36 @@ class RowOf final : public RowWriter {
       double q[7], u[6];
       mechanism_.Measure(static_cast<int>(j), q, u);
       const auto& kind = *mechanism_.mechanism().joints()[j].kind;
-      if (Space::kRot == 3) Continue(words, kind, moment.followed[j], q);
+      Continue(j, words, moment.followed[j], q);
       row_->insert(row_->end(), q, q + kind.num_q);
       row_->insert(row_->end(), u, u + kind.num_u);
     }
   }
 
-  /// Makes angles and quaternions of a spatial joint continuous with the last row.
-  void Continue(const std::vector<ValueWord>& words, const JointKind<Space, double>& kind,
-                double followed, double* q) const {
+  /// Makes angles and quaternions continuous with the last row, at first with the initial values.
+  /// Measure() counts turns in the plane, except from where.
+  void Continue(std::size_t j, const std::vector<ValueWord>& words, double followed, double* q) {
+    const auto& joint = mechanism_.mechanism().joints()[j];
     const double* last = last_.empty() ? nullptr : last_.data() + row_->size();
-    if (kind.has_quaternion() && last != nullptr) KeepSign(last, q);
+    if (joint.kind->has_quaternion() && last != nullptr) KeepSign(last, q);
+    first_turns_.resize(std::max(first_turns_.size(), row_->size() + words.size()), 0.0);
     for (std::size_t i = 0; i < words.size(); ++i) {
       // a helical joint contains its full turns
-      if (words[i].unit != "rad" || kind.parameter != 0.0) continue;
-      if (words.size() == 1 && std::isfinite(followed)) {
-        q[i] = Unwrapped(q[i], followed);
-      } else if (last != nullptr) {
-        q[i] = Unwrapped(q[i], last[i]);
+      if (words[i].unit != "rad" || joint.kind->parameter != 0.0) continue;
+      const int drive = mechanism_.mechanism().DriveOf(joint, static_cast<int>(i));
+      double& turns = first_turns_[row_->size() + i];
+      if (drive >= 0) {
+        q[i] = mechanism_.kinematics().drives()[drive].value;
+      } else if (words.size() == 1) {
+        if (Space::kRot == 1) continue;
+        if (std::isfinite(followed) || last != nullptr) {
+          q[i] = Unwrapped(q[i], std::isfinite(followed) ? followed : last[i]);
+        }
+      } else if (last == nullptr) {
+        turns = Unwrapped(q[i], user_.initial.GuessOf(static_cast<int>(j), i)) - q[i];
+        q[i] += turns;
+      } else {
+        q[i] = Space::kRot == 1 ? q[i] + turns : Unwrapped(q[i], last[i]);
       }
     }
   }
@@ -368,8 +380,9 @@ class RowOf final : public RowWriter {
   std::vector<Acceleration<Space, double>> A_;
   std::vector<Wrench<Space, double>> applied_;
   std::vector<double>* row_ = nullptr;
-  std::vector<double> last_;        ///< row
-  std::vector<std::int64_t> open_;  ///< by column: number of rows without a value
+  std::vector<double> last_;         ///< row
+  std::vector<double> first_turns_;  ///< by column: of the first row, beyond measured angles
+  std::vector<std::int64_t> open_;   ///< by column: number of rows without a value
 };
 
 }  // namespace

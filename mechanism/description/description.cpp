@@ -157,6 +157,13 @@ std::string CheckValues(const MechanismDescription& description,
 
 }  // namespace
 
+double InitialDescription::GuessOf(int joint, std::size_t coordinate) const {
+  const auto given = std::ranges::find(coordinates, joint, &JointValues::joint);
+  if (given == coordinates.end() || coordinate >= given->values.size()) return 0.0;
+  const double guess = given->values[coordinate];
+  return std::isnan(guess) ? 0.0 : guess;
+}
+
 std::string Validate(const MechanismDescription& description) {
   if (description.bodies.size() < 2) return "a mechanism needs at least one body besides ground";
   if (!description.gravity.allFinite()) return "gravity must be finite";

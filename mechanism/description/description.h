@@ -99,6 +99,9 @@ struct InitialDescription {
   /// Targets, of which `coordinates` are the result (ResolvePoses()). Copies that change bodies
   /// leave them out.
   std::vector<PoseTarget> poses = {};
+
+  /// The guess of a joint's coordinate, 0 if there is none.
+  double GuessOf(int joint, std::size_t coordinate) const;
 };
 
 struct MechanismDescription {

@@ -59,6 +59,21 @@ TimeFunction::TimeFunction(TimeFunctionDescription description)
   if (table != nullptr && table->cubic) curvatures_ = NaturalSpline(table->times, table->values);
 }
 
+double TimeFunction::RateJump(double from, double to) const {
+  const auto* table = std::get_if<TimeTable>(&description_);
+  if (table == nullptr || table->cubic) return 0.0;
+  const auto slope =
+      [&](std::size_t i) {  // of the line from point i - 1 to i, flat beyond the ends
+        if (i == 0 || i == table->times.size()) return 0.0;
+        return (table->values[i] - table->values[i - 1]) / (table->times[i] - table->times[i - 1]);
+      };
+  double sum = 0.0;
+  for (std::size_t i = 0; i < table->times.size(); ++i) {
+    if (table->times[i] > from && table->times[i] <= to) sum += slope(i + 1) - slope(i);
+  }
+  return sum;
+}
+
 const std::vector<double>& TimeFunction::knots() const {
   static const std::vector<double> kNone;
   const auto* table = std::get_if<TimeTable>(&description_);

@@ -52,6 +52,9 @@ class TimeFunction {
   template <class S>
   TimeValue<S> At(S t) const;
 
+  /// Sum of the jumps of the rate at knots after `from` up to `to`; zero except for straight lines.
+  double RateJump(double from, double to) const;
+
   /// Returns the times at which some derivative jumps; empty except for tables.
   const std::vector<double>& knots() const;
   const TimeFunctionDescription& description() const { return description_; }

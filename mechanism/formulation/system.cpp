@@ -168,7 +168,7 @@ Outcome System<Space, S>::FactorBranch() {
 }
 
 template <class Space, class S>
-Outcome System<Space, S>::Accelerate() {
+Outcome System<Space, S>::FindAccelerations(VectorX<S>* lambda) {
   feedback_ = &level_->Feedback(kinematics());
   shares_ = false;
   if (mechanism_.is_redundant() && !level_->changes_speeds() &&
@@ -181,16 +181,62 @@ Outcome System<Space, S>::Accelerate() {
     }
     feedback_ = feedback_->size() > 0 ? &both_ : &turn;
   }
+  if (mechanism_.num_u() == 0) return Outcome::kFinished;
+  if (const Outcome outcome = FactorBranch(); outcome != Outcome::kFinished) return outcome;
+  SolveAccelerations(lambda);
+  return udot_.allFinite() ? Outcome::kFinished : Outcome::kNonFinite;
+}
+
+template <class Space, class S>
+Outcome System<Space, S>::Accelerate() {
   const bool is_free = mechanism_.num_u() > 0;
   VectorX<S>* lambda = drives_ != nullptr && integrates_work() ? &lambda_ : nullptr;
   lambda_is_current_ = lambda != nullptr || !is_free;
-  if (is_free) {
-    if (const Outcome outcome = FactorBranch(); outcome != Outcome::kFinished) return outcome;
-    SolveAccelerations(lambda);
-    if (!udot_.allFinite()) return Outcome::kNonFinite;
-    if (solver_->conditioning().is_regularized) ++regularized_evaluations_;
+  if (const Outcome outcome = FindAccelerations(lambda); outcome != Outcome::kFinished) {
+    return outcome;
   }
+  if (is_free && solver_->conditioning().is_regularized) ++regularized_evaluations_;
   return drives_ == nullptr ? Outcome::kFinished : JudgeDrives();
+}
+
+/// Equations of impulses are those of accelerations: a jump counts as an additional acceleration of
+/// its drive, and the additional accelerations are the changes of speeds.
+template <class Space, class S>
+bool System<Space, S>::TakeJumps(S t, std::span<S> y) {
+  if (drives_ == nullptr) return false;
+  Kinematics<Space, S>& kinematics = state_.kinematics();
+  kinematics.SetTime(t);
+  const std::vector<TimeValue<S>> after = kinematics.drives();
+  std::vector<TimeValue<S>> before = after, pushed = after;
+  bool any = false;
+  for (std::size_t d = 0; d < after.size(); ++d) {
+    const S jump = S(mechanism_.drives()[d].value.RateJump(static_cast<double>(accepted_t_),
+                                                           static_cast<double>(t)));
+    any = any || jump != S(0);
+    before[d].rate -= jump;
+    pushed[d] = {before[d].value, before[d].rate, before[d].acceleration + jump};
+  }
+  if (!any) return false;
+  step_end_version_ = -1;
+  kinematics.SetRegularization(kRegularization);
+  state_.SetPositions(Eigen::Map<const VectorX<S>>(y.data(), mechanism_.num_q()));
+  kinematics.SetDrives(before);
+  const Eigen::Map<const VectorX<S>> speeds(y.data() + mechanism_.num_q(), num_state_speeds());
+  if (level_->SetSpeeds(state_, speeds) != Outcome::kFinished) return false;
+  const S energy = ComputeEnergy(kinematics).kinetic;
+  VectorX<S> u = this->u();
+  for (const S sign : {S(-1), S(1)}) {
+    kinematics.SetDrives(sign > S(0) ? pushed : before);
+    state_.SetSpeeds(this->u());
+    if (FindAccelerations(nullptr) != Outcome::kFinished) return false;
+    u += sign * udot_;
+  }
+  kinematics.SetDrives(after);
+  state_.SetSpeeds(u);
+  ToState(q(), u, y);
+  const auto work = static_cast<std::size_t>(state_size());
+  if (y.size() > work) y[work] += ComputeEnergy(kinematics).kinetic - energy;
+  return true;
 }
 
 /// Jacobians use the results of Examine().
@@ -285,16 +331,31 @@ bool System<Space, S>::ReplaceReleased() {
   }
   state_.ForgetFactors();
   const VectorX<S> q = state_.q(), u = state_.u();
-  const bool is_closed = closing_->Accept(state_, S(0)) != Accepted::kFailed;
-  if (!is_closed) {  // the level closes them, or reports a failure
+  if (closing_->Accept(state_, S(0)) == Accepted::kFailed) {
+    // the level closes them, or reports a failure
     state_.SetPositions(q);
     state_.SetSpeeds(u);
+    return true;
+  }
+  // the smallest change in the metric M keeps the energy to second order in the rounding
+  state_.SetSpeeds(u);
+  SpeedViolation(kinematics(), target_);
+  target_ = -target_;
+  if (state_.Factor() == Outcome::kFinished) {
+    solver_->Solve(VectorX<S>(), target_, change_, nullptr);
+    state_.SetSpeeds(u + change_);
   }
   return true;
 }
 
 template <class Space, class S>
 bool System<Space, S>::BeginStep(S t, std::span<S> y) {
+  const bool jumped = TakeJumps(t, y);
+  return ReviewStep(t, y) || jumped;
+}
+
+template <class Space, class S>
+bool System<Space, S>::ReviewStep(S t, std::span<S> y) {
   bool is_projected =
       MayTakeShortCut() && level_->Project(*solver_, y.first(mechanism_.num_q()),
                                            y.subspan(mechanism_.num_q(), mechanism_.num_u()));

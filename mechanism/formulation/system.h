@@ -139,6 +139,13 @@ class System final : public Ode<S> {
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();
+  /// The first of these.
+  Outcome FindAccelerations(VectorX<S>* lambda);
+  /// Speeds of prescribed coordinates that have jumped since the last accepted step change all
+  /// speeds of `y` by an impulse, whose work is supplied. Returns true if there are any.
+  bool TakeJumps(S t, std::span<S> y);
+  /// BeginStep() after jumps.
+  bool ReviewStep(S t, std::span<S> y);
   /// Judges the latter. At level projection, whose accepted steps satisfy the constraints, inertia
   /// carries a mechanism across singular configurations; violations at trial stages are not judged.
   Outcome JudgeDrives();

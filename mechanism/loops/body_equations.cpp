@@ -13,7 +13,8 @@ BodyEquations<Space, S>::BodyEquations(const Mechanism<Space, S>& mechanism)
       b_(mechanism.num_bodies(), Acceleration<Space, S>::Zero()),
       A_(b_),
       c0_(mechanism.joints().size(), Components<Space, S>::Zero()),
-      known_(VectorX<S>::Zero(mechanism.num_u())) {}
+      known_(mechanism.joints().size(), Acceleration<Space, S>::Zero()),
+      known_x_(VectorX<S>::Zero(mechanism.num_u())) {}
 
 /// b = M^-1 times the wrench, at the centre of mass in ground axes: the part of the paper's zeta_i3
 /// that is the same at both handles, before its shift. Moments, less w x I w, are taken to axes of
@@ -41,7 +42,8 @@ void BodyEquations<Space, S>::SetFree(const Kinematics<Space, S>& kinematics, bo
 template <class Space, class S>
 void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
                                        const VectorX<S>& force, const VectorX<S>& target) {
-  known_.setZero();
+  known_x_.setZero();
+  has_speeds_ = false;
   for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) {
     const Joint<Space, S>& joint = mechanism_.joints()[index];
@@ -67,7 +69,8 @@ void BodyEquations<Space, S>::SetForce(const Kinematics<Space, S>& kinematics,
 template <class Space, class S>
 void BodyEquations<Space, S>::SetWrenches(const Kinematics<Space, S>& kinematics,
                                           const VectorX<S>& wrenches) {
-  known_.setZero();
+  known_x_.setZero();
+  has_speeds_ = false;
   for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (std::size_t body = 0; body < wrenches_.size(); ++body) {
     for (int d = 0; d < Space::kDim; ++d) {
@@ -85,14 +88,16 @@ void BodyEquations<Space, S>::SetState(const Kinematics<Space, S>& kinematics,
                                        const VectorX<S>& feedback) {
   AppliedForces<Space, S>(kinematics, wrenches_);
   SetFree(kinematics, true);
+  has_speeds_ = true;
   for (std::size_t j = 0; j < c0_.size(); ++j) {
     const Joint<Space, S>& joint = mechanism_.joints()[j];
     const JointState<Space, S>& state = kinematics.joints()[j];
-    const Acceleration<Space, S> known = kinematics.Centripetal(joint.to, state.r_Q) -
-                                         kinematics.Centripetal(joint.from, state.r_P) - state.g;
+    Acceleration<Space, S>& known = known_[j];
+    known = kinematics.Centripetal(joint.to, state.r_Q) -
+            kinematics.Centripetal(joint.from, state.r_P) - state.g;
     c0_[j] = state.Along(known, state.rows());
     for (int i = 0; i < (joint.in_tree() ? state.num_u : 0); ++i) {
-      known_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);
+      known_x_[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(known);
     }
   }
   if (feedback.size() == 0) return;
@@ -105,7 +110,8 @@ void BodyEquations<Space, S>::SetState(const Kinematics<Space, S>& kinematics,
 
 template <class Space, class S>
 void BodyEquations<Space, S>::SetMissed(const Kinematics<Space, S>& kinematics) {
-  known_.setZero();
+  known_x_.setZero();
+  has_speeds_ = false;
   has_force_ = false;
   for (Components<Space, S>& c0 : c0_) c0.setZero();
   for (int index : mechanism_.constraints()) c0_[index] = kinematics.ConstraintSpeed(index);
@@ -114,7 +120,7 @@ void BodyEquations<Space, S>::SetMissed(const Kinematics<Space, S>& kinematics) 
 /// x = H^T (A_Q - A_P) / |H|^2 of each tree joint, both points at Mo: udot of (7).
 template <class Space, class S>
 void BodyEquations<Space, S>::Read(const Kinematics<Space, S>& kinematics, VectorX<S>& x) const {
-  x = known_;
+  x = known_x_;
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, S>& joint = mechanism_.joints()[step.joint];
     const JointState<Space, S>& state = kinematics.joints()[step.joint];

@@ -43,6 +43,11 @@ class BodyEquations {
   /// M b, without the rounding errors of b.
   std::span<const Wrench<Space, S>> wrenches() const { return wrenches_; }
   std::span<const Components<Space, S>> c0() const { return c0_; }
+  /// n_Q - n_P - g of each joint, at Mo in ground axes; empty if speeds do not count.
+  std::span<const Acceleration<Space, S>> known() const {
+    return has_speeds_ ? std::span<const Acceleration<Space, S>>(known_)
+                       : std::span<const Acceleration<Space, S>>();
+  }
   /// For the solution: of all bodies, with Ground's zero.
   std::span<Acceleration<Space, S>> A() { return A_; }
 
@@ -59,8 +64,9 @@ class BodyEquations {
   std::vector<Wrench<Space, S>> wrenches_;
   std::vector<Acceleration<Space, S>> b_, A_;
   std::vector<Components<Space, S>> c0_;
-  bool has_force_ = false;
-  VectorX<S> known_;  ///< part of x that does not come from A
+  std::vector<Acceleration<Space, S>> known_;
+  bool has_force_ = false, has_speeds_ = false;
+  VectorX<S> known_x_;  ///< part of x that does not come from A
 };
 
 }  // namespace loopbench

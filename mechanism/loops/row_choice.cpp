@@ -1,12 +1,14 @@
 #include "mechanism/loops/row_choice.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
 
 namespace loopbench {
 
 RowChoice::RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int total)
-    : left_(rows),
+    : rows_(rows),
+      left_(rows),
       quotas_(std::move(quotas)),
       is_taken_(static_cast<std::size_t>(rows.rows()), false),
       taken_(quotas_.size(), 0) {
@@ -18,6 +20,7 @@ RowChoice::RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int
     in_quotas += quota.keep;
   }
   TakeBest(std::min(in_quotas, total));
+  Exchange();
   is_in_quota_ = is_taken_;
   for (Quota& quota : quotas_) quota.keep = quota.count;
   TakeBest(total);
@@ -26,7 +29,7 @@ RowChoice::RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int
 void RowChoice::Take(std::size_t joint, int row) {
   is_taken_[row] = true;
   ++taken_[joint];
-  ++num_taken_;
+  order_.push_back({joint, row});
   const double norm = left_.row(row).norm();
   least_ = std::min(least_, norm);
   if (!(norm > 0.0)) return;
@@ -39,7 +42,7 @@ void RowChoice::Take(std::size_t joint, int row) {
 }
 
 void RowChoice::TakeBest(int total) {
-  while (num_taken_ < total) {
+  while (std::ssize(order_) < total) {
     double best = -1.0;
     std::size_t joint = 0;
     int row = -1;
@@ -57,6 +60,48 @@ void RowChoice::TakeBest(int total) {
     }
     if (row < 0) break;
     Take(joint, row);
+  }
+}
+
+void RowChoice::Exchange() {
+  constexpr double kGain = 2.0;
+  const auto may_change = [&](std::size_t joint, int row) {
+    const Quota& quota = quotas_[joint];
+    return quota.keep < quota.count && row >= quota.first + quota.fixed;
+  };
+  for (Eigen::Index round = 0; round < rows_.rows() && !order_.empty(); ++round) {
+    const auto size = static_cast<Eigen::Index>(order_.size());
+    Eigen::MatrixXd taken(size, rows_.cols());
+    for (Eigen::Index k = 0; k < size; ++k) taken.row(k) = rows_.row(order_[k].row);
+    const Eigen::MatrixXd inverse =
+        (taken * taken.transpose()).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+    const Eigen::MatrixXd T = rows_ * taken.transpose() * inverse;
+    double most = kGain * kGain;
+    Taken* out = nullptr;
+    int in = -1;
+    for (Eigen::Index k = 0; k < size; ++k) {
+      const std::size_t joint = order_[k].joint;
+      if (!may_change(joint, order_[k].row)) continue;
+      for (int row = quotas_[joint].first; row < quotas_[joint].first + quotas_[joint].count;
+           ++row) {
+        if (is_taken_[row] || !may_change(joint, row)) continue;
+        const double rest = (rows_.row(row) - T.row(row) * taken).squaredNorm();
+        const double gain = T(row, k) * T(row, k) + rest * inverse(k, k);  // of volume, squared
+        if (!(gain > most)) continue;
+        most = gain;
+        out = &order_[k];
+        in = row;
+      }
+    }
+    if (out == nullptr) return;
+    out->row = in;
+    const std::vector<Taken> order = std::move(order_);
+    order_.clear();
+    left_ = rows_;
+    is_taken_.assign(is_taken_.size(), false);
+    taken_.assign(taken_.size(), 0);
+    least_ = std::numeric_limits<double>::infinity();
+    for (const Taken& one : order) Take(one.joint, one.row);
   }
 }
 

@@ -20,7 +20,7 @@ struct Quota {
 class RowChoice {
  public:
   /// Takes all rows of joints that keep all and prescribed ones, the best others until all quotas
-  /// are full, then the best of all until `total` are taken.
+  /// are full, improved by exchanges within joints, then the best of all until `total` are taken.
   RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int total);
 
   /// The least norm that a row had left when it was taken.
@@ -35,12 +35,19 @@ class RowChoice {
   void Take(std::size_t joint, int row);
   /// More rows by pivoting until `total` are taken.
   void TakeBest(int total);
+  /// Exchanges rows of a joint while this doubles the volume of the rows taken. Pivoting alone may
+  /// take a row early that leaves other joints nothing.
+  void Exchange();
 
-  Eigen::MatrixXd left_;  ///< rows less their parts along those taken
+  struct Taken {
+    std::size_t joint;
+    int row;
+  };
+  Eigen::MatrixXd rows_, left_;  ///< left_: rows less their parts along those taken
+  std::vector<Taken> order_;
   std::vector<Quota> quotas_;
   std::vector<bool> is_taken_, is_in_quota_;
   std::vector<int> taken_;  ///< by joint
-  int num_taken_ = 0;
   double least_ = std::numeric_limits<double>::infinity();
 };
 

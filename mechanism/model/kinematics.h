@@ -77,6 +77,9 @@ class Kinematics {
   S time() const { return time_; }
   /// Values of the mechanism's drives at that time.
   const std::vector<TimeValue<S>>& drives() const { return drives_; }
+  /// Other rates and accelerations of the drives, until the next SetTime(). UpdateVelocity() takes
+  /// them.
+  void SetDrives(const std::vector<TimeValue<S>>& drives) { drives_ = drives; }
 
   /// Poses, joint points and directions from q.
   void UpdatePosition(const Eigen::Ref<const VectorX<S>>& q);

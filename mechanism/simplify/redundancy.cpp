@@ -126,20 +126,16 @@ void AdaptQuotas(const std::vector<Eigen::MatrixXd>& rows, int rank, std::vector
   }
 }
 
-/// The rows of a position that depend most on the others, so that `rank` stay imposed. Joints with
-/// prescribed coordinates keep all theirs: such coordinates change the order of the rows.
+/// The rows of a position that depend most on the others, so that `rank` stay imposed.
 template <class Space>
 std::vector<Released> Release(const Excursion<Space>& position,
                               const Mechanism<Space, double>& mechanism,
-                              const MechanismDescription& description,
                               const std::vector<Eigen::MatrixXd>& everywhere) {
   const std::vector<int>& constraints = mechanism.constraints();
   const DirectionRows& at = position.rows();
   std::vector<Quota> quotas;
   for (std::size_t c = 0; c < constraints.size(); ++c) {
-    const bool keeps_all = !description.joints[constraints[c]].motions.empty();
-    const int fixed = keeps_all ? at.count[c] : 0;
-    quotas.push_back({at.first[c], at.count[c], fixed, fixed});
+    quotas.push_back({at.first[c], at.count[c], 0, 0});
   }
   const RowChoice best(at.rows, quotas, position.rank());
   for (std::size_t c = 0; c < quotas.size(); ++c) quotas[c].keep = best.taken(c);
@@ -191,7 +187,7 @@ Redundancy Find(const MechanismDescription& description) {
     // rounded rows are imposed or not, so that those of the start must serve there
     const bool starts_regular = accuracy > 0.0 && first.rank() == excursion.rank();
     if (mechanism.num_u() > kMaxWithTurns) rows.clear();
-    result.released = Release(starts_regular ? first : excursion, mechanism, description, rows);
+    result.released = Release(starts_regular ? first : excursion, mechanism, rows);
     if (accuracy > 0.0) {
       result.rounding = std::max(excess, start.position_residual / mechanism.length());
     }

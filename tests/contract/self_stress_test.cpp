@@ -159,6 +159,14 @@ TEST_P(ReleasedRows, ChangeAccelerationsToSecondOrderInTheMismatchAlone) {
     const Accelerations fine = Evaluate(GetParam(), make, 1e-5);
     // a factor of 1e4 but for third order and round-off
     EXPECT_LT(fine.spread, 2e-4 * coarse + 1e-10);
+    // as O-DCA and multipliers agree, whose equations are the same at any mismatch
+    const VectorX<double> same =
+        Evaluate(GetParam(), solvers[make == solvers[0] ? 1 : 0], 1e-3).udot;
+    const double size = same.lpNorm<Eigen::Infinity>();
+    if (make != solvers[2]) {
+      const VectorX<double> own = Evaluate(GetParam(), make, 1e-3).udot;
+      EXPECT_LT((own - same).lpNorm<Eigen::Infinity>(), 1e-9 * size);
+    }
     // the mismatch itself changes accelerations to first order
     const VectorX<double> closed = Evaluate(GetParam(), make, 0.0).udot;
     EXPECT_GT((fine.udot - closed).lpNorm<Eigen::Infinity>(), 30.0 * fine.spread);

@@ -168,6 +168,20 @@ TEST_F(GenerateTest, AMechanismMayBeCalledTestOrExample) {
   }
 }
 
+/// The code has no impulses.
+TEST_F(GenerateTest, JumpsOfSpeedAreRejected) {
+  Write("cart.json", R"({"name": "cart", "gravity": [0, -9.81], "bodies": [
+    {"name": "cart", "mass": 1.0, "inertia": 1.0}, {"name": "bar", "mass": 1.0, "inertia": 0.1}],
+    "joints": [{"name": "slide", "type": "prismatic", "from": {"body": "ground"},
+      "to": {"body": "cart"}, "motion": {"type": "table", "interpolation": "linear",
+      "times": [0, 1, 2], "values": [0, 0, 1]}},
+    {"name": "pin", "type": "revolute", "from": {"body": "cart"},
+     "to": {"body": "bar", "at": [0.5, 0]}}]})");
+  ExpectEnding(Call("generate cart.json --out code"), 2,
+               {"the motion of slide has jumps of speed", "cubic"});
+  EXPECT_FALSE(fs::exists(folder_ / "code"));
+}
+
 TEST_F(GenerateTest, EqualInputGivesEqualFiles) {
   for (const char* folder : {"code", "again"}) {
     ExpectEnding(

@@ -298,10 +298,44 @@ TEST(PlanTest, OperationsAreThoseOfTheSweep) {
   }
 }
 
-std::vector<PlanJoint> ChainOf(int bodies) {
+std::vector<PlanJoint> ChainOf(int bodies, int rows = 2) {
   std::vector<PlanJoint> joints;
-  for (int j = 0; j <= bodies; ++j) joints.push_back({j, j, j < bodies ? j + 1 : 0, 2});
+  for (int j = 0; j <= bodies; ++j) joints.push_back({j, j, j < bodies ? j + 1 : 0, rows});
   return joints;
+}
+
+TEST(PlanTest, GroundHoldsArms) {
+  PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
+  options.dim = 6;
+  const auto holders = [](const Plan& plan) {
+    std::vector<int> all;
+    for (const Leaf& leaf : plan.leaves()) all.push_back(leaf.hold.joint < 0 ? -2 : leaf.holder);
+    return all;
+  };
+  // two arms, from both ends, and one join
+  const Plan ring(7, ChainOf(6, 5), options);
+  EXPECT_EQ(holders(ring), (std::vector<int>{-1, 0, 1, 4, 5, -1}));
+  ASSERT_EQ(ring.nodes().size(), 1u);
+  EXPECT_TRUE(ring.nodes()[0].closes_loop);
+  for (const int n : {0, 1, 2}) {
+    EXPECT_EQ(ring.leaves()[n].end, 2);
+    EXPECT_EQ(ring.leaves()[n].free, n + 1);
+  }
+  std::vector<bool> before(6, false);
+  for (const int n : ring.leaf_order()) {
+    const int holder = ring.leaves()[n].holder;
+    EXPECT_TRUE(holder < 0 || before[holder]);
+    before[n] = true;
+  }
+  // at most four free directions in space, one in the plane
+  const std::vector<int> of_twelve = holders(Plan(13, ChainOf(12, 5), options));
+  EXPECT_EQ(std::ranges::count(of_twelve, -2), 4);
+  options.dim = 3;
+  EXPECT_EQ(holders(Plan(4, ChainOf(3), options)), (std::vector<int>{-1, -2, -1}));
+  options.dim = 6;
+  // a body with a branch ends an arm
+  const std::vector<PlanJoint> tree = {{0, 0, 1, 5}, {1, 1, 2, 5}, {2, 2, 3, 5}, {3, 2, 4, 5}};
+  EXPECT_EQ(holders(Plan(5, tree, options)), (std::vector<int>{-1, 0, -2, -2}));
 }
 
 /// Joints looked at while the joins of all bodies are put in order.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "mechanism/description/library.h"
+#include "mechanism/simplify/redundancy.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
@@ -99,7 +100,7 @@ MechanismDescription CartPendulum(const TimeFunctionDescription& motion) {
 }
 
 /// Angle of its bar at `end` by the classical method with steps of 1e-3 s between knots: errors of
-/// some 1e-12.
+/// some 1e-12. At a knot the slider's speed may jump, and the bar's by the impulse of the pin.
 double BarAngle(const TimeFunctionDescription& motion, double end) {
   const TimeFunction s(motion);
   const double mass = 2.0, arm = 0.5, inertia = 0.3 + mass * arm * arm;
@@ -116,14 +117,17 @@ double BarAngle(const TimeFunctionDescription& motion, double end) {
     const Eigen::Vector2d k1 = rate(t, y), k2 = rate(t + h / 2, y + h / 2 * k1),
                           k3 = rate(t + h / 2, y + h / 2 * k2), k4 = rate(t + h, y + h * k3);
     y += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    y[1] += mass * arm * std::sin(y[0]) * s.RateJump(t + h / 2, t + 3 * h / 2) / inertia;
   }
   return y[0];
 }
 
 TEST_P(Driven, BarOnAMovedSliderSwingsAsItsEquationSays) {
   const TimeTable table{.times = {0.0, 0.5, 0.8, 1.7, 2.0}, .values = {0.0, 0.3, 0.1, -0.2, 0.0}};
+  TimeTable lines = table;
+  lines.cubic = false;
   for (const TimeFunctionDescription& motion : std::initializer_list<TimeFunctionDescription>{
-           Harmonic{.amplitude = 0.2, .omega = 6.0}, Polynomial{{0.0, 0.1, 0.4}}, table}) {
+           Harmonic{.amplitude = 0.2, .omega = 6.0}, Polynomial{{0.0, 0.1, 0.4}}, table, lines}) {
     const MechanismDescription description = CartPendulum(motion);
     const Simulation run =
         Simulate(description, GetParam(), Options("dormand-prince", kRtol), 2.0, {});
@@ -133,6 +137,58 @@ TEST_P(Driven, BarOnAMovedSliderSwingsAsItsEquationSays) {
     EXPECT_NEAR(std::remainder(angle - BarAngle(motion, 2.0), 2 * M_PI), 0.0, 1e3 * kRtol);
     EXPECT_LE(run.energy_error, 1e4 * kRtol);
   }
+}
+
+/// A bar driven from rest to a speed of 1, and in line with it a second one that swings freely: the
+/// impulse of the pin between them makes the moment about it 0 = m c (l + c w) + I w.
+TEST_P(Driven, AJumpOfSpeedActsByImpulses) {
+  MechanismDescription d;
+  d.name = "kink";
+  for (const char* name : {"driven", "free"}) d.bodies.push_back(Bar(name, 1.0, 1.0, 0.1));
+  JointDescription drive =
+      Revolute("drive", kGround, Eigen::Vector3d::Zero(), 1, Eigen::Vector3d::Zero());
+  drive.motions = {{0, TimeTable{.times = {0.2, 5.0}, .values = {0.0, 4.8}, .cubic = false}}};
+  d.joints = {drive, Revolute("pin", 1, {1.0, 0.0, 0.0}, 2, Eigen::Vector3d::Zero())};
+  d.initial.coordinates = {{1, {0.0}}};
+  double speed = 0.0;
+  const Simulation run = Simulate(d, GetParam(), Options("dormand-prince", kRtol), 0.2 + 1e-9,
+                                  [&](const Snapshot& at) { speed = at.bodies[2].w.z(); });
+  ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  EXPECT_NEAR(speed, -0.5 / (0.25 + 0.1), 1e3 * kRtol);
+  EXPECT_LE(run.energy_error, 1e4 * kRtol) << "the drive supplies the work of the impulse";
+}
+
+/// A slider-crank whose crank has two hinges on Ground; the one that is cut is driven.
+TEST_P(Driven, ARedundantHingeMayBeDriven) {
+  MechanismDescription d;
+  d.name = "two-hinges";
+  const Eigen::Vector3d at_origin = Eigen::Vector3d::Zero();
+  d.bodies.push_back(Bar("crank", 1.0, 1.0, 0.1));
+  d.bodies.push_back(Bar("rod", 2.0, 1.0, 0.1));
+  d.bodies.push_back(Bar("slider", 0.0, 1.0, 0.1));
+  JointDescription slide = Revolute("slide", kGround, at_origin, 3, at_origin);
+  slide.type = JointType::kPrismatic;
+  JointDescription end = Revolute("end", 2, {2.0, 0.0, 0.0}, 3, at_origin);
+  JointDescription second = Revolute("second", kGround, at_origin, 1, at_origin);
+  end.cut = second.cut = true;
+  second.motions = {{0, Polynomial{{0.5, 1.0}}}};
+  d.joints = {Revolute("first", kGround, at_origin, 1, at_origin),
+              Revolute("knee", 1, {1.0, 0.0, 0.0}, 2, at_origin), slide, end, second};
+  d.initial.coordinates = {{0, {0.5}}, {1, {-0.7}}, {2, {2.7}}};
+  const Redundancy redundancy = FindRedundancy(d);
+  ASSERT_EQ(redundancy.released.size(), 1u);
+  EXPECT_EQ(redundancy.released[0].joint, 4);
+  EXPECT_EQ(redundancy.released[0].directions, (std::vector<int>{0, 1}));
+  double worst = 0.0;
+  const Simulation run = Simulate(Release(d, redundancy), GetParam(),
+                                  Options("dormand-prince", kRtol), 2.0, [&](const Snapshot& at) {
+                                    const double crank = 0.5 + at.t, across = 0.5 * std::sin(crank);
+                                    const double x =
+                                        std::cos(crank) + 2.0 * std::sqrt(1.0 - across * across);
+                                    worst = std::max(worst, std::abs(at.bodies[3].p.x() - x));
+                                  });
+  ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  EXPECT_LE(worst, 1e4 * kRtol);
 }
 
 /// Both cranks of a parallelogram driven: consistent, or not.

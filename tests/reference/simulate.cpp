@@ -12,8 +12,8 @@
 namespace loopbench::harness::reference {
 namespace {
 
-/// The formulation's system with two quadratures: the integral of the kinetic energy, and the work
-/// of forces without a potential.
+/// The formulation's system with two quadratures: the work of forces without a potential, and the
+/// integral of the kinetic energy.
 template <class Space>
 class WithIntegrals final : public Ode {
  public:
@@ -24,8 +24,8 @@ class WithIntegrals final : public Ode {
     const std::size_t n = y.size() - 2;
     const Outcome outcome = formulation_.Examine(t, y.first(n), ydot.first(n));
     const Power<double> power = formulation_.TotalPower();
-    ydot[n] = ComputeEnergy(formulation_.kinematics()).kinetic;
-    ydot[n + 1] = power.supplied - power.dissipated;
+    ydot[n] = power.supplied - power.dissipated;
+    ydot[n + 1] = ComputeEnergy(formulation_.kinematics()).kinetic;
     return outcome;
   }
 
@@ -79,20 +79,23 @@ Simulation SimulateIn(const MechanismDescription& description, const Method& met
   double first_energy = std::nan("");
   Outcome failure = Outcome::kFinished;  // of an accepted state
   const StepObserver observe = [&](double t, std::span<double> state) {
-    const bool restart = formulation->BeginStep(t, state.first(n));
+    // which adds the work of impulses
+    const bool restart = formulation->BeginStep(t, state.first(n + 1));
     failure = formulation->FromState(t, state.first(n));
     if (failure != Outcome::kFinished) return StepAction::kStop;
     simulation.last = SnapshotOf(t, formulation->kinematics());
-    const double energy = simulation.last.kinetic + simulation.last.potential - state[n + 1];
+    const double energy = simulation.last.kinetic + simulation.last.potential - state[n];
     if (std::isnan(first_energy)) first_energy = energy;
     simulation.energy_error = std::max(simulation.energy_error, std::abs(energy - first_energy));
     if (watch) watch(simulation.last);
     return restart ? StepAction::kRestart : StepAction::kContinue;
   };
   WithIntegrals<Space> ode(*formulation);
-  simulation.result = Integrate(ode, 0.0, horizon, y, options, observe);
+  IntegratorOptions stops = options;
+  stops.stop_times = mechanism.stop_times();
+  simulation.result = Integrate(ode, 0.0, horizon, y, stops, observe);
   if (failure != Outcome::kFinished) simulation.result.outcome = failure;
-  simulation.kinetic_integral = y[n];
+  simulation.kinetic_integral = y[n + 1];
   return simulation;
 }
 

@@ -224,6 +224,40 @@ TEST(Trajectory, ForcesInSpaceFollowFullTurns) {
   }
 }
 
+/// A cut slot whose angle, as the difference of angles of bodies, is 8.21.
+constexpr const char* kSlot = R"({"name": "slot", "gravity": [0, -9.81], "bodies": [
+  {"name": "a", "mass": 1, "inertia": 0.1, "com": [0.5, 0]},
+  {"name": "s", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}],
+  "joints": [
+    {"name": "T", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "a"}},
+    {"name": "S", "type": "revolute", "from": {"body": "a", "at": [1, 0]}, "to": {"body": "s"}},
+    {"name": "L", "type": "pin-in-slot", "from": {"body": "ground", "rotation": -2.0},
+     "to": {"body": "s", "at": [2, 0], "rotation": 2.0}, "cut": true}],
+  "initial": {"coordinates": {"T": 1.0, "S": 1.5, "L": [0.2168, 0]}, "fixed": ["T"]}})";
+/// An angle that begins beyond half a turn.
+constexpr const char* kDrivenScrew = R"({"name": "driven", "space": "spatial",
+  "gravity": [0, 0, -9.81], "bodies": [
+  {"name": "a", "mass": 1, "inertia": [0.1, 0.1, 0.1]}],
+  "joints": [{"name": "C", "type": "cylindrical", "from": {"body": "ground"}, "to": {"body": "a"},
+    "motion": [{"coordinate": 0,
+      "value": {"type": "polynomial", "coefficients": [4.0, 9.0]}}]}]})";
+
+TEST(Trajectory, AnglesOfJointsWithSeveralCoordinatesBeginAtTheirGuesses) {
+  for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    const Method method{.formulation = "odca", .coordinates = coordinates};
+    const Written slot =
+        WriteTrajectory(ParseMechanism(kSlot, "slot.json"), method, "ode45", 1e-8, 0.2, Rows(3));
+    const double turn = std::remainder(slot.At(0, "joint", "L", "angle") - 0.2168, 2 * kPi);
+    EXPECT_EQ(slot.At(0, "joint", "L", "angle"), 0.2168 + turn);
+    EXPECT_NEAR(slot.At(1, "joint", "L", "angle"), slot.At(0, "joint", "L", "angle"), 0.5);
+    const Written screw = WriteTrajectory(ParseMechanism(kDrivenScrew, "driven.json"), method,
+                                          "ode45", 1e-8, 1.0, Rows(3));
+    for (std::size_t row = 0; row < 3; ++row) {
+      EXPECT_EQ(screw.At(row, "joint", "C", "angle"), 4.0 + 9.0 * screw.Time(row));
+    }
+  }
+}
+
 TEST(Trajectory, LeavesTheRunAsItIs) {
   // the parallelogram passes singular positions, near which rows see regularized constraints too
   for (const char* name : {"four-bar", "parallelogram", "driven-four-bar", "bennett"}) {

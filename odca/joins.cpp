@@ -209,11 +209,13 @@ void Joins<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses ma
   Repeat(rows, [&](int i) { c[i] = ShiftForce<Space, S>(state.D(i), r) * sign; });
 }
 
-/// The directions h that the joints of its arm leave to a body, at the centre of mass: those of the
-/// holder, then those of its own joint. The arm's N is the sum of h^T M h over its bodies, and its
-/// last body's response is H N^-1 H^T. Then the duals of the joint's rows c: they have the product
-/// 1 with their own c and 0 with others, so that c0 costs no solution. D is orthonormal but for
-/// exact tilts (JointKind::exact_basis).
+/// Free directions h of a held body at its centre of mass: first the directions of the holder, then
+/// those that its own joint leaves free. N is the sum of h^T M h over the bodies of the arm. The
+/// response of its last body is H N^-1 H^T.
+///
+/// Then the dual vectors of the joint's rows c. Dual vector i has the product 1 with row i and 0
+/// with other rows, so c0 needs no solution of equations. The columns of D are orthonormal, except
+/// for exact tilts (JointKind::exact_basis).
 template <class Space, class S>
 void Joins<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n) {
   const Leaf& leaf = plan_.leaves()[n];

@@ -116,15 +116,14 @@ class Joins {
     }
     return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
   }
-  /// A held leaf: an acceleration that satisfies its holds, and the generalised forces of all other
-  /// wrenches up to here along the arm's free directions H. The motion is given + H x with N x =
-  /// along.
+  /// Motion of a held leaf: `given` + H x, with the free directions H and N x = `along`. `given`
+  /// satisfies the holds of the arm. `along` are the generalised forces of the bodies so far.
   struct HeldMotion {
     Acceleration<Space, S> given;
     Components<Space, S> along;
   };
-  /// From its holder's, if there is one, for the wrench on its body and c0 of its hold; tree joints
-  /// take `known` instead, if there is one.
+  /// Continues the motion of the holder (null on Ground) with the wrench F on the body and c0 of
+  /// the hold. If the hold is a tree joint, `known` (null if zero) replaces c0.
   HeldMotion Hang(int n, const HeldMotion* holder, const Wrench<Space, S>& F,
                   const Components<Space, S>& c0, const Acceleration<Space, S>* known) const;
   /// v := L^-1 v and v := L^-T v for N = L L^T of the arm that ends at leaf n.
@@ -138,12 +137,12 @@ class Joins {
   }
   /// L^-1 H^T F
   Components<Space, S> AlongArm(int n, const Wrench<Space, S>& F) const;
-  /// The same of the rows c of a side of leaf n, as its first components.
+  /// L^-1 H^T c of each row c of a side of a held leaf, in the first components.
   const Acceleration<Space, S>* AlongArm(const PlanSide& side) const { return &Mc_[Offset(side)]; }
   Acceleration<Space, S> HeldAcceleration(int n, const Acceleration<Space, S>& given,
                                           const Components<Space, S>& x) const;
-  /// The wrench of its hold on a held body, from its acceleration and the other wrenches on it;
-  /// then its phi, and the opposite wrench on the holder.
+  /// Returns the wrench of the hold on a held body. A: the body's acceleration; F: sum of the other
+  /// wrenches on it. Then phi of this wrench, and the opposite wrench at the holder.
   Wrench<Space, S> HoldingWrench(int n, const Acceleration<Space, S>& A,
                                  const Wrench<Space, S>& F) const {
     return Wrench<Space, S>(bodies_[n].rotational * A.angular, A.linear * bodies_[n].mass) - F;
@@ -215,7 +214,8 @@ class Joins {
   struct Body {
     typename Inertia<Space, S>::Matrix rotational, rotational_inverse;
     S mass = S(0), per_mass = S(0);
-    /// Of a held body: its centre of mass from the holder's, and Mo of its hold from there.
+    /// From the holder's centre of mass to the centre of mass of a held body, and from there to Mo
+    /// of its hold.
     Linear<Space, S> from_holder, to_hold;
   };
   /// A free direction of a held body, and the body's inertia times it.
@@ -274,7 +274,7 @@ class Joins {
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;
   MatrixX<S> columns_;
-  std::vector<int> lone_leaves_;  ///< of no node: bodies of arms before the last, or without joints
+  std::vector<int> lone_leaves_;  ///< leaves of no node: inside arms, or without joints
   int largest_matrix_ = 0;
   bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;

@@ -15,9 +15,9 @@ std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>& mechanism) {
   for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
     const Joint<Space, S>& joint = mechanism.joints()[j];
     const int rows = joint.num_constraints();
-    // Exact tilts (JointKind::exact_basis) are orthogonal to each other, and those of screws to H,
-    // only up to the drift. Imposed rows may stand for released ones, too. Prescribed motions that
-    // contradict a loop are judged in its equations.
+    // Not orthogonal: exact tilts (JointKind::exact_basis) to each other, exact directions of
+    // screws to H, imposed rows that include released ones. Prescribed motions that contradict a
+    // loop are detected in the equations of this loop, so their joints hold no body.
     const bool releases = joint.num_released > 0, tilts = joint.kind->basis_rate != nullptr;
     const bool is_orthogonal =
         tilts ? !releases && !joint.kind->has_screws : !releases || !mechanism.is_redundant();

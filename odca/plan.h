@@ -97,8 +97,9 @@ struct PlanSide {
   int row = 0;  ///< index of its first row in all nodes
 };
 
-/// A body alone: its handles are itself, or all of its sides. Bodies on an arm from Ground whose
-/// joints leave few directions free are held leaves: the joint towards Ground is in no node.
+/// A body alone. Its handles are the body itself, or all of its sides. Bodies of an arm are held
+/// leaves: Ground holds a row of bodies whose joints leave few directions free. These joints are in
+/// no node.
 struct Leaf {
   std::span<const PlanSide> sides;
   PlanSide hold;    ///< that joint; -1 if there is none
@@ -154,7 +155,7 @@ class Plan {
  private:
   /// With one order of joins: by the rules (`start` 0), or body after body from `start`.
   Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options, int start);
-  /// Sets the holds of all leaves; the other joints.
+  /// Sets the holds of all leaves. Returns the other joints.
   std::vector<PlanJoint> AddHolds(std::span<const PlanJoint> joints, const PlanOptions& options);
   void AddLeaves(std::span<const PlanJoint> joints, const std::vector<bool>& is_body, int dim);
   void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts, int dim);

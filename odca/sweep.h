@@ -34,8 +34,8 @@ class Sweep {
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
   const Joins<Space, S>& joins() const { return joins_; }
 
-  /// Given numbers: by body the free accelerations b (empty if zero) and the wrenches M b; by joint
-  /// c0, and for tree joints the acceleration whose components c0 are (BodyEquations::known()).
+  /// By body: free accelerations b (empty if zero) and wrenches M b. By joint: c0, and for tree
+  /// joints BodyEquations::known(), the acceleration with the components c0.
   struct Loads {
     std::span<const Acceleration<Space, S>> b;
     std::span<const Wrench<Space, S>> wrenches;
@@ -64,7 +64,7 @@ class Sweep {
           std::span<const Components<Space, S>> c0);
   template <class Rows, class Width>
   void Down(const PlanNode& node, int n, Rows rows, Width width);
-  /// b of the handles of a leaf. Then A from all forces on it, added.
+  /// UpLeaf() sets b at the handles of a leaf. DownLeaf() adds its acceleration to A.
   void UpLeaf(int n, const Loads& loads);
   void DownLeaf(int n, const Loads& loads, std::span<Acceleration<Space, S>> A);
   /// Runs up and down; adds to A and phi_. Without b the bodies' free accelerations are zero.
@@ -77,7 +77,7 @@ class Sweep {
   Joins<Space, S> joins_;
   std::vector<S> b_;  ///< of all handles, by slot: a join changes those that stay
   std::vector<S> F_;  ///< phi of all rows, then wrenches of bodies
-  /// Of leaves without forces of their joints.
+  /// Accelerations of free leaves without joint forces; `given` of held leaves.
   std::vector<Acceleration<Space, S>> start_;
   std::vector<typename Joins<Space, S>::HeldMotion> held_;  ///< of held leaves
   std::vector<Components<Space, S>> phi_, residual_;

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -407,17 +406,6 @@ int GenerateHere(const GenerateCommand& command) {
   const MechanismFile file = ReadMechanism(command.mechanism);
   const SimplifiedProblem problem = SimplifyProblem(file.description, file.observe, {});
   const MechanismDescription& description = problem.compiled.parts.front().description;
-  for (const JointDescription& joint : description.joints) {
-    for (const PrescribedMotion& motion : joint.motions) {
-      const auto* table = std::get_if<TimeTable>(&motion.value);
-      if (table == nullptr || table->cubic) continue;
-      if (std::ranges::adjacent_find(table->values, std::not_equal_to<>()) == table->values.end()) {
-        continue;
-      }
-      throw ConfigError(command.mechanism.string() + ": cannot be generated: the motion of " +
-                        joint.name + " has jumps of speed, expected \"interpolation\": \"cubic\"");
-    }
-  }
   std::vector<std::string> lines;
   std::istringstream version(VersionText());
   for (std::string line; std::getline(version, line);) lines.push_back(line);

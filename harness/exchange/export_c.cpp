@@ -406,6 +406,14 @@ Code MakeCode(const CodeRequest& request) {
   if (request.motion.front().y.empty() || request.start.q.size() == 0) {
     throw generate::NotCovered("prescribed motions leave no state to integrate");
   }
+  for (const JointDescription& joint : request.subject.description.joints) {
+    for (const PrescribedMotion& motion : joint.motions) {
+      const auto* table = std::get_if<TimeTable>(&motion.value);
+      if (table == nullptr || table->cubic) continue;
+      throw generate::NotCovered("the motion of joint \"" + joint.name +
+                                 "\" has jumps of speed, expected \"interpolation\": \"cubic\"");
+    }
+  }
   Code code;
   code.identifier = IdentifierOf(request.subject.description.name);
   const std::vector<int> carried =

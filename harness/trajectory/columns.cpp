@@ -247,8 +247,8 @@ class RowOf final : public RowWriter {
     }
   }
 
-  /// Makes angles and quaternions continuous with the last row, at first with the initial values.
-  /// Measure() counts turns in the plane, except from where.
+  /// Makes angles and quaternions continuous with the last row. The first row is continuous with
+  /// the initial values. In the plane Measure() counts turns, but not from the initial value.
   void Continue(std::size_t j, const std::vector<ValueWord>& words, double followed, double* q) {
     const auto& joint = mechanism_.mechanism().joints()[j];
     const double* last = last_.empty() ? nullptr : last_.data() + row_->size();

@@ -62,16 +62,7 @@ TimeFunction::TimeFunction(TimeFunctionDescription description)
 double TimeFunction::RateJump(double from, double to) const {
   const auto* table = std::get_if<TimeTable>(&description_);
   if (table == nullptr || table->cubic) return 0.0;
-  const auto slope =
-      [&](std::size_t i) {  // of the line from point i - 1 to i, flat beyond the ends
-        if (i == 0 || i == table->times.size()) return 0.0;
-        return (table->values[i] - table->values[i - 1]) / (table->times[i] - table->times[i - 1]);
-      };
-  double sum = 0.0;
-  for (std::size_t i = 0; i < table->times.size(); ++i) {
-    if (table->times[i] > from && table->times[i] <= to) sum += slope(i + 1) - slope(i);
-  }
-  return sum;
+  return At(to).rate - At(from).rate;  // a rate is constant between knots
 }
 
 const std::vector<double>& TimeFunction::knots() const {

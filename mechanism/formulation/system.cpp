@@ -199,24 +199,22 @@ Outcome System<Space, S>::Accelerate() {
   return drives_ == nullptr ? Outcome::kFinished : JudgeDrives();
 }
 
-/// Equations of impulses are those of accelerations: a jump counts as an additional acceleration of
-/// its drive, and the additional accelerations are the changes of speeds.
+/// Impulses satisfy the same equations as accelerations. A jump counts as an additional
+/// acceleration of its drive, and the additional accelerations are the changes of speeds.
 template <class Space, class S>
 bool System<Space, S>::TakeJumps(S t, std::span<S> y) {
-  if (drives_ == nullptr) return false;
+  const auto jump_of = [&](const Drive& drive) {
+    return S(drive.value.RateJump(static_cast<double>(accepted_t_), static_cast<double>(t)));
+  };
+  const std::vector<Drive>& drives = mechanism_.drives();
+  if (std::ranges::all_of(drives, [&](const Drive& d) { return jump_of(d) == S(0); })) return false;
   Kinematics<Space, S>& kinematics = state_.kinematics();
   kinematics.SetTime(t);
   const std::vector<TimeValue<S>> after = kinematics.drives();
-  std::vector<TimeValue<S>> before = after, pushed = after;
-  bool any = false;
-  for (std::size_t d = 0; d < after.size(); ++d) {
-    const S jump = S(mechanism_.drives()[d].value.RateJump(static_cast<double>(accepted_t_),
-                                                           static_cast<double>(t)));
-    any = any || jump != S(0);
-    before[d].rate -= jump;
-    pushed[d] = {before[d].value, before[d].rate, before[d].acceleration + jump};
-  }
-  if (!any) return false;
+  std::vector<TimeValue<S>> before = after;
+  for (std::size_t d = 0; d < drives.size(); ++d) before[d].rate -= jump_of(drives[d]);
+  std::vector<TimeValue<S>> pushed = before;
+  for (std::size_t d = 0; d < drives.size(); ++d) pushed[d].acceleration += jump_of(drives[d]);
   step_end_version_ = -1;
   kinematics.SetRegularization(kRegularization);
   state_.SetPositions(Eigen::Map<const VectorX<S>>(y.data(), mechanism_.num_q()));

@@ -139,10 +139,10 @@ class System final : public Ode<S> {
   bool integrates_work() const { return with_work_ || state_size() == 0; }
   /// udot_ at the current state, and whether prescribed motions can be followed.
   Outcome Accelerate();
-  /// The first of these.
+  /// Computes udot_ and, unless null, lambda.
   Outcome FindAccelerations(VectorX<S>* lambda);
-  /// Speeds of prescribed coordinates that have jumped since the last accepted step change all
-  /// speeds of `y` by an impulse, whose work is supplied. Returns true if there are any.
+  /// If prescribed speeds have jumped since the last accepted step, changes the speeds in `y` by
+  /// the impulses of the joints and adds their work, if `y` includes it. Returns true if they have.
   bool TakeJumps(S t, std::span<S> y);
   /// BeginStep() after jumps.
   bool ReviewStep(S t, std::span<S> y);

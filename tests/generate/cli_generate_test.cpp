@@ -178,7 +178,7 @@ TEST_F(GenerateTest, JumpsOfSpeedAreRejected) {
     {"name": "pin", "type": "revolute", "from": {"body": "cart"},
      "to": {"body": "bar", "at": [0.5, 0]}}]})");
   ExpectEnding(Call("generate cart.json --out code"), 2,
-               {"the motion of slide has jumps of speed", "cubic"});
+               {"the motion of joint \"slide\" has jumps of speed", "cubic"});
   EXPECT_FALSE(fs::exists(folder_ / "code"));
 }
 

@@ -5,8 +5,10 @@
 #include <cmath>
 
 #include "mechanism/description/library.h"
+#include "mechanism/formulation/system.h"
 #include "mechanism/simplify/redundancy.h"
 #include "mechanism/start/assembly.h"
+#include "odca/odca.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
@@ -156,6 +158,22 @@ TEST_P(Driven, AJumpOfSpeedActsByImpulses) {
   ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   EXPECT_NEAR(speed, -0.5 / (0.25 + 0.1), 1e3 * kRtol);
   EXPECT_LE(run.energy_error, 1e4 * kRtol) << "the drive supplies the work of the impulse";
+}
+
+/// Without a state, positions follow from the time alone, also if the last stage had another time.
+TEST(DrivenWithoutState, AcceptedStepsHaveTheirOwnTime) {
+  MechanismDescription d;
+  d.name = "turned";
+  d.bodies.push_back(Bar("bar", 1.0, 1.0, 0.1));
+  d.joints = {Revolute("drive", kGround, Eigen::Vector3d::Zero(), 1, Eigen::Vector3d::Zero())};
+  d.joints[0].motions = {{0, Polynomial{{0.0, 1.0}}}};
+  const Mechanism<Planar, double> mechanism(d, Coordinates::kJoint);
+  const auto system = MakeSystem<odca::Odca>(mechanism);
+  std::array<double, 2> y = {}, ydot = {};
+  ASSERT_EQ(system->Start(0.0, VectorX<double>(), VectorX<double>()), Outcome::kFinished);
+  ASSERT_EQ(system->Derivative(0.5, y, ydot), Outcome::kFinished);
+  system->BeginStep(1.0, y);
+  EXPECT_EQ(system->kinematics().poses()[1].angle, 1.0);
 }
 
 /// A slider-crank whose crank has two hinges on Ground; the one that is cut is driven.

@@ -175,8 +175,8 @@ TEST(RoundedInput, LinkagesThatPassNearSingularPositionsAreFreeToMove) {
   }
 }
 
-/// Seventeen times the rows of one joint become dependent on those of the others, and are exchanged
-/// for its dropped ones. Taken one after another by pivoting they were not: the loop opened by
+/// Seventeen times the imposed row of one joint becomes dependent on rows of other joints, and a
+/// dropped row of this joint replaces it. Pivoting alone did not replace it: the loop opened by
 /// 0.71 m.
 TEST(RoundedInput, RowsOfAJointAreExchangedWhereOthersNeedTheirs) {
   const MechanismFile file = ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /

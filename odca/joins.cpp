@@ -211,9 +211,7 @@ void Joins<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses ma
 
 /// Free directions h of a held body at its centre of mass: first the directions of the holder, then
 /// those that its own joint leaves free. N is the sum of h^T M h over the bodies of the arm. The
-/// response of its last body is H N^-1 H^T.
-///
-/// Then the dual vectors of the joint's rows c. Dual vector i has the product 1 with row i and 0
+/// response of its last body is H N^-1 H^T. Dual vector i has the product 1 with row i of c and 0
 /// with other rows, so c0 needs no solution of equations. The columns of D are orthonormal, except
 /// for exact tilts (JointKind::exact_basis).
 template <class Space, class S>

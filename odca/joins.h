@@ -214,8 +214,7 @@ class Joins {
   struct Body {
     typename Inertia<Space, S>::Matrix rotational, rotational_inverse;
     S mass = S(0), per_mass = S(0);
-    /// From the holder's centre of mass to the centre of mass of a held body, and from there to Mo
-    /// of its hold.
+    /// Of a held body: from the holder's centre of mass to its own, and from there to Mo.
     Linear<Space, S> from_holder, to_hold;
   };
   /// A free direction of a held body, and the body's inertia times it.

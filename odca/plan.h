@@ -97,9 +97,8 @@ struct PlanSide {
   int row = 0;  ///< index of its first row in all nodes
 };
 
-/// A body alone. Its handles are the body itself, or all of its sides. Bodies of an arm are held
-/// leaves: Ground holds a row of bodies whose joints leave few directions free. These joints are in
-/// no node.
+/// A body alone. Its handles are the body itself, or all of its sides. Bodies of an arm are held by
+/// their joints towards Ground, which are in no node.
 struct Leaf {
   std::span<const PlanSide> sides;
   PlanSide hold;    ///< that joint; -1 if there is none

@@ -4,16 +4,12 @@
 function(loopbench_add_scalar_units result name prologue)
   set(sources ${${result}})
   foreach(group ${ARGN}
-    "drives force_elements forces joint joint_planar kinematics mechanism time_function"
-    "constraint_solver coupled_solver factored_state level* passage system*"
-    "joint_directions joint_measures self_stress"
-    "body_equations tree_dynamics"
-    "joins odca sweep"
+    "drives force_elements forces joint joint_planar kinematics mechanism time_function joint_directions joint_measures \
+self_stress body_equations tree_dynamics joins odca sweep"
+    "constraint_solver coupled_solver factored_state level* passage system* null_space dense_reduction dense_equations \
+lagrange"
     "factors"
-    "loop_solver direction_weights singular_values symmetric_eigen partition"
-    "null_space"
-    "dense_reduction"
-    "dense_equations lagrange")
+    "loop_solver direction_weights singular_values symmetric_eigen partition")
     separate_arguments(patterns UNIX_COMMAND "${group}")
     set(text "${prologue}")
     foreach(pattern ${patterns})

@@ -19,6 +19,9 @@ DenseEquations<Space, S>::DenseEquations(const Mechanism<Space, S>& mechanism, S
       change_(zero_),
       loop_(mechanism.RowsOfConstraints()) {
   const int n = mechanism.num_u(), m = mechanism.num_rows();
+  for (int k = 0; k < static_cast<int>(mechanism.constraints().size()); ++k) {
+    if (!mechanism.joints()[mechanism.constraints()[k]].on_loop) loop_.SetOnNoLoop(k);
+  }
   if (kind_ == SolverKind::kAsPublished) {
     augmented_.setZero(n + m, n + m);
     rhs_.setZero(n + m);

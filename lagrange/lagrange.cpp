@@ -51,7 +51,11 @@ Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
                              .rcond = joints_->rcond(),
                              .smallest_weight = 1.0,
                              .worst_joint = joints_->worst_joint()};
-      if (dense_ == nullptr) is_sparse_ = joints_->has_rank();  // with the digits that there are
+      // Small pivots of a light body that holds heavy ones lose digits, not rank. In absolute
+      // coordinates dense matrices of all joints start with no more.
+      const bool keeps_digits = mechanism_.coordinates() == Coordinates::kAbsolute &&
+                                joints_->rcond() >= LoopSolver<double>::kLosesDigits;
+      if (dense_ == nullptr || keeps_digits) is_sparse_ = joints_->has_rank();
       if (is_sparse_) return Outcome::kFinished;
       if (dense_ == nullptr) {
         return joints_->IsFinite() ? Outcome::kSingular : Outcome::kNonFinite;

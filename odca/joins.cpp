@@ -42,10 +42,10 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
   for (const int n : plan.leaf_order()) {
     const Leaf& leaf = plan.leaves()[n];
     if (leaf.sides.empty()) lone_leaves_.push_back(n);
-    if (leaf.holder >= 0) places_[n].bodies = places_[leaf.holder].bodies + 1;
+    if (leaf.end >= 0 && leaf.end != n) ++places_[leaf.end].bodies;
   }
   const auto scratch = std::make_shared<LoopScratch<S>>(plan.largest_join());
-  int z = 0, y = 0, x = 0, c = 0, free = 0, arm = 0, widest = Space::kDim;
+  int z = 0, y = 0, x = 0, c = 0, tree = 0, widest = Space::kDim;
   c_offset_.assign(mechanism.joints().size(), 0);
   loops_.reserve(plan.loop_joins());
   for (int n = 0; n < plan.num_nodes(); ++n) {
@@ -56,11 +56,9 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
     if (n < plan.num_leaves()) {
       const Leaf& leaf = plan.leaves()[n];
       place.size = leaf.width;
-      if (leaf.hold.joint >= 0) {
-        place.hold = free;
-        place.arm = arm;
-        free += leaf.free;
-        if (leaf.end == n) arm += leaf.free * leaf.free;
+      if (leaf.end >= 0) {
+        place.tree = tree;
+        if (leaf.end == n) tree += leaf.free * leaf.free;
         c_offset_[leaf.hold.joint] = c;
         c += 2 * leaf.hold.rows;
       }
@@ -92,51 +90,60 @@ Joins<Space, S>::Joins(const Mechanism<Space, S>& mechanism, const Plan& plan, S
   X_.assign(x, S(0));
   c_.assign(c, Wrench<Space, S>::Zero());
   Mc_.assign(c, Acceleration<Space, S>::Zero());
-  free_.resize(free);
-  arms_.assign(arm, S(0));
+  for (const int n : plan.leaf_order()) {
+    const Leaf& leaf = plan.leaves()[n];
+    if (leaf.end < 0) continue;
+    places_[n].hold = static_cast<int>(free_.size());
+    const int own = Space::kDim - leaf.hold.rows;
+    for (int k = 0; k < leaf.path; ++k) {
+      const int before = k - (leaf.path - own);
+      FreeDirection& free = free_.emplace_back();
+      free.column =
+          before < 0 ? free_[places_[leaf.holder].hold + k].column : leaf.column + own - 1 - before;
+    }
+  }
+  trees_.assign(tree, S(0));
   columns_.setZero(plan.largest_join(), widest);
 }
 
 template <class Space, class S>
-auto Joins<Space, S>::Hang(int n, const HeldMotion* holder, const Wrench<Space, S>& F,
-                           const Components<Space, S>& c0,
-                           const Acceleration<Space, S>* known) const -> HeldMotion {
+Acceleration<Space, S> Joins<Space, S>::Hang(int n, const Acceleration<Space, S>* holder,
+                                             const Wrench<Space, S>& F,
+                                             const Components<Space, S>& c0,
+                                             const Acceleration<Space, S>* known,
+                                             Components<Space, S>& along) const {
   const PlanSide& hold = plan_.leaves()[n].hold;
-  HeldMotion motion{Acceleration<Space, S>::Zero(), Components<Space, S>::Zero()};
-  if (holder != nullptr) {
-    motion.given = ShiftMotion<Space, S>(holder->given, bodies_[n].from_holder);
-    motion.along = holder->along;
-  }
+  auto given = Acceleration<Space, S>::Zero();
+  if (holder != nullptr) given = ShiftMotion<Space, S>(*holder, bodies_[n].from_holder);
   if (!mechanism_.joints()[hold.joint].in_tree()) {
     const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[hold.joint];
-    for (int i = 0; i < hold.rows; ++i) motion.given -= dual[i] * c0[i];
+    for (int i = 0; i < hold.rows; ++i) given -= dual[i] * c0[i];
   } else if (known != nullptr) {  // components along H do not matter
     const auto part = ShiftMotion<Space, S>(*known, -bodies_[n].to_hold);
-    hold.at_Q ? motion.given -= part : motion.given += part;
+    hold.at_Q ? given -= part : given += part;
   }
-  WithFree(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
-    Repeat(size,
-           [&](int k) { motion.along[k] += free[k].h.dot(F) - free[k].Mh.dot(motion.given); });
+  WithPath(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+    Repeat(size, [&](int k) { along[free[k].column] += free[k].h.dot(F) - free[k].Mh.dot(given); });
   });
-  return motion;
+  return given;
 }
 
 template <class Space, class S>
-Components<Space, S> Joins<Space, S>::AlongArm(int n, const Wrench<Space, S>& F) const {
-  return WithFree(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
-    auto along = Components<Space, S>::Zero();
-    Repeat(size, [&](int k) { along[k] = free[k].h.dot(F); });
-    SolveLower(&arms_[places_[n].arm], size, &along[0]);
-    return along;
+Components<Space, S> Joins<Space, S>::AlongTree(int n, const Wrench<Space, S>& F) const {
+  auto along = Components<Space, S>::Zero();
+  WithPath(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+    Repeat(size, [&](int k) { along[free[k].column] = free[k].h.dot(F); });
   });
+  ApplyTree(n, along);
+  return along;
 }
 
 template <class Space, class S>
 Acceleration<Space, S> Joins<Space, S>::HeldAcceleration(int n, const Acceleration<Space, S>& given,
                                                          const Components<Space, S>& x) const {
-  return WithFree(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+  return WithPath(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
     Acceleration<Space, S> A = given;
-    Repeat(size, [&](int k) { A += free[k].h * x[k]; });
+    Repeat(size, [&](int k) { A += free[k].h * x[free[k].column]; });
     return A;
   });
 }
@@ -179,7 +186,7 @@ bool Joins<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
     for (int child : node.children) {
       if (child >= 0 && child < plan_.num_leaves()) FillLeaf(kinematics, masses, child);
     }
-    const bool ok = WithSizes<Space>(node, [&](auto rows, auto width) {
+    const bool ok = WithSizes<Space, S>(node, [&](auto rows, auto width) {
       FormResponse(node, place, rows, width);
       if (!(node.closes_loop ? FactorLoop(node, place, pass) : FactorFloating(place, rows))) {
         return false;
@@ -210,8 +217,8 @@ void Joins<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses ma
 }
 
 /// Free directions h of a held body at its centre of mass: first the directions of the holder, then
-/// those that its own joint leaves free. N is the sum of h^T M h over the bodies of the arm. The
-/// response of its last body is H N^-1 H^T. Dual vector i has the product 1 with row i of c and 0
+/// those that its own joint leaves free. N is the sum of h^T M h over the bodies of the tree. The
+/// response of its bodies is H N^-1 H^T. Dual vector i has the product 1 with row i of c and 0
 /// with other rows, so c0 needs no solution of equations. The columns of D are orthonormal, except
 /// for exact tilts (JointKind::exact_basis).
 template <class Space, class S>
@@ -240,10 +247,10 @@ void Joins<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses ma
   for (int i = 0; i < hold.rows; ++i) {
     dual[i] = ShiftMotion<Space, S>(dual[i], -r) * (hold.at_Q ? S(1) : S(-1));
   }
-  const int size = leaf.free, before = size - (Space::kDim - hold.rows);
-  const int all = plan_.leaves()[leaf.end].free;
+  const int size = leaf.path, before = size - (Space::kDim - hold.rows), all = leaf.free;
   FreeDirection* free = free_.data() + places_[n].hold;
-  S* N = arms_.data() + places_[leaf.end].arm;
+  S* N = trees_.data() + places_[leaf.end].tree;
+  if (leaf.holder < 0) std::fill_n(N, all * all, S(0));
   for (int k = 0; k < size; ++k) {
     // released directions follow D
     const int i = k - before;
@@ -252,14 +259,12 @@ void Joins<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses ma
                    : Acceleration<Space, S>(state.basis[i < state.num_u ? i : hold.rows + i]);
     free[k].h = ShiftMotion<Space, S>(h, k < before ? body.from_holder : Linear<Space, S>(-r));
     free[k].Mh = {body.rotational * free[k].h.angular, free[k].h.linear * body.mass};
-    for (int l = 0; l <= k; ++l) {
-      S& sum = N[k + all * l];
-      sum = k < before ? sum + free[k].Mh.dot(free[l].h) : free[k].Mh.dot(free[l].h);
-    }
+    for (int l = 0; l <= k; ++l)
+      N[free[l].column + all * free[k].column] += free[k].Mh.dot(free[l].h);
   }
-  if (leaf.end == n) FactorLower(N, size);
+  if (leaf.end == n) FactorLower(N, all);
   operations_ += size * kApply<Space> + Space::kDim * (size * (size + 1) / 2 + before) +
-                 (leaf.sides.empty() ? 0 : size * size * size / 6 + size);
+                 (leaf.sides.empty() ? 0 : all * all * all / 6 + all);
 }
 
 /// Z of body n + 1, or C Z C^T. Z is M^-1 in ground axes, or the response of the held body. The
@@ -272,7 +277,7 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   Body& body = bodies_[n];
   body.rotational_inverse = kinematics.RotationalInverse(inertia, n + 1);
   body.per_mass = S(1) / inertia.mass;
-  const bool is_held = leaf.hold.joint >= 0;
+  const bool is_held = leaf.end >= 0;
   if (is_held) FillHold(kinematics, masses, n);
   const FreeDirection* free = free_.data() + places_[n].hold;
   const int terms = is_held ? leaf.free : Space::kDim;
@@ -282,9 +287,10 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
     const int offset = Offset(side);
     const Wrench<Space, S>* c = c_.data() + offset;
     Acceleration<Space, S>* Zc = Mc_.data() + offset;
-    WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
+    WithSize<S, Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
       FillRows(kinematics, masses, side, rows);
-      operations_ += rows * (is_held ? terms * Space::kDim : kApply<Space>);
+      operations_ +=
+          rows * (is_held ? plan_.leaves()[side.leaf].path * Space::kDim : kApply<Space>);
       if (leaf.is_body) {
         if (is_held) operations_ += rows * terms * Space::kDim;
         return;
@@ -293,7 +299,7 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
         if (!is_held) {
           Zc[i] = {body.rotational_inverse * c[i].angular, c[i].linear * body.per_mass};
         } else {
-          const Components<Space, S> along = AlongArm(n, c[i]);
+          const Components<Space, S> along = AlongTree(side.leaf, c[i]);
           for (int k = 0; k < terms; ++k) Zc[i][k] = along[k];
         }
       });
@@ -329,8 +335,9 @@ void Joins<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
   Block<Space, S> block = Block<Space, S>::Zero();
   if (is_held) {
     Acceleration<Space, S> G[Space::kDim];
-    for (int k = 0; k < terms; ++k) G[k] = free[k].h;
-    SolveLower(&arms_[places_[n].arm], terms, G);
+    for (Acceleration<Space, S>& g : G) g.setZero();
+    for (int k = 0; k < leaf.path; ++k) G[free[k].column] = free[k].h;
+    SolveLower(&trees_[places_[n].tree], terms, G);
     for (int k = 0; k < terms; ++k) SubtractOuter(-G[k], G[k], block);
   } else {
     block = DiagonalBlock<Space, S>(body.rotational_inverse, body.per_mass);
@@ -396,7 +403,7 @@ void Joins<Space, S>::FormResponse(const PlanNode& node, const Place& place, Row
       const bool self_joins = is_second && node.handles[joint.from].child == side.child;
       for (const Handle& handle : node.handles) {
         if (handle.child != side.child) continue;
-        WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
+        WithWidth<Space, S>(handle, known, [&](auto width) LOOPBENCH_INLINED {
           S* Y = Y_.data() + place.y + handle.number * n + first * width;
           RespondAt(node, side, handle, c, count, known, width, self_joins, Y);
         });
@@ -528,7 +535,7 @@ void Joins<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
       block = columns;
     } else {
       const S* L = X_.data() + place.x;
-      WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
+      WithWidth<Space, S>(handle, known, [&](auto width) LOOPBENCH_INLINED {
         Repeat(rows, [&](int i) LOOPBENCH_INLINED {
           S V[Space::kDim];
           Repeat(width, [&](int b) { V[b] = Y[i * width + b]; });
@@ -556,14 +563,14 @@ void Joins<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows r
   for (int f : node.kept) {
     const Handle& at_f = node.handles[f];
     const Place& child = places_[node.children[at_f.child]];
-    WithWidth<Space>(at_f, known, [&](auto width_f) LOOPBENCH_INLINED {
+    WithWidth<Space, S>(at_f, known, [&](auto width_f) LOOPBENCH_INLINED {
       const S* Z = Z_.data() + child.z + child.size * at_f.place;
       const S* V_f = Y + at_f.number * n;
       int row = 0;
       for (int e : node.kept) {
         if (e > f) break;
         const Handle& at_e = node.handles[e];
-        WithWidth<Space>(at_e, known, [&](auto width_e) LOOPBENCH_INLINED {
+        WithWidth<Space, S>(at_e, known, [&](auto width_e) LOOPBENCH_INLINED {
           const auto numbers = Product(width_e, width_f);
           const int a_end = width_e, b_end = width_f;
           const S* V_e = Y + at_e.number * n;

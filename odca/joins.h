@@ -55,10 +55,10 @@ inline constexpr bool kIsKnown = kKnownSize<Size> != 0;
 /// Calls `call` with the rows of a node and the numbers of each of its handles, as constants for
 /// one joint that leaves one direction free, or three in space, and for boundaries of bodies alone
 /// or of rows of such joints alone.
-template <class Space, class Call>
+template <class Space, class S, class Call>
 [[gnu::always_inline]] inline auto WithSizes(const PlanNode& node, const Call& call) {
-  return WithSize<Space::kDim, Space::kDim - 1>(node.width, [&](auto width) {
-    return node.joints.size() == 1 ? WithSize<Space::kDim - 1, 3>(
+  return WithSize<S, Space::kDim, Space::kDim - 1>(node.width, [&](auto width) {
+    return node.joints.size() == 1 ? WithSize<S, Space::kDim - 1, 3>(
                                          node.rows, [&](auto rows) { return call(rows, width); })
                                    : call(node.rows, width);
   });
@@ -80,12 +80,12 @@ bool IsBody(const Handle& handle, Width) {
   return kIsKnown<Width> ? kKnownSize<Width> == Space::kDim : handle.is_body();
 }
 /// Calls `call` with the numbers of a handle; `width`: the numbers of each handle of its node.
-template <class Space, class Width, class Call>
+template <class Space, class S, class Width, class Call>
 [[gnu::always_inline]] inline auto WithWidth(const Handle& handle, Width width, const Call& call) {
   if constexpr (kIsKnown<Width>) {
     return call(width);
   } else {
-    return WithSize<Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
+    return WithSize<S, Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
   }
 }
 /// Returns the numbers of a block, a constant if both of its sides are constants.
@@ -109,36 +109,32 @@ class Joins {
 
   /// Acceleration of leaf n by a wrench.
   Acceleration<Space, S> Response(int n, const Wrench<Space, S>& F) const {
-    if (plan_.leaves()[n].hold.joint >= 0) {
-      Components<Space, S> x = AlongArm(n, F);
-      ApplyArmTransposed(n, x);
+    if (plan_.leaves()[n].end >= 0) {
+      Components<Space, S> x = AlongTree(n, F);
+      ApplyTreeTransposed(n, x);
       return HeldAcceleration(n, Acceleration<Space, S>::Zero(), x);
     }
     return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
   }
-  /// Motion of a held leaf: `given` + H x, with the free directions H and N x = `along`. `given`
-  /// satisfies the holds of the arm. `along` are the generalised forces of the bodies so far.
-  struct HeldMotion {
-    Acceleration<Space, S> given;
-    Components<Space, S> along;
-  };
-  /// Continues the motion of the holder (null on Ground) with the wrench F on the body and c0 of
-  /// the hold. If the hold is a tree joint, `known` (null if zero) replaces c0.
-  HeldMotion Hang(int n, const HeldMotion* holder, const Wrench<Space, S>& F,
-                  const Components<Space, S>& c0, const Acceleration<Space, S>* known) const;
-  /// v := L^-1 v and v := L^-T v for N = L L^T of the arm that ends at leaf n.
-  void ApplyArm(int n, Components<Space, S>& v) const {
-    WithFree(n, [&](auto size, const auto&) { SolveLower(&arms_[places_[n].arm], size, &v[0]); });
+  /// Returns the part of a held body's motion that is given, without its free directions: `holder`
+  /// (null on Ground), moved to the body, with c0 of the hold. If the hold is a tree joint, `known`
+  /// (null if zero) replaces c0. Adds to `along` the generalised forces of the wrench F less those
+  /// of the inertia times the given motion.
+  Acceleration<Space, S> Hang(int n, const Acceleration<Space, S>* holder,
+                              const Wrench<Space, S>& F, const Components<Space, S>& c0,
+                              const Acceleration<Space, S>* known,
+                              Components<Space, S>& along) const;
+  /// v := L^-1 v and v := L^-T v for N = L L^T of the tree of leaf n.
+  void ApplyTree(int n, Components<Space, S>& v) const {
+    WithTree(n, [&](auto size, const S* L) { SolveLower(L, size, &v[0]); });
   }
-  void ApplyArmTransposed(int n, Components<Space, S>& v) const {
-    WithFree(n, [&](auto size, const auto&) {
-      SolveLowerTransposed(&arms_[places_[n].arm], size, &v[0]);
-    });
+  void ApplyTreeTransposed(int n, Components<Space, S>& v) const {
+    WithTree(n, [&](auto size, const S* L) { SolveLowerTransposed(L, size, &v[0]); });
   }
   /// L^-1 H^T F
-  Components<Space, S> AlongArm(int n, const Wrench<Space, S>& F) const;
+  Components<Space, S> AlongTree(int n, const Wrench<Space, S>& F) const;
   /// L^-1 H^T c of each row c of a side of a held leaf, in the first components.
-  const Acceleration<Space, S>* AlongArm(const PlanSide& side) const { return &Mc_[Offset(side)]; }
+  const Acceleration<Space, S>* AlongTree(const PlanSide& side) const { return &Mc_[Offset(side)]; }
   Acceleration<Space, S> HeldAcceleration(int n, const Acceleration<Space, S>& given,
                                           const Components<Space, S>& x) const;
   /// Returns the wrench of the hold on a held body. A: the body's acceleration; F: sum of the other
@@ -207,7 +203,7 @@ class Joins {
     int x = 0;      ///< first number of X
     int loop = -1;  ///< index of the loop solver
     int hold = 0;   ///< of a held leaf, first of its free directions
-    int arm = 0;    ///< of the last leaf of an arm, first number of its N
+    int tree = 0;   ///< of the last leaf of a tree, first number of its N
     int bodies = 1;
   };
   /// Inertia in ground axes; the rotational one of held bodies alone.
@@ -219,6 +215,7 @@ class Joins {
   };
   /// A free direction of a held body, and the body's inertia times it.
   struct FreeDirection {
+    int column = 0;  ///< its index among the free directions of the tree
     Acceleration<Space, S> h;
     Wrench<Space, S> Mh;
   };
@@ -234,13 +231,19 @@ class Joins {
   int Offset(const PlanSide& side) const {
     return c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
   }
-  /// Calls `call` with the number of free directions of a held leaf, as a constant up to three, and
-  /// with these.
+  /// Calls `call` with the number of free directions on the path to a held leaf, as a constant up
+  /// to three, and with these; the other, with the number of all of its tree, and N or its factor.
   template <class Call>
-  [[gnu::always_inline]] auto WithFree(int n, const Call& call) const {
+  [[gnu::always_inline]] auto WithPath(int n, const Call& call) const {
     const FreeDirection* free = free_.data() + places_[n].hold;
-    return WithSize<1, 2, 3>(plan_.leaves()[n].free,
-                             [&](auto size) LOOPBENCH_INLINED { return call(size, free); });
+    return WithSize<S, 1, 2, 3>(plan_.leaves()[n].path,
+                                [&](auto size) LOOPBENCH_INLINED { return call(size, free); });
+  }
+  template <class Call>
+  [[gnu::always_inline]] auto WithTree(int n, const Call& call) const {
+    const S* N = trees_.data() + places_[plan_.leaves()[n].end].tree;
+    return WithSize<S, 1, 2, 3>(plan_.leaves()[n].free,
+                                [&](auto size) LOOPBENCH_INLINED { return call(size, N); });
   }
   template <class Rows, class Width>
   void FormResponse(const PlanNode& node, const Place& place, Rows rows, Width width);
@@ -264,7 +267,7 @@ class Joins {
   std::vector<Place> places_;
   std::vector<Body> bodies_;  ///< by leaf
   std::vector<FreeDirection> free_;
-  std::vector<S> arms_;  ///< N of each arm, or its factor as lower_triangle.h has it
+  std::vector<S> trees_;  ///< N of each tree, or its factor as lower_triangle.h has it
   std::vector<S> Z_;
   std::vector<S> Y_;                        ///< Y of each node; on handles that stay then V = T Y
   std::vector<Wrench<Space, S>> c_;         ///< rows c_P, then c_Q of each joint
@@ -273,7 +276,7 @@ class Joins {
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;
   MatrixX<S> columns_;
-  std::vector<int> lone_leaves_;  ///< leaves of no node: inside arms, or without joints
+  std::vector<int> lone_leaves_;  ///< leaves without sides: inside trees, or without joints
   int largest_matrix_ = 0;
   bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;

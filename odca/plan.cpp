@@ -29,7 +29,8 @@ struct Assembly {
   int node = 0;
   std::vector<int> boundary;  ///< bodies with joints still to come, in order of entry
   std::vector<int> joints;    ///< to other assemblies: all that are to come, and some closed ones
-  std::vector<int> ground_joints;  ///< still to come
+  /// To Ground, or between two bodies of a tree; still to come.
+  std::vector<int> leaf_joints;
   bool reaches_ground = false;
 };
 
@@ -43,36 +44,40 @@ class Planner {
         closed_(joints.size(), false) {
     const auto num_bodies = static_cast<int>(open_rows_.size());
     assemblies_.resize(num_bodies);
-    assembly_of_.resize(num_bodies);
+    assembly_of_.assign(num_bodies, 0);
     for (int body = 1; body < num_bodies; ++body) {
+      const Leaf& leaf = leaves[body - 1];
+      assembly_of_[body] = leaf.end < 0 ? body : leaf.end + 1;
       assemblies_[body].node = body - 1;
-      assemblies_[body].boundary = {body};
-      assemblies_[body].reaches_ground = leaves[body - 1].hold.joint >= 0;
-      assembly_of_[body] = body;
+      assemblies_[body].reaches_ground = leaf.end >= 0;
+      assemblies_[assembly_of_[body]].boundary.push_back(body);
     }
     for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
-      const int from = joints[j].from, to = joints[j].to;
-      open_rows_[from] += joints[j].rows;
-      open_rows_[to] += joints[j].rows;
-      if (from == 0 || to == 0) {
-        assemblies_[std::max(from, to)].ground_joints.push_back(j);
+      PlanJoint between = joints[j];
+      open_rows_[between.from] += between.rows;
+      open_rows_[between.to] += between.rows;
+      between.from = assembly_of_[between.from];
+      between.to = assembly_of_[between.to];
+      if (between.from == 0 || between.to == 0 || between.from == between.to) {
+        assemblies_[std::max(between.from, between.to)].leaf_joints.push_back(j);
       } else {
-        assemblies_[from].joints.push_back(j);
-        assemblies_[to].joints.push_back(j);
+        assemblies_[between.from].joints.push_back(j);
+        assemblies_[between.to].joints.push_back(j);
       }
+      if (between.from != between.to) between_leaves_.push_back(between);
     }
   }
 
   std::vector<Draft> Run(int start) {
     const int num_bodies = static_cast<int>(assemblies_.size());
-    const std::vector<int> waiting = GroundLeaves();
+    const std::vector<int> waiting = CloseLeaves();
     std::vector<int> number(num_bodies);  // assembly by its number in the joins
     std::iota(number.begin(), number.end(), 0);
-    for (const Join& join : OrderJoins(num_bodies, joints_, waiting, options_.dim, start)) {
+    for (const Join& join : OrderJoins(num_bodies, between_leaves_, waiting, options_.dim, start)) {
       number.push_back(Merge(number[join.left], number[join.right]));
     }
     for (Assembly& assembly : assemblies_) {
-      if (!assembly.ground_joints.empty()) Ground(assembly);
+      if (!assembly.leaf_joints.empty()) CloseLeafJoints(assembly);
     }
     return DepthFirst();
   }
@@ -86,7 +91,7 @@ class Planner {
       while (part[body] != body) body = part[body] = part[part[body]];
       return body;
     };
-    for (const PlanJoint& joint : joints_) {
+    for (const PlanJoint& joint : between_leaves_) {
       if (joint.from != 0 && joint.to != 0) part[find(joint.from)] = find(joint.to);
     }
     for (std::size_t body = 0; body < part.size(); ++body)
@@ -94,19 +99,19 @@ class Planner {
     return part;
   }
 
-  /// Closes joints to Ground that need not wait; the others are counted by body.
-  std::vector<int> GroundLeaves() {
+  /// Closes the joints of leaves that need not wait; those that wait are counted by body.
+  std::vector<int> CloseLeaves() {
     const std::vector<int> part = PartOfBody();
     std::vector<int> in_part(assemblies_.size(), 0), waiting(assemblies_.size(), 0);
     for (std::size_t body = 1; body < assemblies_.size(); ++body) {
-      in_part[part[body]] += static_cast<int>(assemblies_[body].ground_joints.size());
+      in_part[part[body]] += static_cast<int>(assemblies_[body].leaf_joints.size());
     }
     for (std::size_t body = 1; body < assemblies_.size(); ++body) {
       Assembly& assembly = assemblies_[body];
       if (options_.grounding == Grounding::kAtRoot && in_part[part[body]] <= 2) {
-        waiting[body] = static_cast<int>(assembly.ground_joints.size());
-      } else if (!assembly.ground_joints.empty()) {
-        Ground(assembly);
+        waiting[body] = static_cast<int>(assembly.leaf_joints.size());
+      } else if (!assembly.leaf_joints.empty()) {
+        CloseLeafJoints(assembly);
       }
     }
     return waiting;
@@ -149,9 +154,9 @@ class Planner {
     return body;
   }
 
-  void Ground(Assembly& assembly) {
-    const std::vector<int> list = std::move(assembly.ground_joints);
-    assembly.ground_joints.clear();
+  void CloseLeafJoints(Assembly& assembly) {
+    const std::vector<int> list = std::move(assembly.leaf_joints);
+    assembly.leaf_joints.clear();
     if (options_.closing == Closing::kTogether) {
       AddNode(assembly, nullptr, list);
     } else {
@@ -189,8 +194,7 @@ class Planner {
     }
     a.reaches_ground |= other_reaches;
     if (b != nullptr) {
-      a.ground_joints.insert(a.ground_joints.end(), b->ground_joints.begin(),
-                             b->ground_joints.end());
+      a.leaf_joints.insert(a.leaf_joints.end(), b->leaf_joints.begin(), b->leaf_joints.end());
     }
     a.node = static_cast<int>(assemblies_.size() - 1 + drafts_.size());
     drafts_.push_back(std::move(draft));
@@ -232,6 +236,7 @@ class Planner {
   }
 
   std::span<const PlanJoint> joints_;
+  std::vector<PlanJoint> between_leaves_;  ///< its `from` and `to` are the last bodies of trees
   PlanOptions options_;
   std::vector<int> open_rows_;        ///< rows of joints still to come, by body
   std::vector<bool> closed_;          ///< joints between assemblies
@@ -257,19 +262,21 @@ long JointWork(long rows, long above, bool is_body, long numbers, long dim) {
 }
 
 /// Multiply-adds of a leaf with so many rows of joints: M^-1 C^T and C M^-1 C^T, and the vectors.
-long LeafWork(const Leaf& leaf, long rows, bool is_body, long dim) {
+/// `paths`: sum of the rows times the free directions on the path to their body.
+long LeafWork(const Leaf& leaf, long rows, long paths, bool is_body, long dim) {
   const long apply = dim * dim / 3;  // M^-1 is diagonal except for three rotations
   const long triangle = rows * (rows + 1) / 2, project = is_body ? 0 : rows * dim;
-  if (leaf.hold.joint < 0) return (rows + 1) * apply + (is_body ? 0 : dim * triangle) + project;
-  const long free = leaf.free, held = leaf.hold.rows;
-  long sum = free * apply + dim * (free * (free + 1) / 2 + free - (dim - held));  // H^T M H
+  if (leaf.end < 0) return (rows + 1) * apply + (is_body ? 0 : dim * triangle) + project;
+  const long path = leaf.path, free = leaf.free, held = leaf.hold.rows;
+  long sum = path * apply + dim * (path * (path + 1) / 2 + path - (dim - held));  // H^T M H
   sum += rows > 0 ? free * free * free / 6 + free : 0;
-  sum += rows * free * dim + (is_body ? rows * free * dim : free * triangle);  // Z
-  return sum + 2 * dim * (held + 2 * free) + apply + project + (is_body ? 0 : free * rows);
+  sum += paths * dim + (is_body ? rows * free * dim : free * triangle);  // Z
+  return sum + 2 * dim * (held + 2 * path) + apply + project + (is_body ? 0 : free * rows);
 }
 
 /// Chooses for each body between its directions and the rows of its joints: whichever costs less
-/// over all joins with this body, given the choice of the others.
+/// over all joins with this body, given the choice of the others. Trees have the rows of their
+/// joints, unless all of these are on the last body.
 std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const PlanJoint> joints,
                                 std::span<const Draft> drafts, int dim) {
   const auto num_leaves = static_cast<int>(leaves.size()), num_bodies = num_leaves + 1;
@@ -277,8 +284,15 @@ std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const Pl
   for (const PlanJoint& joint : joints) {
     for (int body : {joint.from, joint.to}) rows[body] += joint.rows;
   }
-  std::vector<bool> is_body(num_bodies);
-  for (int body = 1; body < num_bodies; ++body) is_body[body] = rows[body] > 2 * dim;
+  std::vector<bool> is_body(num_bodies), has_choice(num_bodies, true);
+  for (int body = 1; body < num_bodies; ++body) {
+    const int end = leaves[body - 1].end;
+    if (end < 0 || end == body - 1 || rows[body] == 0) continue;
+    has_choice[body] = has_choice[end + 1] = false;
+  }
+  for (int body = 1; body < num_bodies; ++body) {
+    is_body[body] = has_choice[body] && rows[body] > 2 * dim;
+  }
   std::vector<std::vector<int>> joins(num_bodies);
   for (int n = 0; n < static_cast<int>(drafts.size()); ++n) {
     for (const BoundaryBody& body : drafts[n].bodies) joins[body.body].push_back(n);
@@ -303,10 +317,12 @@ std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const Pl
     return sum;
   };
   for (int body = 1; body < num_bodies; ++body) {
+    if (!has_choice[body]) continue;
+    const Leaf& leaf = leaves[body - 1];
     long sums[2];
     for (int choice : {0, 1}) {
       is_body[body] = choice == 1;
-      sums[choice] = LeafWork(leaves[body - 1], rows[body], is_body[body], dim);
+      sums[choice] = LeafWork(leaf, rows[body], rows[body] * leaf.path, is_body[body], dim);
       for (int n : joins[body]) sums[choice] += work(drafts[n]);
     }
     is_body[body] = sums[1] < sums[0];
@@ -327,9 +343,13 @@ PlanOptions PlanOptionsOf(SolverKind solver) {
 Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions& options)
     : Plan(num_bodies, joints, options, 0) {
   if (options.basis != BoundaryBasis::kCheapest || num_leaves_ > kFewBodies) return;
-  for (int start = 1; start < num_bodies; ++start) {
-    Plan other(num_bodies, joints, options, start);
-    if (other.operations(options.dim) < operations(options.dim)) *this = std::move(other);
+  PlanOptions each = options;
+  for (const bool branches : {false, true}) {
+    each.branches = branches;
+    for (int start = branches ? 0 : 1; start < num_bodies; ++start) {
+      Plan other(num_bodies, joints, each, start);
+      if (other.operations(options.dim) < operations(options.dim)) *this = std::move(other);
+    }
   }
 }
 
@@ -345,9 +365,10 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
   AddNodes(others, drafts, options.dim);
 }
 
-/// A body with one joint to Ground is the first body of an arm. If its last body has one other
-/// joint, this joint adds the next body. All arms grow in turn. In rings and in the included
-/// mechanisms, arms of up to d - 2 free directions need the fewest operations, within 1 %.
+/// A body with one joint to Ground is the first one of a tree. The other joints of a held body hold
+/// further bodies, if there is one such joint or trees may branch. All trees grow in turn. In rings
+/// and in the included mechanisms, paths of up to d - 2 free directions need the fewest operations,
+/// within 1 %.
 std::vector<PlanJoint> Plan::AddHolds(std::span<const PlanJoint> joints,
                                       const PlanOptions& options) {
   leaves_.resize(static_cast<std::size_t>(num_leaves_));
@@ -356,44 +377,54 @@ std::vector<PlanJoint> Plan::AddHolds(std::span<const PlanJoint> joints,
     for (const int body : {joints[j].from, joints[j].to}) joints_of[body].push_back(j);
   }
   std::vector<bool> holds(joints.size(), false);
-  std::vector<int> ends;
+  std::vector<int> held;                   // leaves, holders first
+  std::vector<int> root(num_leaves_, -1);  // of each held leaf
+  std::vector<Leaf> whole(leaves_);        // of each tree, by root: `free` and `end`
   const auto other = [&](int j, int body) {
     return joints[j].from == body ? joints[j].to : joints[j].from;
   };
-  const auto hold = [&](int body, int j) {
+  const auto hold = [&](int n, int j) {
     const PlanJoint& joint = joints[j];
-    const int holder = other(j, body) - 1;
-    const int free = options.dim - joint.rows + (holder < 0 ? 0 : leaves_[holder].free);
-    Leaf& leaf = leaves_[body - 1];
-    if (leaf.hold.joint >= 0 || !joint.may_hold || 2 * joint.rows <= options.dim) return;
-    if (free > options.dim - 2) return;
-    leaf.hold = {joint.index, joint.rows, joint.to == body};
-    leaf.holder = holder;
-    leaf.free = free;
-    for (int n = body - 1; n >= 0; n = leaves_[n].holder) leaves_[n].end = body - 1;
+    const int holder = other(j, n + 1) - 1, own = options.dim - joint.rows;
+    const int first = holder < 0 ? n : root[holder];
+    const int path = own + (holder < 0 ? 0 : leaves_[holder].path);
+    if (root[n] >= 0 || !joint.may_hold || 2 * joint.rows <= options.dim) return;
+    if (path > options.dim - 2 || own + whole[first].free > options.dim) return;
+    leaves_[n].hold = {n, joint.index, joint.rows, joint.to == n + 1};
+    leaves_[n].holder = holder;
+    leaves_[n].path = path;
+    root[n] = first;
+    whole[first].free += own;
+    whole[first].end = n;
+    // columns of the last bodies come first, so that the factor of N has its zeros
+    leaves_[n].column = -whole[first].free;
     holds[j] = true;
-    ends.push_back(body);
+    held.push_back(n);
   };
   if (options.basis == BoundaryBasis::kCheapest && options.grounding == Grounding::kEager) {
-    for (int body = 1; body <= num_leaves_; ++body) {
-      const auto on_ground = [&](int j) { return other(j, body) == 0; };
-      const std::vector<int>& all = joints_of[body];
+    for (int n = 0; n < num_leaves_; ++n) {
+      const auto on_ground = [&](int j) { return other(j, n + 1) == 0; };
+      const std::vector<int>& all = joints_of[n + 1];
       if (std::ranges::count_if(all, on_ground) == 1)
-        hold(body, *std::ranges::find_if(all, on_ground));
+        hold(n, *std::ranges::find_if(all, on_ground));
     }
-    for (std::size_t k = 0; k < ends.size(); ++k) {
-      const int body = ends[k];
-      const std::vector<int>& all = joints_of[body];
-      if (all.size() != 2) continue;
-      const int next = holds[all[0]] ? all[1] : all[0];
-      if (other(next, body) != 0) hold(other(next, body), next);
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      const int body = held[k] + 1;
+      if (joints_of[body].size() != 2 && !options.branches) continue;
+      for (const int j : joints_of[body]) {
+        if (!holds[j] && other(j, body) != 0) hold(other(j, body) - 1, j);
+      }
     }
   }
   for (int n = 0; n < num_leaves_; ++n) {
     if (leaves_[n].holder < 0) leaf_order_.push_back(n);
   }
-  for (const int body : ends) {
-    if (leaves_[body - 1].holder >= 0) leaf_order_.push_back(body - 1);
+  for (const int n : held) {
+    Leaf& leaf = leaves_[n];
+    if (leaf.holder >= 0) leaf_order_.push_back(n);
+    leaf.end = whole[root[n]].end;
+    leaf.free = whole[root[n]].free;
+    leaf.column += leaf.free;
   }
   std::vector<PlanJoint> others;
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -405,19 +436,23 @@ std::vector<PlanJoint> Plan::AddHolds(std::span<const PlanJoint> joints,
 void Plan::AddLeaves(std::span<const PlanJoint> joints, const std::vector<bool>& is_body, int dim) {
   const auto each_side = [&](auto&& take) {
     for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
-      take(joints[j].from, PlanSide{j, joints[j].rows, false});
-      take(joints[j].to, PlanSide{j, joints[j].rows, true});
+      for (const bool at_Q : {false, true}) {
+        const int leaf = (at_Q ? joints[j].to : joints[j].from) - 1;
+        if (leaf < 0) continue;
+        const int end = leaves_[leaf].end;
+        take(end < 0 ? leaf : end, PlanSide{leaf, j, joints[j].rows, at_Q});
+      }
     }
   };
-  std::vector<int> first(num_leaves_ + 2, 0);
-  each_side([&](int body, const PlanSide&) { ++first[body + 1]; });
+  std::vector<int> first(num_leaves_ + 1, 0);
+  each_side([&](int leaf, const PlanSide&) { ++first[leaf + 1]; });
   std::partial_sum(first.begin(), first.end(), first.begin());
   sides_.resize(static_cast<std::size_t>(first.back()));
   std::vector<int> next = first;
-  each_side([&](int body, const PlanSide& side) { sides_[next[body]++] = side; });
+  each_side([&](int leaf, const PlanSide& side) { sides_[next[leaf]++] = side; });
   for (int n = 0; n < num_leaves_; ++n) {
     Leaf& leaf = leaves_[n];
-    leaf.sides = std::span(sides_).subspan(first[n + 1], first[n + 2] - first[n + 1]);
+    leaf.sides = std::span(sides_).subspan(first[n], first[n + 1] - first[n]);
     leaf.is_body = is_body[n + 1];
     leaf.slot = num_slots_;
     if (leaf.is_body) leaf.width = dim;
@@ -436,6 +471,7 @@ void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> dr
     Handle handle{.body = n + 1, .width = leaf.width, .slot = leaf.slot};
     if (leaf.is_body) boundary[n].push_back(handle);
     for (const PlanSide& side : leaf.is_body ? std::span<const PlanSide>() : leaf.sides) {
+      handle.body = side.leaf + 1;
       handle.joint = side.joint;
       handle.width = side.rows;
       boundary[n].push_back(handle);
@@ -546,9 +582,12 @@ long Plan::operations(int dim) const {
   const auto width = [dim](const Handle& handle) { return handle.is_body() ? dim : handle.width; };
   long sum = 0;
   for (const Leaf& leaf : leaves_) {
-    long rows = 0;
-    for (const PlanSide& side : leaf.sides) rows += side.rows;
-    sum += LeafWork(leaf, rows, leaf.is_body, dim);
+    long rows = 0, paths = 0;
+    for (const PlanSide& side : leaf.sides) {
+      rows += side.rows;
+      paths += side.rows * leaves_[side.leaf].path;
+    }
+    sum += LeafWork(leaf, rows, paths, leaf.is_body, dim);
   }
   for (const PlanNode& node : nodes_) {
     long numbers[2] = {0, 0}, kept = 0, above = 0;

@@ -60,7 +60,8 @@ struct PlanOptions {
   Grounding grounding = Grounding::kEager;
   Closing closing = Closing::kTogether;
   BoundaryBasis basis = BoundaryBasis::kBodies;
-  int dim = 6;  ///< directions of a body: 3 in the plane, 6 in space
+  int dim = 6;            ///< directions of a body: 3 in the plane, 6 in space
+  bool branches = false;  ///< several joints of a held body may hold further bodies
 };
 
 /// As published, joints to Ground close at the root (the paper's section 3.1) and boundaries are
@@ -91,20 +92,24 @@ struct NodeJoint {
 
 /// A joint on a body.
 struct PlanSide {
+  int leaf = -1;  ///< of the body
   int joint = -1;
   int rows = 0;
   bool at_Q = false;
   int row = 0;  ///< index of its first row in all nodes
 };
 
-/// A body alone. Its handles are the body itself, or all of its sides. Bodies of an arm are held by
-/// their joints towards Ground, which are in no node.
+/// A body alone, or a tree of bodies on Ground. Its handles are the body itself, or all of its
+/// sides. Bodies of a tree are held by their joints towards Ground, which are in no node. The last
+/// leaf of a tree has the sides of all its bodies.
 struct Leaf {
   std::span<const PlanSide> sides;
   PlanSide hold;    ///< that joint; -1 if there is none
-  int holder = -1;  ///< the held leaf on its other side, which has no sides; -1 is Ground
-  int end = -1;     ///< of a held leaf: the last one of its arm
-  int free = 0;     ///< free directions of the arm up to here
+  int holder = -1;  ///< the leaf on its other side, held too; -1 is Ground
+  int end = -1;     ///< of a held leaf: the last one of its tree
+  int path = 0;     ///< free directions of the joints between Ground and the body
+  int column = 0;   ///< index of the first one of `hold` among all of the tree
+  int free = 0;     ///< free directions of the tree
   bool is_body = true;
   int width = 0;
   int slot = 0;

@@ -13,7 +13,7 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       b_(plan.num_slots(), S(0)),
       F_(plan.num_rows() + Space::kDim * plan.num_leaves(), S(0)),
       start_(plan.num_leaves(), Acceleration<Space, S>::Zero()),
-      held_(plan.num_leaves()),
+      along_(plan.num_leaves()),
       phi_(mechanism.joints().size(), Components<Space, S>::Zero()),
       residual_(phi_),
       s_(plan.num_rows(), S(0)) {}
@@ -34,19 +34,21 @@ void Sweep<Space, S>::Solve(const Loads& loads, std::span<Acceleration<Space, S>
   Correct({.b = {}, .wrenches = {}, .c0 = residual_, .known = {}}, A);
 }
 
-/// Bodies of an arm before the last have no handles.
+/// The last leaf of a tree has the handles of all its bodies.
 template <class Space, class S>
 [[gnu::always_inline]] inline void Sweep<Space, S>::UpLeaf(int n, const Loads& loads) {
   const Leaf& leaf = plan_.leaves()[n];
-  const bool is_held = leaf.hold.joint >= 0;
+  const bool is_held = leaf.end >= 0;
+  Components<Space, S>& along = along_[is_held ? leaf.end : n];
   if (is_held) {
     const int joint = leaf.hold.joint;
-    held_[n] = joins_.Hang(n, leaf.holder < 0 ? nullptr : &held_[leaf.holder], loads.WrenchOn(n),
-                           loads.c0[joint], loads.known.empty() ? nullptr : &loads.known[joint]);
-    operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.free);
+    if (leaf.holder < 0) along.setZero();
+    start_[n] =
+        joins_.Hang(n, leaf.holder < 0 ? nullptr : &start_[leaf.holder], loads.WrenchOn(n),
+                    loads.c0[joint], loads.known.empty() ? nullptr : &loads.known[joint], along);
+    operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
     if (leaf.sides.empty()) return;
-    joins_.ApplyArm(n, held_[n].along);
-    start_[n] = held_[n].given;
+    joins_.ApplyTree(n, along);
   } else {
     start_[n] = loads.b.empty() ? Acceleration<Space, S>::Zero() : loads.b[n + 1];
   }
@@ -56,8 +58,8 @@ template <class Space, class S>
     return;
   }
   if (leaf.is_body) {
-    Components<Space, S> x = held_[n].along;
-    if (is_held) joins_.ApplyArmTransposed(n, x);
+    Components<Space, S> x = along;
+    if (is_held) joins_.ApplyTreeTransposed(n, x);
     const auto all = is_held ? joins_.HeldAcceleration(n, start_[n], x) : start_[n];
     LOOPBENCH_UNROLL
     for (int d = 0; d < Space::kDim; ++d) slot[d] = all[d];
@@ -65,14 +67,13 @@ template <class Space, class S>
   }
   for (const PlanSide& side : leaf.sides) {
     const Wrench<Space, S>* c = joins_.c(side.joint, side.at_Q, side.rows);
-    WithSize<Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
-      Repeat(rows, [&](int i) { slot[i] = c[i].dot(start_[n]); });
+    WithSize<S, Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
+      Repeat(rows, [&](int i) { slot[i] = c[i].dot(start_[side.leaf]); });
       if (is_held) {
-        const Acceleration<Space, S>* along = joins_.AlongArm(side);
-        WithSize<1, 2, 3>(leaf.free, [&](auto free) LOOPBENCH_INLINED {
-          Repeat(rows, [&](int i) {
-            Repeat(free, [&](int k) { slot[i] += along[i][k] * held_[n].along[k]; });
-          });
+        const Acceleration<Space, S>* of_side = joins_.AlongTree(side);
+        WithSize<S, 1, 2, 3>(leaf.free, [&](auto free) LOOPBENCH_INLINED {
+          Repeat(rows,
+                 [&](int i) { Repeat(free, [&](int k) { slot[i] += of_side[i][k] * along[k]; }); });
         });
       }
       slot += rows;
@@ -81,8 +82,8 @@ template <class Space, class S>
   }
 }
 
-/// A = Z F + b (1-4, 45-46) with all forces known, including the joints' own. The last body of an
-/// arm solves for the whole arm.
+/// A = Z F + b (1-4, 45-46) with all forces known, including the joints' own. The last leaf of a
+/// tree solves for all its bodies.
 template <class Space, class S>
 [[gnu::always_inline]] inline void Sweep<Space, S>::DownLeaf(int n, const Loads& loads,
                                                              std::span<Acceleration<Space, S>> A) {
@@ -92,32 +93,31 @@ template <class Space, class S>
   LOOPBENCH_UNROLL
   for (int d = 0; d < Space::kDim; ++d) F[d] = force_on(n)[d];
   operations_ += Space::kDim * Space::kDim / 3;
-  if (leaf.hold.joint < 0) {
+  if (leaf.end < 0) {
     A[n + 1] += start_[n] + joins_.Response(n, F);
     return;
   }
-  Components<Space, S>& x = held_[n].along;
+  Components<Space, S>& x = along_[leaf.end];
   if (leaf.end == n) {
-    if (leaf.sides.empty()) joins_.ApplyArm(n, x);
-    if (leaf.is_body) x += joins_.AlongArm(n, F);
+    if (leaf.sides.empty()) joins_.ApplyTree(n, x);
+    if (leaf.is_body) x += joins_.AlongTree(n, F);
     for (const PlanSide& side : leaf.is_body ? std::span<const PlanSide>() : leaf.sides) {
-      const Acceleration<Space, S>* along = joins_.AlongArm(side);
-      WithSize<1, 2, 3>(leaf.free, [&](auto free) LOOPBENCH_INLINED {
+      const Acceleration<Space, S>* of_side = joins_.AlongTree(side);
+      WithSize<S, 1, 2, 3>(leaf.free, [&](auto free) LOOPBENCH_INLINED {
         for (int i = 0; i < side.rows; ++i) {
-          Repeat(free, [&](int k) { x[k] += along[i][k] * F_[side.row + i]; });
+          Repeat(free, [&](int k) { x[k] += of_side[i][k] * F_[side.row + i]; });
         }
       });
     }
-    joins_.ApplyArmTransposed(n, x);
+    joins_.ApplyTreeTransposed(n, x);
   }
-  const Acceleration<Space, S> all = joins_.HeldAcceleration(n, held_[n].given, x);
+  const Acceleration<Space, S> all = joins_.HeldAcceleration(n, start_[n], x);
   A[n + 1] += all;
   const Wrench<Space, S> holding = joins_.HoldingWrench(n, all, F + loads.WrenchOn(n));
   const Components<Space, S> phi = joins_.HoldingForce(n, holding);
   for (int i = 0; i < leaf.hold.rows; ++i) phi_[leaf.hold.joint][i] += phi[i];
-  operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.free);
+  operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
   if (leaf.holder < 0) return;
-  held_[leaf.holder].along = x;
   const Wrench<Space, S> reaction = joins_.OnHolder(n, holding);
   LOOPBENCH_UNROLL
   for (int d = 0; d < Space::kDim; ++d) force_on(leaf.holder)[d] += reaction[d];
@@ -130,11 +130,11 @@ void Sweep<Space, S>::Correct(const Loads& loads, std::span<Acceleration<Space, 
   for (const int n : plan_.leaf_order()) UpLeaf(n, loads);
   for (int n = leaves; n < plan_.num_nodes(); ++n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
-    WithSizes<Space>(node, [&](auto rows, auto width) { Up(node, n, rows, width, loads.c0); });
+    WithSizes<Space, S>(node, [&](auto rows, auto width) { Up(node, n, rows, width, loads.c0); });
   }
   for (int n = plan_.num_nodes() - 1; n >= leaves; --n) {
     const PlanNode& node = plan_.nodes()[n - leaves];
-    WithSizes<Space>(node, [&](auto rows, auto width) { Down(node, n, rows, width); });
+    WithSizes<Space, S>(node, [&](auto rows, auto width) { Down(node, n, rows, width); });
   }
   const std::vector<int>& order = plan_.leaf_order();
   for (auto n = order.rbegin(); n != order.rend(); ++n) DownLeaf(*n, loads, A);
@@ -195,7 +195,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
     const Handle& handle = node.handles[e];
     const S* V = joins_.V(node, n, handle);
     S* b = b_.data() + handle.slot;
-    WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
+    WithWidth<Space, S>(handle, known, [&](auto width) LOOPBENCH_INLINED {
       for (int i = 0; i < rows; ++i) {
         Repeat(width, [&](int a) { b[a] -= V[i * width + a] * s[i]; });  // (29-30, 72)
       }
@@ -218,7 +218,7 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows, Width known) 
     const Handle& handle = node.handles[e];
     const S* V = joins_.V(node, n, handle);
     const S* F = F_.data() + handle.force;
-    WithWidth<Space>(handle, known, [&](auto width) LOOPBENCH_INLINED {
+    WithWidth<Space, S>(handle, known, [&](auto width) LOOPBENCH_INLINED {
       for (int i = 0; i < rows; ++i) {
         S sum = phi[i];
         Repeat(width, [&](int a) { sum -= V[i * width + a] * F[a]; });

@@ -77,9 +77,11 @@ class Sweep {
   Joins<Space, S> joins_;
   std::vector<S> b_;  ///< of all handles, by slot: a join changes those that stay
   std::vector<S> F_;  ///< phi of all rows, then wrenches of bodies
-  /// Accelerations of free leaves without joint forces; `given` of held leaves.
+  /// Accelerations of free leaves without joint forces; of held leaves the given ones.
   std::vector<Acceleration<Space, S>> start_;
-  std::vector<typename Joins<Space, S>::HeldMotion> held_;  ///< of held leaves
+  /// By last leaf of a tree: generalised forces along the free directions, L^-1 of these, and last
+  /// the accelerations along the free directions.
+  std::vector<Components<Space, S>> along_;
   std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;  ///< by row
   long operations_ = 0;

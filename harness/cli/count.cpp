@@ -242,6 +242,9 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   if (command.mechanisms.empty() && command.family.empty()) {
     throw ConfigError("count: found neither mechanisms nor --family, expected one of them");
   }
+  // other processes read them
+  for (const std::filesystem::path& path : command.mechanisms) NoteInput(path);
+  if (!command.out.empty()) RequireOutput(command.out);
   std::vector<Record> rows;
   const auto add = [&](const std::string& name, const std::function<int()>& count) {
     int code = 0;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -247,9 +249,15 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
                    {"largest", "largest difference", kScientific},
                    {"t", "at [s]", kSeconds},
                    {"compared", "rows", kInteger}};
-  std::size_t most = 0;
+  std::size_t most = 0, between = 0;
+  for (std::size_t row = 0; row < theirs.rows(); ++row) {
+    bool is_between = false;
+    ValueAt(ours, ours.time, theirs.At(row, theirs.time), &is_between);
+    if (is_between) ++between;
+  }
+  std::vector<std::string> whole_turns;
   for (const SharedColumn& column : shared) {
-    LargestAt largest;
+    LargestAt largest, turns;
     std::size_t compared = 0;
     const std::vector<double> apart = Differences(ours, theirs, column);
     for (std::size_t row = 0; row < apart.size(); ++row) {
@@ -261,6 +269,13 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
       RequireFinite(own, column.label, t, command.ours, command.source);
       ++compared;
       largest.Add(std::abs(apart[row]), t);
+      if (column.unit == "rad") {
+        turns.Add(std::round(std::abs(number - own - apart[row]) / (2 * std::numbers::pi)), t);
+      }
+    }
+    if (turns.value > 0.0) {
+      whole_turns.push_back(fmt::format("{}: besides, {:g} whole turns at {:g} s", column.label,
+                                        turns.value, turns.t));
     }
     most = std::max(most, compared);
     AddRow({column.label, Maybe(largest), When(largest), compared}, &table);
@@ -273,6 +288,12 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
     table.notes.push_back(fmt::format("{} of {} rows are not compared: {} has no such times",
                                       theirs.rows() - most, theirs.rows(), command.ours.string()));
   }
+  if (between > 0) {
+    table.notes.push_back(fmt::format(
+        "{} of {} rows are compared with cubics through the rows of {}, which has no such times",
+        between, theirs.rows(), command.ours.string()));
+  }
+  std::ranges::move(whole_turns, std::back_inserter(table.notes));
   AppendProvenance(table, typed);
   PrintText(ToScreen(table) + "\n");
   if (command.figure.empty()) return 0;

@@ -241,6 +241,10 @@ class Checker {
     check_.source = motion_.from_joints() ? "joint coordinates" : "body poses";
     check_.has_speeds = motion_.has_speeds();
     for (const JointDescription& joint : user.joints) check_.joints.push_back({joint.name});
+    for (const CouplingDescription& coupling : user.couplings) {
+      check_.joints.push_back({"coupling " + coupling.name});
+    }
+    turns_.resize(user.couplings.size());
     for (std::size_t j = 0; j < user.joints.size(); ++j) {
       given_.emplace_back();
       for (const TrajectoryColumn& column : JointColumns(user, j)) {
@@ -287,7 +291,8 @@ class Checker {
       followed_[j] = is_given ? row[given_[j][0]] : std::numeric_limits<double>::quiet_NaN();
     }
     mechanism_.Set(t, motion_.Read(t, row), followed_);
-    for (std::size_t j = 0; j < check_.joints.size(); ++j) AddJoint(j, t, row);
+    for (std::size_t j = 0; j < user_.joints.size(); ++j) AddJoint(j, t, row);
+    for (std::size_t c = 0; c < turns_.size(); ++c) AddCoupling(c, t);
     if (check_.no_energy.empty()) {
       const Energy<double> energy = ComputeEnergy(mechanism_.kinematics());
       double balance = energy.total();
@@ -331,6 +336,27 @@ class Checker {
     }
   }
 
+  /// In the unit of its first joint. Whole turns of angles in the first row do not count.
+  void AddCoupling(std::size_t c, double t) {
+    const Kinematics<Space, double>& kinematics = mechanism_.kinematics();
+    const auto index = static_cast<int>(c);
+    const double open = kinematics.CouplingMismatch(index);
+    if (check_.rows == 1) {
+      double without = open;
+      for (const double turn : mechanism_.mechanism().couplings()[c].measured_turns) {
+        without = std::remainder(without, turn);
+      }
+      turns_[c] = open - without;
+    }
+    JointCheck& check = check_.joints[user_.joints.size() + c];
+    const bool turns = kinematics.FirstTurns(index);
+    (turns ? check.rotation : check.shift)
+        .Add(std::abs(kinematics.OfFirstJoint(index, open - turns_[c])), t);
+    if (!check_.has_speeds) return;
+    (turns ? check.angular_velocity : check.velocity)
+        .Add(std::abs(kinematics.OfFirstJoint(index, kinematics.CouplingSpeed(index))), t);
+  }
+
   TrajectoryReader& reader_;
   std::string file_;
   const MechanismDescription& user_;
@@ -340,6 +366,7 @@ class Checker {
   std::vector<std::size_t> motions_;             ///< columns of the mechanism's motion
   std::vector<std::vector<std::size_t>> given_;  ///< columns of joints, by the user's joint
   std::vector<double> followed_;                 ///< given coordinates, NaN if not given
+  std::vector<double> turns_;                    ///< of each coupling, whole turns in the first row
   std::size_t supplied_ = kNowhere, dissipated_ = kNowhere;
   double first_energy_ = 0.0;
   Window window_;
@@ -367,13 +394,14 @@ std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory
   return shared;
 }
 
-double ValueAt(const Trajectory& ours, std::size_t column, double t) {
+double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_between) {
   const std::size_t rows = ours.rows();
   std::size_t low = 0, high = rows;  // first row not before t
   while (low < high) {
     const std::size_t middle = (low + high) / 2;
     (ours.At(middle, ours.time) < t ? low : high) = middle + (ours.At(middle, ours.time) < t);
   }
+  if (is_between != nullptr) *is_between = false;
   // times written with fewer digits count as equal
   constexpr double kSame = 1e-12;
   for (const std::size_t row : {low, low - 1}) {
@@ -383,6 +411,7 @@ double ValueAt(const Trajectory& ours, std::size_t column, double t) {
     }
   }
   if (low == 0 || low == rows) return std::numeric_limits<double>::quiet_NaN();
+  if (is_between != nullptr) *is_between = true;
   const std::size_t count = std::min<std::size_t>(4, rows);
   const std::size_t first = std::min(low < 2 ? 0 : low - 2, rows - count);
   double value = 0.0;

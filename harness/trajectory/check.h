@@ -41,7 +41,7 @@ struct TrajectoryCheck {
   double from = 0.0, to = 0.0;  ///< [s]
   std::string source;           ///< "body poses" or "joint coordinates"
   bool has_speeds = false;
-  std::vector<JointCheck> joints;  ///< joints of the mechanism, except free ones
+  std::vector<JointCheck> joints;  ///< joints of the mechanism, then couplings
   LargestAt shift, rotation;       ///< largest of all joints
   LargestAt energy;                ///< change of kinetic + potential - supplied + dissipated [J]
   double kinetic = 0.0;            ///< largest [J]
@@ -70,8 +70,8 @@ struct SharedColumn {
 std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory& theirs);
 
 /// Returns the value of `ours` at a time: of that row, or of the cubic through the four rows around
-/// it. NaN outside.
-double ValueAt(const Trajectory& ours, std::size_t column, double t);
+/// it. NaN outside. `is_between` (may be null): true if the time is no row's.
+double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_between = nullptr);
 
 /// Returns `theirs` minus `ours` at the times of `theirs`, angles modulo full turns; NaN outside
 /// `ours`.

@@ -147,7 +147,7 @@ template <int kRows, class Call>
   if constexpr (kRows > 0) {
     return call(std::integral_constant<int, kRows>());
   } else {
-    return WithSize<2, 3, 5>(rows, call);
+    return WithSize<double, 2, 3, 5>(rows, call);
   }
 }
 
@@ -241,7 +241,7 @@ bool BlockCholesky::FactorColumn(int j, Size n) {
 }
 
 bool BlockCholesky::Factor() {
-  return WithSize<2, 3, 5>(uniform_, [&](auto rows) {
+  return WithSize<double, 2, 3, 5>(uniform_, [&](auto rows) {
     constexpr int kRows = kKnownSize<decltype(rows)>;
     for (int j = 0; j < static_cast<int>(columns_.size()); ++j) {
       if (WithRows<kRows>(columns_[j].rows, [&](auto n) { return FactorColumn<kRows>(j, n); })) {
@@ -304,7 +304,8 @@ void BlockCholesky::SolveColumns(double* all) const {
 }
 
 void BlockCholesky::Solve(double* x) const {
-  WithSize<2, 3, 5>(uniform_, [&](auto rows) { SolveColumns<kKnownSize<decltype(rows)>>(x); });
+  WithSize<double, 2, 3, 5>(uniform_,
+                            [&](auto rows) { SolveColumns<kKnownSize<decltype(rows)>>(x); });
 }
 
 }  // namespace loopbench

@@ -7,19 +7,28 @@
 
 namespace loopbench {
 
-/// `call` with n, as a constant if it is one of `known`.
 template <int first, int... others, class Call>
-[[gnu::always_inline]] inline auto WithSize(int n, const Call& call) {
+[[gnu::always_inline]] inline auto WithConstant(int n, const Call& call) {
   if (n == first) return call(std::integral_constant<int, first>());
   if constexpr (sizeof...(others) > 0) {
-    return WithSize<others...>(n, call);
+    return WithConstant<others...>(n, call);
+  } else {
+    return call(n);
+  }
+}
+
+/// Calls `call` with n, as a constant if it is one of `known` and the numbers S are doubles.
+template <class S, int... known, class Call>
+[[gnu::always_inline]] inline auto WithSize(int n, const Call& call) {
+  if constexpr (std::is_same_v<S, double>) {
+    return WithConstant<known...>(n, call);
   } else {
     return call(n);
   }
 }
 
 /// Does the same for a size that is already constant.
-template <int... known, int n, class Call>
+template <class S, int... known, int n, class Call>
 [[gnu::always_inline]] inline auto WithSize(std::integral_constant<int, n> size, const Call& call) {
   return call(size);
 }

@@ -18,7 +18,7 @@ inline constexpr int kSmallTriangle = 16;
 /// that is not positive, and returns that.
 template <class S, class Size>
 S FactorLower(S* A, Size size) {
-  return WithSize<2, 4, 5>(size, [=](auto n) {
+  return WithSize<S, 2, 4, 5>(size, [=](auto n) {
     using std::min;
     using std::sqrt;
     S least = n > 0 ? A[0] : S(1);
@@ -42,7 +42,7 @@ S FactorLower(S* A, Size size) {
 /// x := L^-1 x, of numbers or vectors.
 template <class S, class Size, class T>
 void SolveLower(const S* L, Size size, T* x) {
-  WithSize<2, 4, 5>(size, [=](auto n) {
+  WithSize<S, 2, 4, 5>(size, [=](auto n) {
     for (int i = 0; i < n; ++i) {
       T value = x[i];
       for (int k = 0; k < i; ++k) value -= x[k] * L[i + k * n];
@@ -54,7 +54,7 @@ void SolveLower(const S* L, Size size, T* x) {
 /// x := L^-T x.
 template <class S, class Size, class T>
 void SolveLowerTransposed(const S* L, Size size, T* x) {
-  WithSize<2, 4, 5>(size, [=](auto n) {
+  WithSize<S, 2, 4, 5>(size, [=](auto n) {
     for (int i = n - 1; i >= 0; --i) {
       T value = x[i];
       for (int k = i + 1; k < n; ++k) value -= x[k] * L[k + i * n];
@@ -66,7 +66,7 @@ void SolveLowerTransposed(const S* L, Size size, T* x) {
 /// Computes x := L x for a general L, such as an inverse.
 template <class S>
 void MultiplyLower(const S* L, int size, S* x) {
-  WithSize<2, 4, 5>(size, [=](auto n) {
+  WithSize<S, 2, 4, 5>(size, [=](auto n) {
     for (int r = n - 1; r >= 0; --r) {
       S sum = L[r + r * n] * x[r];
       for (int c = 0; c < r; ++c) sum += L[r + c * n] * x[c];
@@ -78,7 +78,7 @@ void MultiplyLower(const S* L, int size, S* x) {
 /// x := L^T x.
 template <class S>
 void MultiplyLowerTransposed(const S* L, int size, S* x) {
-  WithSize<2, 4, 5>(size, [=](auto n) {
+  WithSize<S, 2, 4, 5>(size, [=](auto n) {
     for (int c = 0; c < n; ++c) {
       S sum = S(0);
       for (int r = c; r < n; ++r) sum += L[r + c * n] * x[r];
@@ -90,7 +90,7 @@ void MultiplyLowerTransposed(const S* L, int size, S* x) {
 /// Replaces L by L^-1, including its diagonal.
 template <class S>
 void InvertLower(S* L, int size) {
-  WithSize<2, 4, 5>(size, [=](auto n) {
+  WithSize<S, 2, 4, 5>(size, [=](auto n) {
     for (int j = 0; j < n; ++j) {
       for (int i = j + 1; i < n; ++i) {
         S sum = S(0);

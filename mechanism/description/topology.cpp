@@ -115,4 +115,32 @@ Topology BuildTopology(const MechanismDescription& description, Coordinates coor
   return topology;
 }
 
+/// The joint of each constraint is on a loop with the joints of both ways to where these meet.
+std::vector<bool> OnLoops(const MechanismDescription& description, const Topology& topology) {
+  std::vector<TreeEdge> edge_of(description.bodies.size());
+  std::vector<int> depth(edge_of.size(), 0);
+  std::vector<int> next(edge_of.size());  // towards Ground; skips edges that are on a loop
+  std::iota(next.begin(), next.end(), 0);
+  for (const TreeEdge& edge : topology.edges) {
+    edge_of[edge.child] = edge;
+    depth[edge.child] = depth[edge.parent] + 1;
+  }
+  const auto find = [&](int body) {
+    while (next[body] != body) body = next[body] = next[next[body]];
+    return body;
+  };
+  std::vector<bool> on_loops(description.joints.size(), false);
+  for (const int j : topology.constraints) {
+    on_loops[j] = true;
+    int one = find(description.joints[j].from.body), other = find(description.joints[j].to.body);
+    while (one != other) {
+      if (depth[one] < depth[other]) std::swap(one, other);
+      if (edge_of[one].joint >= 0) on_loops[edge_of[one].joint] = true;
+      next[one] = edge_of[one].parent;
+      one = find(one);
+    }
+  }
+  return on_loops;
+}
+
 }  // namespace loopbench

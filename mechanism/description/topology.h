@@ -39,4 +39,8 @@ struct Topology {
 
 Topology BuildTopology(const MechanismDescription& description, Coordinates coordinates);
 
+/// Returns by joint: true if its bodies are also connected otherwise. `topology`: in joint
+/// coordinates.
+std::vector<bool> OnLoops(const MechanismDescription& description, const Topology& topology);
+
 }  // namespace loopbench

@@ -33,6 +33,7 @@ Excursion<Space>::Excursion(const Mechanism<Space, double>& mechanism, const Vec
   const double eps = std::numeric_limits<double>::epsilon();
   // joints are given to the accuracy, with independent errors; four is the root of 16 joints
   const double of_loop = accuracy * std::min(4.0, std::sqrt(std::ssize(mechanism.joints())));
+  rank_ratio_ = std::max(kRankRatio, of_loop);
   closed_ = std::max(std::max(1e-11, of_loop) * mechanism.length(), 100 * eps * farthest);
   kinematics_.AcceptStep();
   kinematics_.CountTurns();
@@ -62,8 +63,8 @@ void Excursion<Space>::Factor() {
   // between rigid parts all is round-off
   const double largest = here_.rows.colwise().norm().maxCoeff();
   const double counts = std::max(largest, std::sqrt(DirectionWeights<double>::kMinResponse));
-  if (!(largest > kRankRatio * counts)) here_.rows.setZero();  // nothing is constrained
-  solver_.setThreshold(std::min(0.5, kRankRatio * counts / largest));
+  if (!(largest > rank_ratio_ * counts)) here_.rows.setZero();  // nothing is constrained
+  solver_.setThreshold(std::min(0.5, rank_ratio_ * counts / largest));
   solver_.compute(here_.rows);
   factored_ = true;
   rank_ = static_cast<int>(solver_.rank());
@@ -143,7 +144,7 @@ StepKind Excursion<Space>::Step(double distance, int seed) {
   for (int i = 0; i < n; ++i) y[i] = std::cos(1.0 + seed * std::sqrt(2.0) + (i + seed) * (i + 0.5));
   if (course_.size() == n) y = course_ * (3.0 / course_.norm()) + y / y.norm();
   if (here_.rows.size() > 0 && !factored_) {
-    solver_.setThreshold(kRankRatio);
+    solver_.setThreshold(rank_ratio_);
     solver_.compute(here_.rows);
     factored_ = true;
   }

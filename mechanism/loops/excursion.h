@@ -6,6 +6,8 @@
 // and its loops are closed again. Dense: for analyses before a run.
 #pragma once
 
+#include <cmath>
+
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/loops/direction_rows.h"
 
@@ -20,11 +22,16 @@ enum class StepKind {
   kNotClosed,  ///< no closed position was found
 };
 
+/// A way x opens loops that are singular by x^2 / 2 [rad or lengths]. Returns a way that opens them
+/// far beyond the accuracy of rounded input.
+inline double WayBeyond(double accuracy) { return std::sqrt(40.0 * accuracy); }
+
 template <class Space>
 class Excursion {
  public:
   /// Starts at the position q of a mechanism in joint coordinates without prescribed motions, which
-  /// must outlive this. Loops count as closed within `accuracy` [rad or lengths] or round-off.
+  /// must outlive this. Loops count as closed within `accuracy` [rad or lengths] or round-off, and
+  /// directions that depend on each other within it have no rank.
   Excursion(const Mechanism<Space, double>& mechanism, const VectorX<double>& q,
             double accuracy = 0.0);
 
@@ -48,6 +55,8 @@ class Excursion {
   int rank() const { return rank_; }
   /// Smallest pivot that counts over the largest: how far this position is from losing rank.
   double conditioning() const { return conditioning_; }
+  /// Pivots below this count as zero; at least kRankRatio.
+  double rank_ratio() const { return rank_ratio_; }
   /// Returns the largest neglected pivot: a measure of the independence of redundant constraints.
   double excess() const { return excess_; }
   int freedom() const { return mechanism_->num_u() - rank_; }
@@ -64,7 +73,8 @@ class Excursion {
   const Mechanism<Space, double>* mechanism_;
   Kinematics<Space, double> kinematics_;
   VectorX<double> q_, units_;  ///< units of speeds: 1, or the mechanism's length
-  double closed_ = 0.0;        ///< scaled violations below this are round-off [m]
+  double rank_ratio_ = 0.0;
+  double closed_ = 0.0;  ///< scaled violations below this are round-off [m]
   DirectionRows here_;
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver_;
   VectorX<double> course_;  ///< L^T u of the last step that moved

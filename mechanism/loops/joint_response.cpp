@@ -8,49 +8,6 @@
 
 namespace loopbench {
 
-namespace {
-
-/// Returns by joint: true if its bodies are also connected otherwise. A joint that alone holds its
-/// outward bodies bears no self-stress, however small its pivot.
-template <class Space>
-std::vector<bool> OnLoops(const Mechanism<Space, double>& mechanism) {
-  struct Step {
-    int depth = 0, joint = -1;  ///< towards Ground
-    int up = kGround;           ///< the next body whose step is not known to be on a loop
-  };
-  std::vector<Step> steps(static_cast<std::size_t>(mechanism.num_bodies()));
-  for (std::size_t body = 0; body < steps.size(); ++body) steps[body].up = static_cast<int>(body);
-  std::vector<int> parents(steps.size(), kGround);
-  for (const TreeStep& step : mechanism.tree()) {
-    steps[step.child].depth = steps[step.parent].depth + 1;
-    steps[step.child].joint = step.joint;
-    parents[step.child] = step.parent;
-  }
-  const auto find = [&](int body) {
-    while (steps[body].up != body) {
-      steps[body].up = steps[steps[body].up].up;  // halves the way of the next ones
-      body = steps[body].up;
-    }
-    return body;
-  };
-  std::vector<bool> on_loops(mechanism.joints().size(), false);
-  for (std::size_t j = 0; j < on_loops.size(); ++j) {
-    const Joint<Space, double>& joint = mechanism.joints()[j];
-    if (joint.in_tree()) continue;
-    on_loops[j] = true;
-    int one = find(joint.from), other = find(joint.to);
-    while (one != other) {
-      if (steps[one].depth < steps[other].depth) std::swap(one, other);
-      on_loops[static_cast<std::size_t>(steps[one].joint)] = true;
-      steps[one].up = parents[one];
-      one = find(one);
-    }
-  }
-  return on_loops;
-}
-
-}  // namespace
-
 template <class Space>
 std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
     const Mechanism<Space, double>& mechanism, double most) {
@@ -91,25 +48,25 @@ std::unique_ptr<JointResponse<Space>> JointResponse<Space>::Make(
   BlockCholesky X(std::move(rows), pairs, most);
   if (X.numbers() > most) return nullptr;
   return std::unique_ptr<JointResponse>(new JointResponse(
-      std::move(sides), std::move(joints), std::move(X), OnLoops(mechanism), sides_of_body));
+      std::move(sides), std::move(joints), std::move(X), mechanism.joints(), sides_of_body));
 }
 
 template <class Space>
 JointResponse<Space>::JointResponse(std::vector<Side> sides, std::vector<int> joints,
-                                    BlockCholesky X, const std::vector<bool>& on_loops,
+                                    BlockCholesky X, std::span<const Joint<Space, double>> all,
                                     const std::vector<std::vector<int>>& sides_of_body)
     : sides_(std::move(sides)),
       joints_(std::move(joints)),
       X_(std::move(X)),
       x_(static_cast<std::size_t>(X_.size()), 0.0),
-      phi_(on_loops.size(), Components<Space, double>::Zero()) {
+      phi_(all.size(), Components<Space, double>::Zero()) {
   int rows = 0;
   for (const Side& side : sides_) rows += side.rows;
   c_.assign(rows, Wrench<Space, double>::Zero());
   Mc_.assign(rows, Acceleration<Space, double>::Zero());
   for (int block = 0; block < static_cast<int>(joints_.size()); ++block) {
     inverse_shares_.push_back(1.0 / ShareOfLimit(X_.eliminated(block)));
-    on_loops_.push_back(on_loops[static_cast<std::size_t>(joints_[block])]);
+    on_loops_.push_back(all[static_cast<std::size_t>(joints_[block])].on_loop);
   }
   for (const std::vector<int>& on_body : sides_of_body) {
     for (std::size_t a = 0; a < on_body.size(); ++a) {
@@ -145,7 +102,7 @@ bool JointResponse<Space>::Factor(const Kinematics<Space, double>& kinematics, M
     const Side &first = sides_[pair.first], &second = sides_[pair.second];
     const Wrench<Space, double>* c = &c_[first.first];
     const Acceleration<Space, double>* Mc = &Mc_[second.first];
-    WithSize<2, 3, 5>(second.rows, [&](auto columns) {
+    WithSize<double, 2, 3, 5>(second.rows, [&](auto columns) {
       for (int i = 0; i < first.rows; ++i) {
         const int last = pair.first == pair.second ? i + 1 : int{columns};
         for (int k = 0; k < last; ++k) pair.block[i * columns + k] += c[i].dot(Mc[k]);

@@ -66,7 +66,7 @@ class JointResponse {
   };
 
   JointResponse(std::vector<Side> sides, std::vector<int> joints, BlockCholesky X,
-                const std::vector<bool>& on_loops,
+                std::span<const Joint<Space, double>> all,
                 const std::vector<std::vector<int>>& sides_of_body);
 
   std::vector<Side> sides_;

@@ -103,7 +103,7 @@ bool LoopSolver<S>::FactorScaled(const ConstRef& X) {
       const S root = scales_[part.scale + i * (part.rows + 1)] / InversePivot(part.row + i);
       const S ratio = root * root;
       rcond_ = min(rcond_, ratio);
-      is_regular = ratio >= S(kSuspicious) && is_regular;  // false for NaN, too
+      is_regular = ratio >= S(part.least) && is_regular;  // false for NaN, too
     }
   }
   return is_regular;

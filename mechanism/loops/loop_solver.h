@@ -71,6 +71,9 @@ class LoopSolver {
  public:
   /// Scaled pivots below this send the decision to the geometry.
   static constexpr double kSuspicious = 1e-4;
+  /// The same for joints on no loop. They have rank, but a light body that holds heavy ones loses
+  /// digits: with this pivot accelerations have relative errors up to eps / 1e-6 = 2e-10.
+  static constexpr double kLosesDigits = 1e-6;
   using ConstRef = Eigen::Ref<const MatrixX<S>>;
 
   /// Joints contribute `rows[k]` rows each, in order. Without a scratch it has one of its own.
@@ -78,6 +81,7 @@ class LoopSolver {
 
   int size() const { return size_; }
 
+  void SetOnNoLoop(int joint) { parts_[joint].least = kLosesDigits; }
   /// The K of each joint, from its free response, for the next factorisation.
   void SetScale(int joint, const JointMatrix<S>& free_response);
 
@@ -108,6 +112,7 @@ class LoopSolver {
   struct Part {
     int row = 0, rows = 0;
     int scale = 0;  ///< first number in scales_
+    double least = kSuspicious;
   };
   enum class Form { kNone, kPlain, kScaled, kGeometric, kRegularized };
   bool IsGeometric() const { return form_ == Form::kGeometric || form_ == Form::kRegularized; }

@@ -90,6 +90,8 @@ Mechanism<Space, S>::Mechanism(const MechanismDescription& description, Coordina
   }
   AddBodies(description);
   AddJoints(description, BuildTopology(description, coordinates));
+  const std::vector<bool> on_loops = OnLoops(description, joint_topology);
+  for (std::size_t j = 0; j < on_loops.size(); ++j) joints_[j].on_loop = on_loops[j];
   AddCouplings(description);
   for (int j = 0; j < std::ssize(description.joints); ++j) {
     const double inertia = description.joints[j].rotor_inertia;

@@ -36,6 +36,7 @@ struct Joint {
   int description = -1;                 ///< index of the user's joint, -1 for a virtual free joint
   int first_drive = 0, num_drives = 0;  ///< its prescribed coordinates, in Mechanism::drives()
   int num_released = 0;                 ///< directions of D that are not imposed (redundancy.h)
+  bool on_loop = false;                 ///< its bodies are also connected otherwise
   Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
   double initial = 0.0;                 ///< initial value of its only coordinate, or 0
 

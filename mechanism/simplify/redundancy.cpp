@@ -19,14 +19,14 @@ namespace {
 constexpr double kApart = 0.15;
 constexpr int kMaxWithTurns = 40;
 int Positions(int speeds) { return speeds <= kMaxWithTurns ? 48 : 6; }
-/// A larger rank than before needs this conditioning. Near singular configurations errors of
-/// positions grow, and may make redundant rows independent by a little more than kRankRatio.
-constexpr double kCertain = 10.0 * kRankRatio;
+/// A larger rank than before needs a conditioning of so many rank_ratio(). Near singular
+/// configurations errors of positions grow, and may make redundant rows independent by a little
+/// more than that.
+constexpr double kCertain = 10.0;
 /// To decide where rows must move, a walk takes one turn per freedom, but no more than these.
 constexpr int kMostTurns = 8;
 
-/// Ways that show whether a position is regular [rad or lengths]. A way x opens loops that are
-/// singular by x^2 / 2, which must be far beyond the accuracy of rounded input.
+/// Ways that show whether a position is regular [rad or lengths].
 constexpr double kProbe = 0.01, kRoundedProbe = 0.05;
 
 /// Returns true if all free speeds lead to finite motions, as for constraints that are redundant at
@@ -72,7 +72,8 @@ Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>
   for (int k = 1; k <= all && best.rank() < mechanism.num_rows(); ++k) {
     const Excursion<Space> before = excursion;
     if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < best.rank()) continue;
-    if (excursion.rank() > best.rank() && excursion.conditioning() < kCertain) {
+    if (excursion.rank() > best.rank() &&
+        excursion.conditioning() < kCertain * excursion.rank_ratio()) {
       excursion = before;
       excursion.TurnAnywhere();
       continue;
@@ -164,7 +165,7 @@ Redundancy Find(const MechanismDescription& description) {
   const VectorX<double> q = at_start.CoordinatesIn(mechanism);
   Kinematics<Space, double> undriven(mechanism);
   undriven.UpdatePosition(q);
-  const bool independent = AreIndependent(undriven);
+  const bool independent = description.accuracy <= kRankRatio && AreIndependent(undriven);
   if (!independent && mechanism.num_u() > kMaxAnalysedSpeeds) return result;
   result.rows = result.rank = result.rank_at_start = mechanism.num_rows();
   if (independent) return result;
@@ -179,7 +180,8 @@ Redundancy Find(const MechanismDescription& description) {
     std::vector<Eigen::MatrixXd> rows;
     excursion = Roam(std::move(excursion), mechanism, moves, rows);
     result.rank = excursion.rank();
-    if (!IsRegular(excursion, accuracy > 0.0 ? kRoundedProbe : kProbe)) {
+    if (!IsRegular(excursion,
+                   accuracy > 0.0 ? std::max(kRoundedProbe, WayBeyond(accuracy)) : kProbe)) {
       result.rank = std::min(result.rows, mechanism.num_u() - (moves ? 1 : 0));
       continue;
     }

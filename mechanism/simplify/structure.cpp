@@ -89,6 +89,7 @@ class Analysis {
     }
     const bool driven = !mechanism_.drives().empty();
     const bool known = redundancy.rows > 0 && !driven && result_.couplings == 0;
+    if (known && redundancy.rounding > 0.0) result_.rank = redundancy.rank_at_start;
     result_.rank_nearby = known ? redundancy.rank : result_.rank;
     FindFreedomOfParts();
     if (!driven) return result_;

@@ -9,6 +9,7 @@
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/joint_response.h"
+#include "mechanism/loops/scaled_loops.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/assembly.h"
 
@@ -103,13 +104,23 @@ std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<do
   Kinematics<Space, double> here(mechanism);
   here.UpdatePosition(q);
   // which judges the constraints of joints
-  if (AreIndependent(here) && (mechanism.couplings().empty() || n <= mechanism.num_rows())) {
+  if (accuracy <= kRankRatio && AreIndependent(here) &&
+      (mechanism.couplings().empty() || n <= mechanism.num_rows())) {
     return n > rows ? "" : all_taken;
   }
   if (n > kMaxAnalysedSpeeds) return "";
+  // redundant constraints of rounded input leave a motion that closes within its accuracy
+  const auto moves_within = [&] {
+    Excursion<Space> rounded(mechanism, q, accuracy);
+    const double distance = std::max(kRoundedDistance, WayBeyond(accuracy));
+    for (int trial = 1; trial <= kTrials; ++trial) {
+      if (rounded.Step(distance, trial) == StepKind::kMoved) return true;
+    }
+    return false;
+  };
   Excursion<Space> excursion(mechanism, q);
   const int first_order = excursion.freedom();
-  if (first_order == 0) return all_taken;
+  if (first_order == 0) return moves_within() ? "" : all_taken;
   if (excursion.rank() == rows) return "";
   const int rank = excursion.rank();
   int fell_back = 0;
@@ -119,11 +130,7 @@ std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<do
     fell_back += step == StepKind::kFellBack;
   }
   if (fell_back < kTrials && !IsRigidToSecondOrder(mechanism, q, rank)) return "";
-  // redundant constraints of rounded input leave a motion that closes within its accuracy
-  Excursion<Space> rounded(mechanism, q, accuracy);
-  for (int trial = 1; trial <= kTrials; ++trial) {
-    if (rounded.Step(kRoundedDistance, trial) == StepKind::kMoved) return "";
-  }
+  if (moves_within()) return "";
   return "this position is singular, the " + std::to_string(first_order) +
          (first_order == 1 ? " speed that its" : " independent speeds that its") +
          " constraints leave lead" + (first_order == 1 ? "s" : "") +

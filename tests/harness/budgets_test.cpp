@@ -36,15 +36,15 @@ struct Budget {
 // clang-format off
 constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
-    {"mechanism/algebra",       { 2239,  23,   0},  1900},
-    {"mechanism/description",   { 2153,  28,   1},  1750},
-    {"mechanism/model",         { 3107,  22,   2},  2300},
-    {"mechanism/loops",         { 3406,  23,   2},  1900},
-    {"mechanism/start",         { 2137,  18,   4},   700},
+    {"mechanism/algebra",       { 2249,  23,   0},  1900},
+    {"mechanism/description",   { 2185,  28,   1},  1750},
+    {"mechanism/model",         { 3110,  22,   2},  2300},
+    {"mechanism/loops",         { 3379,  23,   2},  1900},
+    {"mechanism/start",         { 2144,  18,   4},   700},
     {"mechanism/formulation",   { 2815,  24,   4},  1500},
-    {"mechanism/simplify",      { 3376,  25,   5},  2600},
-    {"odca",                    { 7162,  38,   5},  3900},
-    {"lagrange",                {  376,   4,   4},   350},
+    {"mechanism/simplify",      { 3379,  25,   5},  2600},
+    {"odca",                    { 7218,  38,   5},  3900},
+    {"lagrange",                {  383,   4,   4},   350},
     {"reduction",               { 1630,  12,   4},  1350},
     {"harness/text",            { 1635,  13,   0},   900},
     {"harness/json",            { 2004,   9,   1},  1300},
@@ -55,7 +55,7 @@ constexpr Budget kBudgets[] = {
     {"harness/generate",        { 2433,  12,   7},  1230},
     {"harness/integrator",      { 1339,   7,   5},   900},
     {"harness/reference",       {  913,   4,   4},   800},
-    {"harness/trajectory",      { 2509,   9,  12},  1750},
+    {"harness/trajectory",      { 2538,   9,  12},  1750},
     {"harness/observers",       { 1147,   4,   7},  1000},
     {"harness/run",             { 1842,  12,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
@@ -71,9 +71,9 @@ constexpr Budget kBudgets[] = {
     {"harness/exchange",        { 9631,  37,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
-    {"harness/cli",             { 8425,  26,  29},  3600},
+    {"harness/cli",             { 8449,  26,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {94125, 510, 242}, 62000}
+    {"",                        {94269, 510, 242}, 62000}
 };
 // clang-format on
 

@@ -452,6 +452,41 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
                {"1 of 2 rows are not compared"});
 }
 
+/// Coordinates of joints determine all poses, whatever a coupling says about them.
+TEST_F(Command, CouplingsAreCheckedToo) {
+  Write("pair.json", R"({"name": "pair", "gravity": [0, 0], "ground": {"points": {"P": [0.3, 0]}},
+    "bodies": [{"name": "w1", "mass": 2, "inertia": 0.02}, {"name": "w2", "mass": 1, "inertia": 0.03}],
+    "joints": [{"name": "A", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "w1"}},
+      {"name": "B", "type": "revolute", "from": {"body": "ground", "at": "P"}, "to": {"body": "w2"}}],
+    "couplings": [{"name": "mesh", "coefficients": {"A": 20, "B": 40}}]})");
+  const auto write = [&](double offset, double speed) {
+    std::string text =
+        "t [s],joint:A:angle [rad],joint:A:angle speed [rad/s],joint:B:angle [rad],"
+        "joint:B:angle speed [rad/s]\n";
+    for (const double t : {0.0, 0.1, 0.2}) {
+      text += fmt::format("{},{},2,{},{}\n", t, 2 * t, offset + speed * t, speed);
+    }
+    Write("theirs.csv", text);
+  };
+  const std::string check = "trajectory theirs.csv --mechanism pair.json";
+  write(0.0, -1.0);
+  ExpectEnding(Call(check), 0, {"coupling mesh", "0.00e+00                      0.00e+00"});
+  write(2 * M_PI, -1.0);
+  ExpectEnding(Call(check), 0, {"0.00e+00                      0.00e+00"});
+  // 40 (0.5 + 0.2 * 4) / 20 rad at 0.2 s, 40 * 4 / 20 rad/s
+  write(0.5, 3.0);
+  ExpectEnding(Call(check), 0, {"2.60e+00                      8.00e+00"});
+}
+
+TEST_F(Command, WholeTurnsAndRowsInBetweenAreNamed) {
+  const std::string columns = "t [s],joint:thread:angle [rad]\n";
+  Write("ours.csv", columns + "0,0\n1,1\n2,2\n3,3\n");
+  Write("theirs.csv", columns + fmt::format("0,{}\n1,1\n1.5,1.5\n", 4 * M_PI));
+  ExpectEnding(Call("trajectory theirs.csv --compare-with ours.csv"), 0,
+               {"1 of 3 rows are compared with cubics through the rows of ours.csv",
+                "joint:thread:angle [rad]: besides, 2 whole turns at 0 s"});
+}
+
 TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
   Write("two.json", std::string(kTinyExperiment).insert(1, R"("output": {"number": 3},)"));
   ExpectEnding(Call("run two.json --out one --shard 1/2"), 0, {});

@@ -141,6 +141,20 @@ TEST(JointResponse, TellsLostRankFromLostDigits) {
   EXPECT_FALSE(Factored(both, 0.0).response->has_rank());
 }
 
+/// There no joint belongs to a tree of the mechanism.
+TEST(JointResponse, FindsLoopsInAbsoluteCoordinatesToo) {
+  const auto factored = [](const MechanismDescription& description) {
+    const testing::Placed<Planar> placed(description, Coordinates::kAbsolute, 1);
+    auto response = JointResponse<Planar>::Make(placed.mechanism, kMaxOfResponse);
+    const bool is_certain = response->Factor(placed.kinematics);
+    return std::pair(is_certain, response->has_rank());
+  };
+  EXPECT_EQ(factored(Tree(7, 0.0)), std::pair(true, true));
+  EXPECT_EQ(factored(With(Tree(7, 0.0), 2)), std::pair(false, true));
+  EXPECT_EQ(factored(Ladder(3, 1.0, 0.0)).second, true);
+  EXPECT_EQ(factored(With(Ladder(3, 1.0, 0.0), 2)).second, false) << "cranks are on loops";
+}
+
 using Sparse = testing::SystemWith<lagrange::Lagrange, Planar, double>;
 
 /// A ladder of three windows with its cranks at `angle`, all speeds zero.

@@ -319,7 +319,9 @@ TEST(PlanTest, GroundHoldsArms) {
   EXPECT_TRUE(ring.nodes()[0].closes_loop);
   for (const int n : {0, 1, 2}) {
     EXPECT_EQ(ring.leaves()[n].end, 2);
-    EXPECT_EQ(ring.leaves()[n].free, n + 1);
+    EXPECT_EQ(ring.leaves()[n].path, n + 1);
+    EXPECT_EQ(ring.leaves()[n].free, 3);
+    EXPECT_EQ(ring.leaves()[n].column, 2 - n);
   }
   std::vector<bool> before(6, false);
   for (const int n : ring.leaf_order()) {
@@ -332,10 +334,39 @@ TEST(PlanTest, GroundHoldsArms) {
   EXPECT_EQ(std::ranges::count(of_twelve, -2), 4);
   options.dim = 3;
   EXPECT_EQ(holders(Plan(4, ChainOf(3), options)), (std::vector<int>{-1, -2, -1}));
+}
+
+/// A body on Ground holds three bodies, on which a fourth one closes the loops.
+TEST(PlanTest, GroundHoldsTrees) {
+  PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
   options.dim = 6;
-  // a body with a branch ends an arm
-  const std::vector<PlanJoint> tree = {{0, 0, 1, 5}, {1, 1, 2, 5}, {2, 2, 3, 5}, {3, 2, 4, 5}};
-  EXPECT_EQ(holders(Plan(5, tree, options)), (std::vector<int>{-1, 0, -2, -2}));
+  std::vector<PlanJoint> joints = {{0, 0, 1, 5}, {1, 1, 2, 5}, {2, 1, 3, 5}, {3, 1, 4, 4},
+                                   {4, 2, 5, 3}, {5, 3, 5, 3}, {6, 4, 5, 3}};
+  const Plan plan(6, joints, options);
+  for (const int n : {0, 1, 2, 3}) {
+    EXPECT_EQ(plan.leaves()[n].holder, n == 0 ? -1 : 0);
+    EXPECT_EQ(plan.leaves()[n].end, 3);
+    EXPECT_EQ(plan.leaves()[n].free, 5);
+    EXPECT_EQ(plan.leaves()[n].path, std::vector({1, 2, 2, 3})[n]);
+    EXPECT_EQ(plan.leaves()[n].column, std::vector({4, 3, 2, 0})[n]);
+  }
+  EXPECT_EQ(plan.leaves()[4].hold.joint, -1);
+  EXPECT_EQ(plan.leaves()[3].sides.size(), 3u) << "of three bodies";
+  ASSERT_EQ(plan.nodes().size(), 1u);
+  EXPECT_EQ(plan.nodes()[0].rows, 9);
+  // with more than six free directions a body remains
+  joints[3].rows = 3;
+  joints[1].rows = 4;
+  EXPECT_EQ(std::ranges::count_if(Plan(6, joints, options).leaves(),
+                                  [](const Leaf& leaf) { return leaf.end >= 0; }),
+            3);
+  // a joint between two bodies of a tree is closed at its leaf
+  const std::vector<PlanJoint> loop = {{0, 0, 1, 5}, {1, 1, 2, 5}, {2, 1, 3, 5}, {3, 2, 3, 5}};
+  const Plan closed(4, loop, options);
+  ASSERT_EQ(closed.nodes().size(), 1u);
+  EXPECT_EQ(closed.leaves()[2].end, 2);
+  EXPECT_TRUE(closed.nodes()[0].closes_loop);
+  EXPECT_EQ(closed.nodes()[0].handles.size(), 2u);
 }
 
 /// Joints looked at while the joins of all bodies are put in order.

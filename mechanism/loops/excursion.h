@@ -6,6 +6,7 @@
 // and its loops are closed again. Dense: for analyses before a run.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "mechanism/algebra/decompositions.h"
@@ -23,8 +24,8 @@ enum class StepKind {
 };
 
 /// A way x opens loops that are singular by x^2 / 2 [rad or lengths]. Returns a way that opens them
-/// far beyond the accuracy of rounded input.
-inline double WayBeyond(double accuracy) { return std::sqrt(40.0 * accuracy); }
+/// far beyond the accuracy of rounded input, but on which a regular motion hardly bends.
+inline double WayBeyond(double accuracy) { return std::min(0.3, std::sqrt(40.0 * accuracy)); }
 
 template <class Space>
 class Excursion {

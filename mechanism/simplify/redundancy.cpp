@@ -35,12 +35,12 @@ constexpr double kProbe = 0.01, kRoundedProbe = 0.05;
 template <class Space>
 bool IsRegular(const Excursion<Space>& position, double probe) {
   constexpr int kProbes = 3;
-  constexpr double kMaxBend = 0.2;
+  const double most_bend = std::max(0.2, 1.5 * probe);
   for (int k = 1; k <= kProbes; ++k) {
     Excursion<Space> there = position;
     there.TurnAnywhere();
     if (there.Step(probe, 100 + k) != StepKind::kMoved) return false;
-    if (there.bend() > kMaxBend || there.rank() != position.rank()) return false;
+    if (there.bend() > most_bend || there.rank() != position.rank()) return false;
   }
   return true;
 }

@@ -39,7 +39,7 @@ constexpr Budget kBudgets[] = {
     {"mechanism/algebra",       { 2249,  23,   0},  1900},
     {"mechanism/description",   { 2185,  28,   1},  1750},
     {"mechanism/model",         { 3110,  22,   2},  2300},
-    {"mechanism/loops",         { 3379,  23,   2},  1900},
+    {"mechanism/loops",         { 3380,  23,   2},  1900},
     {"mechanism/start",         { 2144,  18,   4},   700},
     {"mechanism/formulation",   { 2815,  24,   4},  1500},
     {"mechanism/simplify",      { 3379,  25,   5},  2600},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 8449,  26,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {94269, 510, 242}, 62000}
+    {"",                        {94270, 510, 242}, 62000}
 };
 // clang-format on
 

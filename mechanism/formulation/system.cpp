@@ -126,9 +126,7 @@ void System<Space, S>::SolveFormed(VectorX<S>* lambda) {
 
 template <class Space, class S>
 void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
-  const bool needs_lambda = shares_ && state_.stress()->needs_multipliers();
-  VectorX<S>* multipliers = needs_lambda && lambda == nullptr ? &lambda_change_ : lambda;
-  if (!solver_->Accelerate(kinematics(), *feedback_, udot_, multipliers)) SolveFormed(multipliers);
+  if (!solver_->Accelerate(kinematics(), *feedback_, udot_, lambda)) SolveFormed(lambda);
   if (carried_ != nullptr) {
     VectorX<S>* multiplier_change = lambda != nullptr ? &lambda_change_ : nullptr;
     if (solver_->TakesWrenches()) {
@@ -140,11 +138,9 @@ void System<Space, S>::SolveAccelerations(VectorX<S>* lambda) {
     if (lambda != nullptr) *lambda += lambda_change_;
   }
   if (!shares_) return;
-  SelfStress<Space, S>& stress = *state_.stress();
-  const VectorX<S>& force = stress.ForceOfStress(needs_lambda ? *multipliers : lambda_change_);
   dynamics_.BodyAccelerations(kinematics(), udot_, A_);
-  const VectorX<S>& share = stress.ShareOfAccelerations(kinematics(), A_);
-  solver_->Solve(force, share, change_, lambda != nullptr ? &lambda_change_ : nullptr);
+  const VectorX<S>& share = state_.stress()->ShareOfAccelerations(kinematics(), A_);
+  solver_->Solve(VectorX<S>(), share, change_, lambda != nullptr ? &lambda_change_ : nullptr);
   udot_ += change_;
   if (lambda != nullptr) *lambda += lambda_change_;
 }

@@ -30,35 +30,20 @@ void SolveBoth(const MatrixX<S>& L, S* x) {
   SolveLowerTransposed(L.data(), static_cast<int>(L.rows()), x);
 }
 
-/// Scalar product of columns i of A and j of B. For a few numbers Eigen's overhead exceeds the
-/// work.
+/// Scalar product of n numbers. For a few numbers Eigen's overhead exceeds the work.
 template <class S>
-S Dot(const MatrixX<S>& A, int i, const MatrixX<S>& B, int j) {
-  const auto size = A.rows();
-  const S *a = A.data() + i * size, *b = B.data() + j * size;
+S Dot(const S* a, const S* b, Eigen::Index n) {
   S sum(0);
-  for (Eigen::Index k = 0; k < size; ++k) sum += a[k] * b[k];
+  for (Eigen::Index i = 0; i < n; ++i) sum += a[i] * b[i];
   return sum;
 }
-
-/// y = A x for the first columns of A, as many as x has. As for Dot(), Eigen's overhead exceeds the
-/// work.
-template <class S, class X, class Y>
-void Multiply(const MatrixX<S>& A, const X& x, Y&& y) {
-  y.setZero();
-  for (Eigen::Index j = 0; j < x.size(); ++j) {
+/// y = A x for the first columns of A, n of them.
+template <class S>
+void Multiply(const MatrixX<S>& A, const S* x, Eigen::Index n, S* y) {
+  std::fill_n(y, A.rows(), S(0));
+  for (Eigen::Index j = 0; j < n; ++j) {
     const S *a = A.data() + j * A.rows(), factor = x[j];
     for (Eigen::Index i = 0; i < A.rows(); ++i) y[i] += a[i] * factor;
-  }
-}
-/// y = A^T x for the first columns of A, as many as y has.
-template <class S, class X, class Y>
-void MultiplyTransposed(const MatrixX<S>& A, const X& x, Y&& y) {
-  for (Eigen::Index j = 0; j < y.size(); ++j) {
-    const S* a = A.data() + j * A.rows();
-    S sum(0);
-    for (Eigen::Index i = 0; i < A.rows(); ++i) sum += a[i] * x[i];
-    y[j] = sum;
   }
 }
 
@@ -88,21 +73,15 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
   inverse_scale_ = row_scale_;
   column_scale_.setOnes(H_ + D_);
   gram_.setIdentity(r_, r_);
-  T_.setZero(r_, d_);
+  W_.setZero(m + D_, d_);
+  W_.middleRows(r_, d_).setIdentity();
   C_.setIdentity(d_, d_);
-  W_t_.setZero(D_, d_);
-  e_t_.setZero(D_);
-  z_t_ = e_t_;
-  e_c_.setZero(m);
-  z_c_ = e_c_;
-  x_.setZero(H_ + D_);
-  y_ = x_;
-  missed_.setZero(d_);
-  along_ = missed_;
+  z_.setZero(m + D_);
+  y_.setZero(H_ + D_);
+  along_.setZero(d_);
   feedback_.setZero(mechanism.num_moving_rows() > 0 ? mechanism.num_equations()
                                                     : mechanism.num_rows());
   share_ = feedback_;
-  if (D_ == 0) force_.setZero(mechanism.num_u());
   is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0 &&
               mechanism.num_moving_rows() == 0;
 }
@@ -259,16 +238,17 @@ void SelfStress<Space, S>::FillRates(const Kinematics<Space, S>& kinematics) {
 
 template <class Space, class S>
 S SelfStress<Space, S>::FactorRows() {
+  const auto row = [&](int k) { return rows_.data() + static_cast<Eigen::Index>(k) * H_; };
   for (int j = 0; j < r_; ++j) {
-    for (int i = j; i < r_; ++i) gram_(i, j) = Dot(rows_, i, rows_, j);
+    for (int i = j; i < r_; ++i) gram_(i, j) = Dot(row(i), row(j), H_);
   }
   // at a singular configuration T belongs to regularized rows
   const S trace = gram_.trace();
   gram_.diagonal().array() += S(64) * std::numeric_limits<S>::epsilon() * trace;
   const S pivot = FactorInPlace(gram_) / trace;
   for (int q = 0; q < d_; ++q) {
-    for (int k = 0; k < r_; ++k) T_(k, q) = Dot(rows_, k, rows_, r_ + q);
-    SolveBoth(gram_, T_.col(q).data());
+    for (int k = 0; k < r_; ++k) W_(k, q) = -Dot(row(k), row(r_ + q), H_);
+    SolveBoth(gram_, W_.col(q).data());
   }
   return pivot;
 }
@@ -278,22 +258,15 @@ bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
   if (!is_arranged_ || kinematics.released() != arranged_) Arrange(kinematics);
   for (Loop& loop : loops_) FillRows(kinematics, loop);
   const S pivot = r_ > 0 ? FactorRows() : S(1);
-  for (int q = 0; q < d_ && D_ > 0; ++q) {
-    z_c_.head(r_) = -T_.col(q);
-    z_c_.tail(d_) = VectorX<S>::Unit(d_, q);
-    TransposedTimes<false>(kinematics, z_c_, y_);
-    W_t_.col(q) = -y_.tail(D_);
-  }
+  if (D_ > 0) SetForest(kinematics, W_.data(), d_);
   for (int j = 0; j < d_; ++j) {
-    for (int i = j; i < d_; ++i) {
-      C_(i, j) = S(i == j) + Dot(T_, i, T_, j) + Dot(W_t_, i, W_t_, j);
-    }
+    for (int i = j; i < d_; ++i) C_(i, j) = Dot(W_.col(i).data(), W_.col(j).data(), W_.rows());
   }
   FactorInPlace(C_);
   if (mechanism_->is_redundant()) Turn(kinematics);
   // Rows within the accuracy: speeds err by T^2, accelerations by T^3 times the rounding.
   const S most = mechanism_->is_redundant() ? S(10) : S(2);
-  return T_.size() == 0 || (pivot >= S(1e-4) && T_.cwiseAbs().maxCoeff() <= most);
+  return d_ == 0 || (pivot >= S(1e-4) && W_.topRows(r_).cwiseAbs().maxCoeff() <= most);
 }
 
 template <class Space, class S>
@@ -333,141 +306,105 @@ SpatialVector<Space, S, Kind> SelfStress<Space, S>::TurnWithP(
 }
 
 template <class Space, class S>
-template <bool kRates>
-void SelfStress<Space, S>::Times(const Kinematics<Space, S>& kinematics, const VectorX<S>& x,
-                                 VectorX<S>& rows) const {
+void SelfStress<Space, S>::SetForest(const Kinematics<Space, S>& kinematics, S* z, int count) {
+  const int m = r_ + d_, size = m + D_;
+  for (int q = 0; q < count; ++q) std::fill_n(z + q * size + m, D_, S(0));
   for (const Loop& loop : loops_) {
-    Velocity<Space, S> V = Velocity<Space, S>::Zero(), V_rate = V;
-    for (const Link& link : loop.links) {
-      const Edge& edge = edges_[link.child];
-      const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
-      Velocity<Space, S> at = Velocity<Space, S>::Zero(), at_rate = at;
-      for (int i = kRates ? 0 : edge.num_u; i < edge.num_columns; ++i) {
-        const int column = ColumnOf(edge, i);
-        const S speed = x[column] * column_scale_[column];
-        Add(edge.parts[i], basis[i], speed, at);
-        if (kRates && edge.parts[i].moves) Add(edge.parts[i], edge.own_rates[i], speed, at_rate);
+    for (int q = 0; q < count; ++q) {
+      Wrench<Space, S> F = Wrench<Space, S>::Zero();
+      for (int k = 0; k < loop.directions(); ++k) {
+        const int row = loop.row(k), i = loop.num_u + k;
+        Add(loop.parts[i], loop.basis[i], S(row_scale_[row] * z[q * size + row]), F);
       }
-      if constexpr (kRates) {
-        at_rate = ShiftMotion<Space, S>(at_rate + TurnWithP(kinematics, edge.joint, at), link.arm);
-        at_rate.linear += Cross<S>(at.angular, link.arm_rate);
+      for (const Link& link : loop.links) {
+        const Edge& edge = edges_[link.child];
+        const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
+        const Wrench<Space, S> at = ShiftForce<Space, S>(F, link.arm);
+        S* part = z + q * size + m + edge.D_column - edge.num_u;
+        for (int i = edge.num_u; i < edge.num_columns; ++i) {
+          const S value = Dot(edge.parts[i], basis[i], at) * column_scale_[ColumnOf(edge, i)];
+          link.is_reversed ? part[i] += value : part[i] -= value;
+        }
       }
-      at = ShiftMotion<Space, S>(at, link.arm);
-      link.is_reversed ? V -= at : V += at;
-      if constexpr (kRates) link.is_reversed ? V_rate -= at_rate : V_rate += at_rate;
-    }
-    // (w x D) . V = -D . (w x V)
-    if constexpr (kRates) V_rate -= TurnWithP(kinematics, loop.joint, V);
-    for (int k = 0; k < loop.directions(); ++k) {
-      const int row = loop.row(k), i = loop.num_u + k;
-      S sum = Dot(loop.parts[i], loop.basis[i], kRates ? V_rate : V);
-      if (kRates && loop.parts[i].moves) sum += Dot(loop.parts[i], loop.own_rates[i], V);
-      rows[row] = row_scale_[row] * sum;
     }
   }
 }
 
 template <class Space, class S>
-template <bool kRates>
-void SelfStress<Space, S>::TransposedTimes(const Kinematics<Space, S>& kinematics,
-                                           const VectorX<S>& z, VectorX<S>& columns) const {
-  columns.setZero();
+void SelfStress<Space, S>::ColumnsOfRates(const Kinematics<Space, S>& kinematics) {
+  y_.setZero();
   for (const Loop& loop : loops_) {
     Wrench<Space, S> F = Wrench<Space, S>::Zero(), F_rate = F;
     for (int k = 0; k < loop.directions(); ++k) {
       const int i = loop.num_u + k;
-      const S force = row_scale_[loop.row(k)] * z[loop.row(k)];
+      const S force = row_scale_[loop.row(k)] * z_[loop.row(k)];
       Add(loop.parts[i], loop.basis[i], force, F);
-      if (kRates && loop.parts[i].moves) Add(loop.parts[i], loop.own_rates[i], force, F_rate);
+      if (loop.parts[i].moves) Add(loop.parts[i], loop.own_rates[i], force, F_rate);
     }
-    if constexpr (kRates) F_rate += TurnWithP(kinematics, loop.joint, F);
+    F_rate += TurnWithP(kinematics, loop.joint, F);
     for (const Link& link : loop.links) {
       const Edge& edge = edges_[link.child];
       const Basis<Space, S>& basis = kinematics.joints()[edge.joint].basis;
       const Wrench<Space, S> at = ShiftForce<Space, S>(F, link.arm);
-      Wrench<Space, S> at_rate = at;
-      if constexpr (kRates) {
-        at_rate = ShiftForce<Space, S>(F_rate, link.arm) - TurnWithP(kinematics, edge.joint, at);
-        at_rate.angular += Moment<S>(link.arm_rate, F.linear);
-      }
-      for (int i = kRates ? 0 : edge.num_u; i < edge.num_columns; ++i) {
+      Wrench<Space, S> at_rate =
+          ShiftForce<Space, S>(F_rate, link.arm) - TurnWithP(kinematics, edge.joint, at);
+      at_rate.angular += Moment<S>(link.arm_rate, F.linear);
+      for (int i = 0; i < edge.num_columns; ++i) {
         const int column = ColumnOf(edge, i);
         S part = Dot(edge.parts[i], basis[i], at_rate);
-        if (kRates && edge.parts[i].moves) part += Dot(edge.parts[i], edge.own_rates[i], at);
+        if (edge.parts[i].moves) part += Dot(edge.parts[i], edge.own_rates[i], at);
         part *= column_scale_[column];
-        link.is_reversed ? columns[column] -= part : columns[column] += part;
+        link.is_reversed ? y_[column] -= part : y_[column] += part;
       }
     }
   }
 }
 
 template <class Space, class S>
-void SelfStress<Space, S>::Measure(const Kinematics<Space, S>& kinematics) {
+void SelfStress<Space, S>::MeasureSpeeds(const Kinematics<Space, S>& kinematics) {
   for (const Loop& loop : loops_) {
-    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(loop.joint);
+    const Velocity<Space, S>& V = kinematics.joints()[loop.joint].V_rel;
     for (int k = 0; k < loop.directions(); ++k) {
-      const int row = loop.row(k);
-      const int i = loop.num_u + k;
-      e_c_[row] = row_scale_[row] * Dot(loop.parts[i], loop.basis[i], mismatch);
+      const int row = loop.row(k), i = loop.num_u + k;
+      z_[row] = row_scale_[row] * Dot(loop.parts[i], loop.basis[i], V);
     }
+    if (loop.num_drives == 0) continue;
+    const Components<Space, S> speed = kinematics.ConstraintSpeed(loop.joint);
+    for (int k = 0; k < loop.num_drives; ++k) z_[loop.row(k)] = row_scale_[loop.row(k)] * speed[k];
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];
     if (edge.D_column < 0) continue;
-    const JointState<Space, S>& state = kinematics.joints()[edge.joint];
-    const Velocity<Space, S> mismatch = kinematics.ConstraintMismatch(edge.joint);
-    for (int k = 0; k < state.rows(); ++k) {
-      const int row = edge.D_column + k;
-      const DirectionParts& parts = edge.parts[edge.num_u + k];
-      e_t_[row] = Dot(parts, state.D(k), mismatch) * (parts.turns ? mechanism_->length() : S(1));
+    const Components<Space, S> speed = kinematics.ConstraintSpeed(edge.joint);
+    for (int k = 0; k < kinematics.joints()[edge.joint].rows(); ++k) {
+      const bool turns = edge.parts[edge.num_u + k].turns;
+      z_[r_ + d_ + edge.D_column + k] = speed[k] * (turns ? mechanism_->length() : S(1));
     }
   }
 }
 
 template <class Space, class S>
-void SelfStress<Space, S>::ProjectOnStress(VectorX<S>& z_t, VectorX<S>& z_c) {
-  MultiplyTransposed(T_, z_c, along_);
-  MultiplyTransposed(W_t_, z_t, missed_);
-  for (int q = 0; q < d_; ++q) along_[q] = z_c[r_ + q] - along_[q] + missed_[q];
+void SelfStress<Space, S>::ProjectOnStress() {
+  for (int q = 0; q < d_; ++q) along_[q] = Dot(W_.col(q).data(), z_.data(), z_.size());
   SolveBoth(C_, along_.data());
-  Multiply(T_, along_, z_c.head(r_));
-  Multiply(W_t_, along_, z_t);
-  for (int k = 0; k < r_; ++k) z_c[k] = -z_c[k];
-  z_c.tail(d_) = along_;
+  Multiply(W_, along_.data(), d_, z_.data());
 }
 
 template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::Feedback(const Kinematics<Space, S>& kinematics) {
   FillRates(kinematics);
-  Measure(kinematics);
-  // J [a; b] = e
-  x_.head(H_).setZero();
-  x_.tail(D_) = e_t_;
+  MeasureSpeeds(kinematics);
+  ProjectOnStress();
+  // z = W' W'^T e + W (..): J^T z = J'^T W W^T e'; released rows have no part of z
+  ColumnsOfRates(kinematics);
+  for (int k = 0; k < r_; ++k) z_[k] = Dot(rows_.col(k).data(), y_.data(), H_);
+  z_.segment(r_, d_).setZero();
+  SolveBoth(gram_, z_.data());
   if (D_ > 0) {
-    Times<false>(kinematics, x_, z_c_);
-    e_c_ -= z_c_;
+    SetForest(kinematics, z_.data(), 1);
+    z_.tail(D_) += y_.tail(D_);
   }
-  SolveBoth(gram_, e_c_.data());
-  Multiply(rows_, e_c_.head(r_), x_.head(H_));
-  // W (-W'^T e), from the rates of loops; rates of J_t vanish
-  Times<true>(kinematics, x_, z_c_);
-  z_t_.setZero();
-  ProjectOnStress(z_t_, z_c_);
-  // z = W' W'^T e: J^T z = J'^T W (-W'^T e) and W^T z = 0
-  TransposedTimes<true>(kinematics, z_c_, y_);
-  MultiplyTransposed(rows_, y_, z_c_.head(r_));
-  z_c_.tail(d_).setZero();
-  SolveBoth(gram_, z_c_.data());
-  if (D_ > 0) {
-    TransposedTimes<false>(kinematics, z_c_, x_);
-    z_t_ = y_.tail(D_) - x_.tail(D_);
-  }
-  e_c_ = z_c_;
-  e_t_ = z_t_;
-  ProjectOnStress(z_t_, z_c_);
-  z_c_ = e_c_ - z_c_;
-  z_t_ = e_t_ - z_t_;
-  ToRows(z_t_, z_c_, feedback_);
+  ToRows(feedback_);
   return feedback_;
 }
 
@@ -478,7 +415,7 @@ const VectorX<S>& SelfStress<Space, S>::ShareOfSpeeds(const Kinematics<Space, S>
     for (int q = 0; q < loop.num_released; ++q) {
       const int row = loop.rows_released[q];
       if (row < r_) continue;
-      missed_[row - r_] = row_scale_[row] * loop.basis[loop.num_u + loop.num_imposed + q].dot(V);
+      z_[row] = row_scale_[row] * loop.basis[loop.num_u + loop.num_imposed + q].dot(V);
     }
   }
   return Share();
@@ -493,79 +430,53 @@ const VectorX<S>& SelfStress<Space, S>::ShareOfAccelerations(
     for (int q = 0; q < loop.num_released; ++q) {
       const int row = loop.rows_released[q];
       if (row < r_) continue;
-      missed_[row - r_] = row_scale_[row] * left[loop.num_imposed + q] + z_c_[row];
+      z_[row] = row_scale_[row] * left[loop.num_imposed + q];
     }
   }
   return Share();
 }
 
 template <class Space, class S>
-const VectorX<S>& SelfStress<Space, S>::ForceOfStress(const VectorX<S>& lambda) {
-  if (!needs_multipliers()) return force_;
-  e_c_.setZero();
-  for (const Loop& loop : loops_) {
-    for (int k = 0; k < loop.num_imposed; ++k) {
-      const int row = loop.imposed + k;
-      e_c_[row] = lambda[mechanism_->joints()[loop.joint].row + k] * inverse_scale_[row];
-      if (k < loop.num_drives) continue;
-      for (const int q : loop.rows_released) {
-        if (q >= r_) e_c_[q] += T_(row, q - r_) * e_c_[row];
-      }
-    }
-  }
-  for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
-    const int row = r_ - mechanism_->num_moving_rows() + i;
-    e_c_[row] = lambda[FirstMovingEquation() + i] * inverse_scale_[row];
-  }
-  ProjectOnStress(e_t_, e_c_);
-  force_.setZero();
-  for (int k = 0; k < r_ + d_; ++k) force_ -= rows_.col(k) * e_c_[k];
-  force_ = force_.cwiseQuotient(column_scale_);
-  return force_;
-}
-
-template <class Space, class S>
 const VectorX<S>& SelfStress<Space, S>::Share() {
   // of W^T rho, rho = [-T_b; 1] missed
-  e_c_.tail(d_) = missed_;
-  e_c_.head(r_).setZero();
+  z_.head(r_).setZero();
   for (const Loop& loop : loops_) {
     for (int k = loop.num_drives; k < loop.num_imposed; ++k) {
+      const int row = loop.imposed + k;
       for (const int q : loop.rows_released) {
-        if (q >= r_) e_c_[loop.imposed + k] -= T_(loop.imposed + k, q - r_) * e_c_[q];
+        if (q >= r_) z_[row] += W_(row, q - r_) * z_[q];
       }
     }
   }
-  e_t_.setZero();
-  ProjectOnStress(e_t_, e_c_);
-  ToRows(e_t_, e_c_, share_);
+  z_.tail(D_).setZero();
+  ProjectOnStress();
+  ToRows(share_);
   return share_;
 }
 
 template <class Space, class S>
-void SelfStress<Space, S>::ToRows(const VectorX<S>& forest, const VectorX<S>& loops,
-                                  VectorX<S>& rows) const {
+void SelfStress<Space, S>::ToRows(VectorX<S>& rows) const {
   for (const Loop& loop : loops_) {
     for (int k = 0; k < loop.num_imposed; ++k) {
       const int row = loop.imposed + k;
-      S sum = loops[row];
+      S sum = z_[row];
       for (const int q : loop.rows_released) {
-        if (k >= loop.num_drives && q >= r_) sum += T_(row, q - r_) * loops[q];
+        if (k >= loop.num_drives && q >= r_) sum -= W_(row, q - r_) * z_[q];
       }
       rows[mechanism_->joints()[loop.joint].row + k] = sum * inverse_scale_[row];
     }
   }
   for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
     const int row = r_ - mechanism_->num_moving_rows() + i;
-    rows[FirstMovingEquation() + i] = loops[row] * inverse_scale_[row];
+    rows[FirstMovingEquation() + i] = z_[row] * inverse_scale_[row];
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];
     if (edge.D_column < 0) continue;
     const Joint<Space, S>& joint = mechanism_->joints()[edge.joint];
-    for (int k = 0; k < joint.num_constraints(); ++k) {
-      rows[joint.row + k] = forest[edge.D_column + k] * column_scale_[H_ + edge.D_column + k];
-    }
+    const S *from = z_.data() + r_ + d_ + edge.D_column,
+            *scale = column_scale_.data() + H_ + edge.D_column;
+    for (int k = 0; k < joint.num_constraints(); ++k) rows[joint.row + k] = from[k] * scale[k];
   }
 }
 

@@ -26,11 +26,10 @@
 // x0 violates c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong to one
 // joint, and rho must lie along W. The solution is x0 + y with U_b^T J y = U_b^T W W^T rho.
 // Multipliers then have a part along W, whose force J^T W W^T lambda is also of first order in e.
-// In joint coordinates this part is removed. In absolute ones it stays: without it, Bennett's
-// linkage drifted three times as far.
+// It stays: without it, Bennett's linkage drifted three times as far in absolute coordinates.
 //
-// Rates of W follow from J^T W = 0: W'^T e = -W^T J' J^+ e, W' x = -(J^+)^T J'^T W x.
-// Multiplication by J' and its transpose are sums along the loops, not matrices.
+// Rates of W follow from W^T e = 0, W'^T e = -W^T e', and from J^T W = 0, W' x = -(J^+)^T J'^T W x.
+// Multiplication by the transpose of J' is a sum along the loops, not a matrix.
 //
 // All this holds to first order in e, for rows that are derivatives of e to that order
 // (JointKind::exact_basis). Rotations are multiplied by the mechanism's length, so that all rows
@@ -68,8 +67,8 @@ class SelfStress {
           const int row = loop.rows_released[q];
           if (row < r_) continue;
           const S share =
-              T_(loop.imposed + k, row - r_) * row_scale_[row] * inverse_scale_[loop.imposed + k];
-          basis[loop.num_u + k] += basis[loop.num_u + loop.num_imposed + q] * Any(share);
+              W_(loop.imposed + k, row - r_) * row_scale_[row] * inverse_scale_[loop.imposed + k];
+          basis[loop.num_u + k] -= basis[loop.num_u + loop.num_imposed + q] * Any(share);
         }
       }
     }
@@ -85,11 +84,6 @@ class SelfStress {
   /// mass. Feedback() must have been called.
   const VectorX<S>& ShareOfAccelerations(const Kinematics<Space, S>& kinematics,
                                          std::span<const Acceleration<Space, S>> A);
-  /// Returns true if multipliers have a part along W that must be removed.
-  bool needs_multipliers() const { return D_ == 0; }
-  /// -J^T W W^T lambda: the generalised force that takes the part along W from multipliers lambda
-  /// of the imposed rows. Empty, and without use of lambda, unless needs_multipliers().
-  const VectorX<S>& ForceOfStress(const VectorX<S>& lambda);
 
  private:
   using Parts = std::array<DirectionParts, Space::kDim>;
@@ -134,27 +128,25 @@ class SelfStress {
   }
   void FillRows(const Kinematics<Space, S>& kinematics, Loop& loop);
   void FillRates(const Kinematics<Space, S>& kinematics);
-  /// gram_ and T_; the least pivot over the trace.
+  /// gram_ and T in W_; the least pivot over the trace.
   S FactorRows();
   /// Rates of directions that are fixed in P, times numbers with the sum V.
   template <class Kind>
   SpatialVector<Space, S, Kind> TurnWithP(const Kinematics<Space, S>& kinematics, int joint,
                                           const SpatialVector<Space, S, Kind>& V) const;
-  /// J x by the rows of loops for x without a part along H, or J' x.
-  template <bool kRates>
-  void Times(const Kinematics<Space, S>& kinematics, const VectorX<S>& x, VectorX<S>& rows) const;
-  /// Columns D of J^T z, or all of J'^T z.
-  template <bool kRates>
-  void TransposedTimes(const Kinematics<Space, S>& kinematics, const VectorX<S>& z,
-                       VectorX<S>& columns) const;
-  /// a = (W^T W)^-1 W^T [z_t; z_c], then W a in their place.
-  void ProjectOnStress(VectorX<S>& z_t, VectorX<S>& z_c);
-  /// e of the forest's rows and of the loops'.
-  void Measure(const Kinematics<Space, S>& kinematics);
-  /// Returns U_b^T W W^T rho, in the rows of the mechanism, for the violation of released rows.
+  /// z = -J_D^T z in the rows of the forest, from its rows of loops; of `count` vectors.
+  void SetForest(const Kinematics<Space, S>& kinematics, S* z, int count);
+  /// y = J'^T z.
+  void ColumnsOfRates(const Kinematics<Space, S>& kinematics);
+  /// z = e'.
+  void MeasureSpeeds(const Kinematics<Space, S>& kinematics);
+  /// z = W a with a = (W^T W)^-1 W^T z.
+  void ProjectOnStress();
+  /// Returns U_b^T W W^T rho, in the rows of the mechanism, for the violation of released rows,
+  /// which they have in z.
   const VectorX<S>& Share();
-  /// U_b^T of numbers of forest and loops, by the mechanism's rows, out of scale.
-  void ToRows(const VectorX<S>& forest, const VectorX<S>& loops, VectorX<S>& rows) const;
+  /// U_b^T z by the mechanism's rows, out of scale.
+  void ToRows(VectorX<S>& rows) const;
 
   const Mechanism<Space, S>* mechanism_;
   std::vector<Edge> edges_;  ///< by child body
@@ -167,8 +159,13 @@ class SelfStress {
   MatrixX<S> rows_;    ///< J_H transposed; rows and columns in scale
   /// Factors of rows and their inverses, and of columns: 1 / length.
   VectorX<S> row_scale_, inverse_scale_, column_scale_;
-  MatrixX<S> gram_, T_, C_, W_t_;  ///< gram_ and C_ = W^T W hold Cholesky factors
-  VectorX<S> e_t_, e_c_, x_, y_, z_t_, z_c_, missed_, along_, feedback_, share_, force_;
+  MatrixX<S> gram_, C_;  ///< Cholesky factors, C = W^T W
+  /// Numbers by rows of J: imposed and moving ones of loops, released ones, those of the forest. W
+  /// has -T, 1 and -J_D^T W_c there.
+  MatrixX<S> W_;
+  VectorX<S> z_;
+  VectorX<S> y_;  ///< numbers by columns of J
+  VectorX<S> along_, feedback_, share_;
 };
 
 }  // namespace loopbench

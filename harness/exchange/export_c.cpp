@@ -384,17 +384,6 @@ void Describe(const CodeRequest& request, const std::vector<int>& carried_speeds
 
 }  // namespace
 
-std::string Fill(std::string text, const std::map<std::string, std::string>& words) {
-  for (const auto& [word, value] : words) {
-    const std::string mark = "@" + word + "@";
-    for (std::size_t at = text.find(mark); at != std::string::npos;
-         at = text.find(mark, at + value.size())) {
-      text.replace(at, mark.size(), value);
-    }
-  }
-  return text;
-}
-
 std::map<std::string, std::string> WordsOf(const Code& code) {
   std::string upper = code.identifier;
   std::ranges::transform(upper, upper.begin(),

@@ -54,9 +54,6 @@ Code MakeCode(const CodeRequest& request);
 
 inline constexpr int kMaxCodeBranches = 16;
 
-/// Returns the text with each @WORD@ replaced by its value.
-std::string Fill(std::string text, const std::map<std::string, std::string>& words);
-
 /// Returns the words of all texts: ID, the identifier, and UP, the same in capitals.
 std::map<std::string, std::string> WordsOf(const Code& code);
 

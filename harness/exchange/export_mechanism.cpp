@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <utility>
 #include <variant>
 
 #include "harness/exchange/export_mjcf.h"
@@ -14,8 +12,6 @@
 
 namespace loopbench::exchange {
 namespace {
-
-Vec ToVec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
 /// Converts a pose; planar positions and rotations lie in z = 0.
 template <class Space>
@@ -51,13 +47,22 @@ class Maker {
     }
     for (const int index : mechanism.constraints())
       model_.cut.push_back(MakeJoint(mechanism, index));
-    for (const CouplingDescription& coupling : description_.couplings) {
-      Add(coupling);
-    }
+    for (const CouplingDescription& coupling : description_.couplings) Add(coupling);
     for (const ForceDescription& force : description_.forces) {
       std::visit([this](const auto& one) { Add(one); }, force);
     }
-    at_start ? PutAtStart(mechanism) : PutAtZero();
+    model_.q.assign(static_cast<std::size_t>(model_.num_q), 0.0);
+    model_.u.assign(static_cast<std::size_t>(model_.num_u), 0.0);
+    for (const Joint& joint : model_.tree) {
+      if (joint.num_q > joint.num_u) model_.q[joint.q] = 1.0;
+    }
+    if (!at_start) return std::move(model_);
+    const Start<double> start = Assemble<Space>(description_, mechanism);
+    if (start.outcome != Outcome::kFinished) {
+      throw std::runtime_error("its start cannot be assembled: " + start.message);
+    }
+    model_.q.assign(start.q.begin(), start.q.end());
+    model_.u.assign(start.u.begin(), start.u.end());
     return std::move(model_);
   }
 
@@ -68,9 +73,7 @@ class Maker {
     made.mass = body.mass;
     made.com = ToVec(body.com);
     for (const auto& [name, at] : body.points) made.points.emplace_back(name, ToVec(at - body.com));
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) made.inertia[3 * i + j] = body.inertia(i, j);
-    }
+    made.inertia = ToMatrix(body.inertia);
   }
 
   template <class Space>
@@ -179,24 +182,6 @@ class Maker {
     Miss("{}", PartsOf(copy).name);
   }
 
-  void PutAtZero() {
-    model_.q.assign(static_cast<std::size_t>(model_.num_q), 0.0);
-    model_.u.assign(static_cast<std::size_t>(model_.num_u), 0.0);
-    for (const Joint& joint : model_.tree) {
-      if (joint.num_q > joint.num_u) model_.q[joint.q] = 1.0;
-    }
-  }
-
-  template <class Space>
-  void PutAtStart(const Mechanism<Space, double>& mechanism) {
-    const Start<double> start = Assemble<Space>(description_, mechanism);
-    if (start.outcome != Outcome::kFinished) {
-      throw std::runtime_error("its start cannot be assembled: " + start.message);
-    }
-    model_.q.assign(start.q.begin(), start.q.end());
-    model_.u.assign(start.u.begin(), start.u.end());
-  }
-
   const MechanismDescription& description_;
   Model model_;
   std::vector<int> tree_of_;  ///< by joint of the description: index into the tree, or -1
@@ -207,13 +192,6 @@ Model Make(const MechanismDescription& description, bool at_start) {
   return description.space == SpaceKind::kPlanar ? maker.Make<Planar>(at_start)
                                                  : maker.Make<Spatial>(at_start);
 }
-
-}  // namespace
-
-Model MakeModel(const MechanismDescription& description) { return Make(description, false); }
-
-Model MakeModelAtStart(const MechanismDescription& description) { return Make(description, true); }
-namespace {
 
 /// Writes MJCF with all constraints, since MuJoCo regularizes redundant ones.
 ExportedFile WriteMjcf(const MechanismDescription& description, const ExportOptions& options) {
@@ -241,16 +219,14 @@ ExportedFile WriteSimbody(const MechanismDescription& description, const ExportO
 
 }  // namespace
 
-const std::vector<ExportFormat>& ExportFormats() {
-  static const std::vector<ExportFormat> kFormats = {
-      {"mjcf", ".xml", "MJCF, which MuJoCo loads", WriteMjcf},
-      {"simbody", ".cpp", "a C++17 program that builds the mechanism in Simbody", WriteSimbody}};
-  return kFormats;
-}
+Model MakeModel(const MechanismDescription& description) { return Make(description, false); }
 
-ExportedFile Export(const MechanismDescription& description, const ExportFormat& format,
-                    const ExportOptions& options) {
-  return format.write(description, options);
+Model MakeModelAtStart(const MechanismDescription& description) { return Make(description, true); }
+
+const std::vector<ExportFormat>& ExportFormats() {
+  static const std::vector<ExportFormat> kFormats = {{"mjcf", ".xml", WriteMjcf},
+                                                     {"simbody", ".cpp", WriteSimbody}};
+  return kFormats;
 }
 
 }  // namespace loopbench::exchange

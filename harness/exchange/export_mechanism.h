@@ -1,9 +1,7 @@
 // A mechanism as plain numbers, and as a file of another program.
 #pragma once
 
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "harness/exchange/model.h"
 #include "mechanism/description/description.h"
@@ -33,7 +31,7 @@ struct ExportedFile {
 
 /// An export format.
 struct ExportFormat {
-  std::string_view name, ending, sentence;
+  std::string_view name, ending;
   ExportedFile (*write)(const MechanismDescription& description, const ExportOptions& options);
 };
 
@@ -41,7 +39,9 @@ const std::vector<ExportFormat>& ExportFormats();
 
 /// Exports the mechanism at its assembled start, byte-reproducibly. Throws Unsupported with all
 /// unsupported parts, and std::runtime_error if assembly fails.
-ExportedFile Export(const MechanismDescription& description, const ExportFormat& format,
-                    const ExportOptions& options = {});
+inline ExportedFile Export(const MechanismDescription& description, const ExportFormat& format,
+                           const ExportOptions& options = {}) {
+  return format.write(description, options);
+}
 
 }  // namespace loopbench::exchange

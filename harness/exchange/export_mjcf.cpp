@@ -4,11 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <string>
-#include <vector>
 
 #include "harness/exchange/export_names.h"
 #include "mechanism/algebra/space.h"
@@ -27,16 +23,12 @@ constexpr double kMinMass = 1e-15;
 /// MuJoCo's parser rejects deeper documents.
 constexpr int kMaxNested = 90;
 
-Vec ToVec(const Vector3d& v) { return {v[0], v[1], v[2]}; }
-Vector3d ToEigen(const Vec& v) { return {v[0], v[1], v[2]}; }
-
 /// Return frames or points of the model relative to the user's origin of their body.
 Vector3d FromOrigin(const Model& model, int body, const Vec& at) {
   return ToEigen(model.bodies[body].com) + ToEigen(at);
 }
 loopbench::Frame FromOrigin(const Model& model, int body, const Frame& frame) {
-  return {Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(frame.R.data()),
-          FromOrigin(model, body, frame.p)};
+  return {ToEigen(frame.R), FromOrigin(model, body, frame.p)};
 }
 
 /// Returns w, x, y, z.
@@ -189,8 +181,10 @@ std::string Constant(double force) {
 
 // Shapes for MuJoCo's viewer, without mass and contact.
 
-/// Returns joint positions on each body from its origin, then its centre of mass.
-std::vector<std::vector<Vector3d>> PlacesOnBodies(const Model& model) {
+/// Returns `geom` elements by body: bars from its first joint to the others, or to its centre of
+/// mass if it has one joint; a ball if there is no bar.
+std::vector<std::vector<std::string>> ShapesOf(const Model& model) {
+  // joint positions on each body from its origin, then its centre of mass
   std::vector<std::vector<Vector3d>> places(model.bodies.size());
   const auto add = [&](int body, const Vec& at) {
     places[body].push_back(FromOrigin(model, body, at));
@@ -202,13 +196,6 @@ std::vector<std::vector<Vector3d>> PlacesOnBodies(const Model& model) {
     }
   }
   for (std::size_t b = 0; b < model.bodies.size(); ++b) add(static_cast<int>(b), {});
-  return places;
-}
-
-/// Returns `geom` elements by body: bars from its first joint to the others, or to its centre of
-/// mass if it has one joint; a ball if there is no bar.
-std::vector<std::vector<std::string>> ShapesOf(const Model& model) {
-  const auto places = PlacesOnBodies(model);
   double size = 0.0;  // size of the largest body
   for (std::size_t b = 1; b < places.size(); ++b) {
     for (const Vector3d& at : places[b]) size = std::max(size, (at - places[b].front()).norm());
@@ -252,7 +239,12 @@ class MjcfWriter {
   }
 
   Mjcf Write() {
-    NameBodies();
+    UniqueNames names({"world"});
+    body_names_.push_back("world");
+    for (std::size_t i = 1; i < model_.bodies.size(); ++i) {
+      const std::string& given = model_.bodies[i].name;
+      body_names_.push_back(Renamed("body", given, names.Take(XmlText(given))));
+    }
     AddPoints();
     for (const Joint& joint : model_.cut) AddClosures(joint);
     for (const SpringDamper& force : model_.spring_dampers) AddSpringDamper(force);
@@ -287,21 +279,15 @@ class MjcfWriter {
   }
 
  private:
-  void Say(const std::string& text) { made_.notes.push_back({false, text}); }
+  template <class... Values>
+  void Say(fmt::format_string<Values...> text, Values&&... values) {
+    made_.notes.push_back({false, fmt::format(text, std::forward<Values>(values)...)});
+  }
 
   /// Returns `name`, which represents the user's `given`; adds a note if they differ.
   std::string Renamed(const char* what, const std::string& given, std::string name) {
-    if (name != given) Say(fmt::format("{} \"{}\" is called \"{}\".", what, given, name));
+    if (name != given) Say("{} \"{}\" is called \"{}\".", what, given, name);
     return name;
-  }
-
-  void NameBodies() {
-    UniqueNames names({"world"});
-    body_names_.push_back("world");
-    for (std::size_t i = 1; i < model_.bodies.size(); ++i) {
-      const std::string& given = model_.bodies[i].name;
-      body_names_.push_back(Renamed("body", given, names.Take(XmlText(given))));
-    }
   }
 
   /// Adds a site and returns its name.
@@ -408,8 +394,7 @@ class MjcfWriter {
     const double sign = joint.from_is_child ? -1.0 : 1.0;
     if (constant != 0.0) {
       actuators_ += "    <general" + Named("joint", name) + Constant(sign * constant) + "/>\n";
-      Say(fmt::format("The constant effort along joint \"{}\" is an actuator without control.",
-                      joint.name));
+      Say("The constant effort along joint \"{}\" is an actuator without control.", joint.name);
     }
     std::string text;
     if (stiffness != 0.0) {
@@ -430,7 +415,7 @@ class MjcfWriter {
     made.sign = joint.from_is_child ? -1.0 : 1.0;
     const double* u = model_.u.data() + made.u;
     if (made.ball) {
-      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(made.axes.data()) = chain.axes;
+      made.axes = ToMatrix(chain.axes);
       // MuJoCo's speeds are in axes of the moved body
       Vector3d w = made.sign * Vector3d(u[0], u[1], u[2]);
       if (made.sign > 0.0) w = chain.turn.transpose() * w;
@@ -445,20 +430,19 @@ class MjcfWriter {
 
   void SayParts(const Joint& joint, const std::vector<std::string>& names) {
     if (names.empty()) {
-      Say(fmt::format("joint \"{}\" (weld) is body \"{}\" without a joint.", joint.name,
-                      model_.bodies[joint.child()].name));
+      Say("joint \"{}\" (weld) is body \"{}\" without a joint.", joint.name,
+          model_.bodies[joint.child()].name);
     }
     if (names.size() > 1) {
-      Say(fmt::format("joint \"{}\" ({}) is written as joints \"{}\" of one body.", joint.name,
-                      joint.kind, fmt::join(names, "\", \"")));
+      Say("joint \"{}\" ({}) is written as joints \"{}\" of one body.", joint.name, joint.kind,
+          fmt::join(names, "\", \""));
     }
     if (joint.from_is_child && !names.empty()) {
-      Say(fmt::format(
-          "joint \"{}\" is seen from its second body: coordinates have the opposite sign.",
-          joint.name));
+      Say("joint \"{}\" is seen from its second body: coordinates have the opposite sign.",
+          joint.name);
     }
     if (joint.num_q > joint.num_u) {
-      Say(fmt::format("joint \"{}\": the quaternion is counted from the start.", joint.name));
+      Say("joint \"{}\": the quaternion is counted from the start.", joint.name);
     }
   }
 
@@ -495,8 +479,8 @@ class MjcfWriter {
     const std::string pairs = points.size() == 1
                                   ? "a pair of points is"
                                   : fmt::format("{} pairs of points are", points.size());
-    Say(fmt::format("joint \"{}\" ({}) closes a loop: {} held {}.", joint.name, kind, pairs,
-                    kind == "rod" ? "at a distance, by a tendon" : "together"));
+    Say("joint \"{}\" ({}) closes a loop: {} held {}.", joint.name, kind, pairs,
+        kind == "rod" ? "at a distance, by a tendon" : "together");
   }
 
   void AddClosure(const Joint& joint, const Vector3d& at, const std::string& name) {
@@ -540,7 +524,7 @@ class MjcfWriter {
     if (force.preload == 0.0) return;
     // positive tension shortens
     actuators_ += "    <general" + Named("tendon", name) + Constant(-force.preload) + "/>\n";
-    Say(fmt::format("The preload of {} is an actuator without control.", name));
+    Say("The preload of {} is an actuator without control.", name);
   }
 
   void AddPointForce(const PointForce& force) {
@@ -555,8 +539,7 @@ class MjcfWriter {
     actuators_ += "    <general" + sites +
                   Attribute("gear", std::array{F[0], F[1], F[2], 0.0, 0.0, 0.0}) + Constant(1.0) +
                   "/>\n";
-    Say(fmt::format("{} on body \"{}\" is an actuator without control.", name,
-                    model_.bodies[body].name));
+    Say("{} on body \"{}\" is an actuator without control.", name, model_.bodies[body].name);
   }
 
   const Model& model_;

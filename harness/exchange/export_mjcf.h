@@ -12,9 +12,6 @@
 // 1e-4.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "harness/exchange/model.h"
 
 namespace loopbench::exchange {

@@ -31,6 +31,17 @@ void Replace(std::string& text, std::string_view what, std::string_view by) {
   }
 }
 
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Returns the largest moment minus the sum of the others.
+double Excess(const Vector3d& moments) { return 2.0 * moments.maxCoeff() - moments.sum(); }
+
+/// Bounds round-off: an eigenvalue has an error of some eps times the largest; three are compared.
+double RoundOff(const Vector3d& moments) {
+  return 16.0 * std::numeric_limits<double>::epsilon() * moments.maxCoeff();
+}
+
 }  // namespace
 
 std::string XmlText(std::string_view text) {
@@ -103,6 +114,17 @@ std::string NumberText(double value) {
   return text;
 }
 
+std::string Fill(std::string text, const std::map<std::string, std::string>& words) {
+  for (const auto& [word, value] : words) {
+    const std::string mark = "@" + word + "@";
+    for (std::size_t at = text.find(mark); at != std::string::npos;
+         at = text.find(mark, at + value.size())) {
+      text.replace(at, mark.size(), value);
+    }
+  }
+  return text;
+}
+
 std::string UniqueNames::Take(const std::string& wanted) {
   const std::string name = wanted.empty() ? "unnamed" : wanted;
   if (Add(name)) return name;
@@ -118,24 +140,8 @@ std::string ShownKind(const Joint& joint) {
   return fmt::format("joint \"{}\": {}", joint.name, joint.kind);
 }
 
-namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
-/// Returns the largest moment minus the sum of the others.
-double Excess(const Vector3d& moments) { return 2.0 * moments.maxCoeff() - moments.sum(); }
-
-/// Bounds round-off: an eigenvalue has an error of some eps times the largest; three are compared.
-double RoundOff(const Vector3d& moments) {
-  return 16.0 * std::numeric_limits<double>::epsilon() * moments.maxCoeff();
-}
-
-}  // namespace
-
 PrincipalInertia PrincipalInertiaOf(const Body& body, bool planar) {
-  const Matrix3d I =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(body.inertia.data());
+  const Matrix3d I = ToEigen(body.inertia);
   PrincipalInertia made;
   if (planar) {
     made.moments.setConstant(I(2, 2));

@@ -4,14 +4,22 @@
 #include <Eigen/Core>
 #include <map>
 #include <set>
-#include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "harness/exchange/model.h"
 
 namespace loopbench::exchange {
+
+// Numbers of a model as vectors and matrices of Eigen.
+
+inline Vec ToVec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
+inline Eigen::Vector3d ToEigen(const Vec& v) { return {v[0], v[1], v[2]}; }
+inline Matrix ToMatrix(const Eigen::Matrix3d& A) {
+  return {A(0, 0), A(0, 1), A(0, 2), A(1, 0), A(1, 1), A(1, 2), A(2, 0), A(2, 1), A(2, 2)};
+}
+inline Eigen::Matrix3d ToEigen(const Matrix& A) {
+  return Eigen::Matrix3d{{A[0], A[1], A[2]}, {A[3], A[4], A[5]}, {A[6], A[7], A[8]}};
+}
 
 // Escaping of user names in exported documents and programs: unchanged text if the language allows
 // it, and never code.
@@ -40,6 +48,9 @@ std::string QuoteCpp(std::string_view text);
 /// Returns the shortest text that reads back as this number, always with a point or an exponent.
 /// Subnormal numbers, which stream readers reject, become zero.
 std::string NumberText(double value);
+
+/// Returns the text with each @WORD@ replaced by its value.
+std::string Fill(std::string text, const std::map<std::string, std::string>& words);
 
 /// Names that are unique within a document.
 class UniqueNames {

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <map>
 #include <optional>
 
 #include "harness/exchange/export_names.h"
@@ -21,12 +19,9 @@ constexpr const char* kHead = R"(//
 //
 )";
 
-// The texts are separate files, because a program prints differently from Loopbench.
-constexpr const char* kDeclarations =
-#include "harness/exchange/export_simbody_begin.inc"
-    ;
-constexpr const char* kTail =
-#include "harness/exchange/export_simbody_end.inc"
+// The text is a separate file, because a program prints differently from Loopbench.
+constexpr const char* kProgram =
+#include "harness/exchange/export_simbody.inc"
     ;
 
 using Type = SimbodyConstraintType;
@@ -183,38 +178,6 @@ void AddForces(const Model& model, std::vector<SimbodyForce>* forces) {
   }
 }
 
-}  // namespace
-
-SimbodyParts MakeSimbodyParts(const Model& model) {
-  std::vector<std::string> missing = model.missing;
-  SimbodyParts parts;
-  for (std::size_t i = 0; i < model.tree.size(); ++i) {
-    const SimbodyMobilizer& made = parts.mobilizers.emplace_back(MakeMobilizer(model, i));
-    if (made.type.empty()) missing.push_back(ShownKind(model.tree[i]));
-  }
-  for (std::size_t i = 0; i < model.cut.size(); ++i) {
-    const auto closure = ClosureOf(model.cut[i], model.planar);
-    if (!closure) missing.push_back(ShownKind(model.cut[i]) + ", which closes a loop");
-    for (const Row& row : closure.value_or(Rows())) {
-      parts.constraints.push_back({row.type, i, row.axis_on_F, row.axis_on_M});
-    }
-  }
-  for (const PointForce& force : model.point_forces) {
-    if (!force.in_body_axes) continue;
-    const Body& body = model.bodies[force.point.body];
-    missing.push_back("point_force on body \"" + body.name + "\", in its axes");
-  }
-  for (std::size_t i = 1; i < model.bodies.size(); ++i) {
-    const std::string fault = FaultOfInertia(model.bodies[i], model.planar);
-    if (!fault.empty()) missing.push_back(fault);
-  }
-  if (!missing.empty()) throw Unsupported(std::move(missing));
-  AddCouplers(model, &parts);
-  AddForces(model, &parts.forces);
-  return parts;
-}
-namespace {
-
 using fmt::format;
 
 template <class Range>
@@ -252,25 +215,28 @@ class Writer {
   }
 
   SimbodyProgramText Write() {
-    std::string tree, closures, couplers, forces;
-    for (const SimbodyMobilizer& one : parts_.mobilizers) tree += Text(one);
-    for (const SimbodyConstraint& one : parts_.constraints) closures += Text(one);
-    for (std::size_t i = 0; i < parts_.couplers.size(); ++i) couplers += CouplerText(i);
-    for (const SimbodyForce& one : parts_.forces) forces += Text(one);
+    std::string constructor = "Mechanism::Mechanism() {\n  body.push_back(matter.Ground());\n";
+    for (const SimbodyMobilizer& one : parts_.mobilizers) constructor += Text(one);
+    for (const SimbodyConstraint& one : parts_.constraints) constructor += Text(one);
+    for (std::size_t i = 0; i < parts_.couplers.size(); ++i) constructor += CouplerText(i);
+    constructor += format("  Force::Gravity(forces, matter, {});\n", Point(model_.gravity));
+    for (const SimbodyForce& one : parts_.forces) constructor += Text(one);
+    constructor += "}\n\n";
     AddNotes();
     made_.program =
         CommentLines("// ", "\"" + model_.name +
                                 "\", a mechanism of Loopbench at its assembled start, as a program "
                                 "for Simbody 3.7. SI units, angles in rad.") +
-        kHead + CommentOfNotes("// ", made_.notes) + kDeclarations +
-        "Mechanism::Mechanism() {\n  body.push_back(matter.Ground());\n" + tree + closures +
-        couplers + format("  Force::Gravity(forces, matter, {});\n", Point(model_.gravity)) +
-        forces + "}\n\n" + Start() + Names() + kTail;
+        kHead + CommentOfNotes("// ", made_.notes) +
+        Fill(kProgram, {{"MECHANISM", constructor + Start() + Names()}});
     return std::move(made_);
   }
 
  private:
-  void Say(const std::string& text) { made_.notes.push_back({false, text}); }
+  template <class... Values>
+  void Say(fmt::format_string<Values...> text, Values&&... values) {
+    made_.notes.push_back({false, fmt::format(text, std::forward<Values>(values)...)});
+  }
 
   std::string BodyText(int body) const { return format("body[{}]", number_[body]); }
 
@@ -389,17 +355,15 @@ class Writer {
     Say("Body frames have the user's axes and lie in centres of mass.");
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
       if (one.sign > 0.0) continue;
-      Say(
-          format("joint \"{}\" is a {} with coordinates of the opposite sign; what is printed has "
-                 "the user's.",
-                 model_.tree[one.joint].name, one.type));
+      Say("joint \"{}\" is a {} with coordinates of the opposite sign; what is printed has "
+          "the user's.",
+          model_.tree[one.joint].name, one.type);
     }
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
       if (!one.is_flywheel) continue;
-      Say(
-          format("rotor_inertia of joint \"{}\" is a flywheel on Ground, whose angle is the "
-                 "coordinate of the joint.",
-                 model_.tree[one.joint].name));
+      Say("rotor_inertia of joint \"{}\" is a flywheel on Ground, whose angle is the "
+          "coordinate of the joint.",
+          model_.tree[one.joint].name);
     }
     for (const Joint& joint : model_.cut) {
       if (joint.kind == "free") continue;
@@ -408,8 +372,8 @@ class Writer {
         released = format(", in {} directions; what it holds beyond these follows from the others",
                           joint.imposed.size());
       }
-      Say(format("joint \"{}\" ({}) closes a loop: it is made of constraints{}.", joint.name,
-                 joint.kind, released));
+      Say("joint \"{}\" ({}) closes a loop: it is made of constraints{}.", joint.name, joint.kind,
+          released);
     }
   }
 
@@ -420,6 +384,35 @@ class Writer {
 };
 
 }  // namespace
+
+SimbodyParts MakeSimbodyParts(const Model& model) {
+  std::vector<std::string> missing = model.missing;
+  SimbodyParts parts;
+  for (std::size_t i = 0; i < model.tree.size(); ++i) {
+    const SimbodyMobilizer& made = parts.mobilizers.emplace_back(MakeMobilizer(model, i));
+    if (made.type.empty()) missing.push_back(ShownKind(model.tree[i]));
+  }
+  for (std::size_t i = 0; i < model.cut.size(); ++i) {
+    const auto closure = ClosureOf(model.cut[i], model.planar);
+    if (!closure) missing.push_back(ShownKind(model.cut[i]) + ", which closes a loop");
+    for (const Row& row : closure.value_or(Rows())) {
+      parts.constraints.push_back({row.type, i, row.axis_on_F, row.axis_on_M});
+    }
+  }
+  for (const PointForce& force : model.point_forces) {
+    if (!force.in_body_axes) continue;
+    const Body& body = model.bodies[force.point.body];
+    missing.push_back("point_force on body \"" + body.name + "\", in its axes");
+  }
+  for (std::size_t i = 1; i < model.bodies.size(); ++i) {
+    const std::string fault = FaultOfInertia(model.bodies[i], model.planar);
+    if (!fault.empty()) missing.push_back(fault);
+  }
+  if (!missing.empty()) throw Unsupported(std::move(missing));
+  AddCouplers(model, &parts);
+  AddForces(model, &parts.forces);
+  return parts;
+}
 
 SimbodyProgramText WriteSimbodyProgram(const Model& model) { return Writer(model).Write(); }
 

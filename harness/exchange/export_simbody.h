@@ -1,10 +1,6 @@
 // A mechanism as a C++ program of Simbody.
 #pragma once
 
-#include <array>
-#include <string>
-#include <vector>
-
 #include "harness/exchange/model.h"
 
 namespace loopbench::exchange {

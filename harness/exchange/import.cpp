@@ -1,12 +1,6 @@
 #include "harness/exchange/import.h"
 
-#include <fmt/format.h>
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <set>
 #include <tuple>
 
 #include "harness/config/mechanism_sections.h"
@@ -50,24 +44,10 @@ Imported Import(std::string_view text, const std::string& file,
   return draft.Finish(format);
 }
 
-}  // namespace
-
-Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
-  return Import(text, file, std::nullopt, options);
-}
-
-Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options) {
-  return Import(ReadTextFile(path), path.string(), path, options);
-}
-
 // Steps common to all formats after the import.
 
-namespace {
-
 /// Reason why a body cannot move by itself, and the required values; "" if it can.
-struct MassFault {
-  std::string found, expected;
-};
+using MassFault = std::pair<std::string, std::string>;
 
 MassFault MassFaultOf(const BodyDescription& body) {
   constexpr double kPrinted = 0.01;  // precision of mechanism files (mechanism_bodies.cpp)
@@ -138,14 +118,134 @@ std::function<Cluster(int)> ClusterFinder(const MechanismDescription& d,
   };
 }
 
+// Sidecar: loops, forces and a start that the other format cannot express, with the keys of
+// mechanism files (docs/exchange.md).
+
+/// The present mechanism, and poses of its bodies in ground axes at zero coordinates, where loops
+/// given on one side close.
+struct Sidecar : Draft {
+  std::vector<Frame> at_rest;
+  bool has_gravity = false;
+};
+
+/// A joint given on one side: at rest its other frame coincides.
+struct Loop : JointDescription {};
+using LoopPart = PartOf<Loop>;
+
+const Fields<LoopPart>& LoopFields() {
+  const auto read_type = [](const JsonNode& node, LoopPart& loop) {
+    loop.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
+    if (!TraitsOf(loop.type).parameter.key.empty() || loop.type == JointType::kFree) {
+      node.Fail("a type without a number of its own: others stand in \"joints\"");
+    }
+  };
+  const auto read_second = [](const JsonNode& node, LoopPart& loop) {
+    loop.to.body = ReadBodyName(node, *loop.draft).value_or(-1);
+    if (loop.to.body >= 0 && loop.to.body == loop.from.body) node.Fail("another body");
+  };
+  const auto read_axis = [](const JsonNode& node, LoopPart& loop) {
+    loop.axis = ReadVector(node, loop.draft->space);
+    if (TraitsOf(loop.type).own_axis == '-') {
+      node.Fail(fmt::format("no axis of a {} joint", ToString(loop.type)));
+    } else if (loop.axis.isZero()) {
+      node.Fail("an axis that is not zero");
+    }
+  };
+  const auto body = [](Loop& loop) -> int& { return loop.from.body; };
+  const auto at = [](Loop& loop) -> Eigen::Vector3d& { return loop.from.position; };
+  static const Fields<LoopPart> fields(
+      "loop", "A joint given on one side, which closes where all coordinates are 0.",
+      {{"name", NewName<Loop>(&Loop::name, &Draft::joint_names), "One that no other joint has.",
+        "a name"},
+       {"type", By<LoopPart>(ChoiceSchema(JointTypeNames().all()), read_type),
+        "What it leaves free.", "a joint type"},
+       {"from", BodyOf<Loop>(body, true), "A body's name or \"ground\".", "the name of a body"},
+       {"to", By<LoopPart>(TextSchema(), read_second), "Another.", "the name of a body"},
+       {"at", PlaceOf<Loop>(body, at), "The joint in axes of `from` [m].",
+        "a point of `from`, or coordinates in its axes"},
+       {"axis", By<LoopPart>(VectorSchema(), read_axis), "In axes of `from`."}});
+  return fields;
+}
+
+void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
+  for (const JsonNode& element : node.Elements("loops")) {
+    Loop loop;
+    loop.from.body = loop.to.body = -1;
+    loop = ReadPart(LoopFields(), element, sidecar, loop);
+    if (loop.from.body >= 0 && loop.to.body >= 0) {
+      // the other side from the body poses
+      const auto& rest = sidecar.at_rest;
+      const Frame X_QP = rest[loop.to.body].Inverse() * rest[loop.from.body];
+      const Eigen::AngleAxisd turn{Eigen::Quaterniond(X_QP.R)};
+      loop.to.position = X_QP.R * loop.from.position + X_QP.p;
+      loop.to.rotation = turn.angle() * turn.axis();
+      loop.cut = true;
+    }
+    sidecar.joints.push_back(loop);
+    sidecar.joint_names.Add(loop.name);
+  }
+}
+
+const Fields<Sidecar>& SidecarFields() {
+  const auto read_gravity = [](const JsonNode& node, Sidecar& sidecar) {
+    sidecar.gravity = ReadVector(node, sidecar.space);
+    sidecar.has_gravity = true;
+  };
+  static const Fields<Sidecar> fields(
+      "sidecar", "What a description of another program cannot say.",
+      {{"comment", Text(&Draft::comment), "Free text for readers."},
+       {"gravity", By<Sidecar>(VectorSchema(), read_gravity), "In place of the file's [m/s^2]."},
+       {"loops", By(ArraySchema(LoopFields().Schema()), ReadLoops), "Joints given on one side."},
+       {"joints", JointsValue(), "Joints given on both sides."},
+       {"couplings", CouplingsValue(), "Linear relations of joint coordinates."},
+       {"forces", ForcesValue(), "Besides gravity."},
+       {"initial", Section(InitialFields()), "In place of the file's start."},
+       {"known_solution", Section(ObservationFields()),
+        "Exact facts that observers compare with."}});
+  return fields;
+}
+
+/// Adds the content of the file to `description`; its start replaces the given one. Throws
+/// ConfigError with all mistakes, one per line.
+Sidecar ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
+                    MechanismDescription* description) {
+  Sidecar sidecar;
+  static_cast<MechanismDescription&>(sidecar) = *description;
+  sidecar.at_rest = at_rest;
+  for (const BodyDescription& body : sidecar.bodies) sidecar.body_names.Add(body.name);
+  for (const JointDescription& joint : sidecar.joints) sidecar.joint_names.Add(joint.name);
+  ReadDocument(ReadTextFile(path), path.string(),
+               [&](const JsonNode& root) { return SidecarFields().Read(root, &sidecar); });
+  *description = static_cast<MechanismDescription&>(sidecar);
+  return sidecar;
+}
+
 }  // namespace
+
+Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
+  return Import(text, file, std::nullopt, options);
+}
+
+Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options) {
+  return Import(ReadTextFile(path), path.string(), path, options);
+}
+
+std::vector<int> FixedTogether(const MechanismDescription& description) {
+  const std::vector<bool> sound(description.bodies.size(), true);
+  const auto cluster_of = ClusterFinder(description, sound, true);
+  std::vector<int> groups(sound.size(), -1);
+  for (int i = 0; i < std::ssize(groups); ++i) {
+    if (groups[i] >= 0) continue;
+    for (const int body : cluster_of(i).members) groups[body] = i;
+  }
+  return groups;
+}
 
 void ImportDraft::ReadLateMasses() const {
   if (late_masses_.empty()) return;
-  const std::vector<bool> sound(description.bodies.size(), true);
-  const Cluster fixed = ClusterFinder(description, sound, true)(kGround);
+  const std::vector<int> groups = FixedTogether(description);
   for (const auto& [body, read] : late_masses_) {
-    if (!fixed.poses.contains(body)) read();
+    if (groups[body] != kGround) read();
   }
 }
 
@@ -153,7 +253,7 @@ void ImportDraft::MergeFixed(bool whole) {
   const std::size_t count = description.bodies.size();
   std::vector<bool> sound(count), seen(count);
   for (std::size_t i = 0; i < count; ++i) {
-    sound[i] = i == kGround || MassFaultOf(description.bodies[i]).found.empty();
+    sound[i] = i == kGround || MassFaultOf(description.bodies[i]).first.empty();
   }
   std::vector<Attachment> attachments(count);
   const auto cluster_of = ClusterFinder(description, sound, whole);
@@ -164,10 +264,8 @@ void ImportDraft::MergeFixed(bool whole) {
     for (const int body : cluster.members) {
       seen[body] = true;
       if (body == cluster.carrier) continue;
-      attachments[body] = {
-          .carrier = cluster.carrier,
-          .X = cluster.poses.at(cluster.carrier).Inverse() * cluster.poses.at(body),
-          .attached = true};
+      const Frame X = cluster.poses.at(cluster.carrier).Inverse() * cluster.poses.at(body);
+      attachments[body] = {cluster.carrier, X, 0.0, true};
       const BodyDescription& merged = description.bodies[body];
       const char* why = merged.mass == 0.0 ? "without mass and fixed"
                         : sound[body]      ? "fixed to a body without an inertia of its own"
@@ -178,19 +276,18 @@ void ImportDraft::MergeFixed(bool whole) {
       Note(elements_[body], reason);
     }
   }
-  if (std::ranges::any_of(attachments, &Attachment::attached)) Attach(attachments);
+  Attach(attachments);
 }
 
 void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
+  if (std::ranges::none_of(attachments, &Attachment::attached)) return;
   Renumbering renumbering;
-  MechanismDescription merged_description =
-      MergeRigidBodies(description, attachments, &renumbering);
+  MechanismDescription merged = MergeRigidBodies(description, attachments, &renumbering);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
     if (renumbering.joints[j] >= 0 || joint.type == JointType::kWeld) continue;
     Note(elements_[joint.to.body],
-         fmt::format("joint \"{}\" dropped: it leads from a body to what is fixed to it",
-                     joint.name));
+         "joint \"" + joint.name + "\" dropped: it leads from a body to what is fixed to it");
   }
   for (const CouplingDescription& coupling : description.couplings) {
     const auto lost = std::ranges::find_if(
@@ -210,9 +307,9 @@ void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
       }
     }
     pose.body = renumbering.bodies[pose.body];
-    merged_description.initial.poses.push_back(pose);
+    merged.initial.poses.push_back(pose);
   }
-  description = std::move(merged_description);
+  description = std::move(merged);
   for (std::size_t i = 0; i < attachments.size(); ++i) {
     const int kept = renumbering.bodies[i];  // never above i
     if (kept < 0) continue;
@@ -259,15 +356,14 @@ void ImportDraft::FixMasslessEnds() {
       const int carrier = joint.from.body == body ? joint.to.body : joint.from.body;
       if (carrier == kGround || attachments[carrier].attached) continue;
       if (CouplesOthers(joints[i][0])) continue;
-      attachments[i] = {.carrier = carrier,
-                        .X = (at_rest[carrier].Inverse() * at_rest[i]).AsFrame(),
-                        .attached = true};
+      const Placement X = at_rest[carrier].Inverse() * at_rest[i];
+      attachments[i] = {carrier, X.AsFrame(), 0.0, true};
       if (noted.insert(elements_[i].id()).second) {
         Note(elements_[i], "without mass at the end of a chain: fixed where it is drawn");
       }
       found = true;
     }
-    if (found) Attach(attachments);
+    Attach(attachments);
   }
 }
 
@@ -287,8 +383,8 @@ void ImportDraft::CheckMasses() {
                        body.inertia(0, 0)),
            true);
     }
-    const MassFault fault = MassFaultOf(description.bodies[i]);
-    if (!fault.found.empty()) elements_[i].Fail(fault.found, fault.expected);
+    const auto [found, expected] = MassFaultOf(body);
+    if (!found.empty()) elements_[i].Fail(found, expected);
   }
 }
 
@@ -296,123 +392,11 @@ void ImportDraft::HoldFloatingParts() {
   for (const Island& island : FindIslands(description, Connection::kJoints)) {
     if (island.grounded) continue;
     const int root = island.bodies.front();
-    AddJoint(NameLater(description.bodies[root].name), JointType::kFree, kGround, {}, root, {});
+    AddJoint(NameLater(description.bodies[root].name), JointType::kFree, {}, {root, {}});
     description.initial.coordinates.push_back({last_joint(), at_rest[root].AsCoordinates()});
   }
   NameJoints();
 }
-
-namespace {
-
-// Sidecar: loops, forces and a start that the other format cannot express, with the keys of
-// mechanism files (docs/exchange.md).
-
-/// The present mechanism, and poses of its bodies in ground axes at zero coordinates, where loops
-/// given on one side close.
-struct Sidecar : Draft {
-  std::vector<Frame> at_rest;
-  bool has_gravity = false;
-};
-
-/// A joint given on one side: at rest its other frame coincides.
-struct Loop : JointDescription {};
-using LoopPart = PartOf<Loop>;
-
-void ReadTypeOfLoop(const JsonNode& node, LoopPart& loop) {
-  loop.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
-  if (!TraitsOf(loop.type).parameter.key.empty() || loop.type == JointType::kFree) {
-    node.Fail("a type without a number of its own: others stand in \"joints\"");
-  }
-}
-
-void ReadSecond(const JsonNode& node, LoopPart& loop) {
-  loop.to.body = ReadBodyName(node, *loop.draft).value_or(-1);
-  if (loop.to.body >= 0 && loop.to.body == loop.from.body) node.Fail("another body");
-}
-
-void ReadAxisOfLoop(const JsonNode& node, LoopPart& loop) {
-  loop.axis = ReadVector(node, loop.draft->space);
-  if (TraitsOf(loop.type).own_axis == '-') {
-    node.Fail(fmt::format("no axis of a {} joint", ToString(loop.type)));
-  } else if (loop.axis.isZero()) {
-    node.Fail("an axis that is not zero");
-  }
-}
-
-const Fields<LoopPart>& LoopFields() {
-  const auto body = [](Loop& loop) -> int& { return loop.from.body; };
-  const auto at = [](Loop& loop) -> Eigen::Vector3d& { return loop.from.position; };
-  static const Fields<LoopPart> fields(
-      "loop", "A joint given on one side, which closes where all coordinates are 0.",
-      {{"name", NewName<Loop>(&Loop::name, &Draft::joint_names), "One that no other joint has.",
-        "a name"},
-       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadTypeOfLoop), "What it leaves free.",
-        "a joint type"},
-       {"from", BodyOf<Loop>(body, true), "A body's name or \"ground\".", "the name of a body"},
-       {"to", By(TextSchema(), ReadSecond), "Another.", "the name of a body"},
-       {"at", PlaceOf<Loop>(body, at), "The joint in axes of `from` [m].",
-        "a point of `from`, or coordinates in its axes"},
-       {"axis", By(VectorSchema(), ReadAxisOfLoop), "In axes of `from`."}});
-  return fields;
-}
-
-/// Computes the other side from the body poses.
-void CloseAtRest(const std::vector<Frame>& at_rest, JointDescription* joint) {
-  if (joint->from.body < 0 || joint->to.body < 0) return;
-  const Frame X_QP = at_rest[joint->to.body].Inverse() * at_rest[joint->from.body];
-  joint->to.position = X_QP.R * joint->from.position + X_QP.p;
-  const Eigen::AngleAxisd turn{Eigen::Quaterniond(X_QP.R)};
-  joint->to.rotation = turn.angle() * turn.axis();
-  joint->cut = true;
-}
-
-void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
-  for (const JsonNode& element : node.Elements("loops")) {
-    Loop loop;
-    loop.from.body = loop.to.body = -1;
-    loop = ReadPart(LoopFields(), element, sidecar, loop);
-    CloseAtRest(sidecar.at_rest, &loop);
-    sidecar.joints.push_back(loop);
-    sidecar.joint_names.Add(loop.name);
-  }
-}
-
-void ReadGravityOfSidecar(const JsonNode& node, Sidecar& sidecar) {
-  sidecar.gravity = ReadVector(node, sidecar.space);
-  sidecar.has_gravity = true;
-}
-
-const Fields<Sidecar>& SidecarFields() {
-  static const Fields<Sidecar> fields(
-      "sidecar", "What a description of another program cannot say.",
-      {{"comment", Text(&Draft::comment), "Free text for readers."},
-       {"gravity", By(VectorSchema(), ReadGravityOfSidecar), "In place of the file's [m/s^2]."},
-       {"loops", By(ArraySchema(LoopFields().Schema()), ReadLoops), "Joints given on one side."},
-       {"joints", JointsValue(), "Joints given on both sides."},
-       {"couplings", CouplingsValue(), "Linear relations of joint coordinates."},
-       {"forces", ForcesValue(), "Besides gravity."},
-       {"initial", Section(InitialFields()), "In place of the file's start."},
-       {"known_solution", Section(ObservationFields()),
-        "Exact facts that observers compare with."}});
-  return fields;
-}
-
-/// Adds the content of the file to `description`; its start replaces the given one. Throws
-/// ConfigError with all mistakes, one per line.
-Sidecar ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>& at_rest,
-                    MechanismDescription* description) {
-  Sidecar sidecar;
-  static_cast<MechanismDescription&>(sidecar) = *description;
-  sidecar.at_rest = at_rest;
-  for (const BodyDescription& body : sidecar.bodies) sidecar.body_names.Add(body.name);
-  for (const JointDescription& joint : sidecar.joints) sidecar.joint_names.Add(joint.name);
-  ReadDocument(ReadTextFile(path), path.string(),
-               [&](const JsonNode& root) { return SidecarFields().Read(root, &sidecar); });
-  *description = static_cast<MechanismDescription&>(sidecar);
-  return sidecar;
-}
-
-}  // namespace
 
 Imported ImportDraft::Finish(const std::string& format) {
   Imported imported;

@@ -3,12 +3,7 @@
 // Each joint of a series acts in axes moved by the previous ones. With X_i(q_i) the motion of joint
 // i in drawn axes of the last body C, the pose of C in the first body P is X_PC X_1 .. X_n. The set
 // of reachable poses determines the type of the joint.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <map>
 
 #include "harness/exchange/import_draft.h"
 #include "mechanism/algebra/symmetric_eigen.h"
@@ -64,9 +59,7 @@ bool Perpendicular(const Vector3d& a, const Vector3d& b) { return std::abs(a.dot
 /// Returns axes x, y, z from two axes that are perpendicular up to rounding.
 Eigen::Quaterniond Axes(const Vector3d& x, const Vector3d& z_near) {
   const Vector3d z = (z_near - x.dot(z_near) * x).normalized();
-  Eigen::Matrix3d R;
-  R << x, z.cross(x), z;
-  return Eigen::Quaterniond(R);
+  return FromAxes(x, z.cross(x), z);
 }
 
 bool Independent(const std::vector<SerialJoint>& joints) {
@@ -75,100 +68,7 @@ bool Independent(const std::vector<SerialJoint>& joints) {
   return std::abs(axes.determinant()) > kAligned;
 }
 
-/// Returns the joint that several joints form; `all`: in their order, by kind.
-std::optional<ComposedJoint> JointOf(const std::vector<SerialJoint>& joints,
-                                     const std::map<SerialKind, std::vector<SerialJoint>>& all) {
-  const auto of = [&](SerialKind kind) {
-    const auto found = all.find(kind);
-    return found == all.end() ? std::vector<SerialJoint>() : found->second;
-  };
-  const std::vector<SerialJoint> hinges = of(SerialKind::kHinge), slides = of(SerialKind::kSlide),
-                                 balls = of(SerialKind::kBall);
-  if (joints.size() == 2 && hinges.size() == 2) {
-    const Vector3d &a = hinges[0].axis, &b = hinges[1].axis;
-    const auto point = Perpendicular(a, b) ? MeetingPoint(hinges) : std::nullopt;
-    // about x of F, then about y of M
-    if (point) return ComposedJoint{JointType::kUniversal, {Axes(a, a.cross(b)), *point}};
-  }
-  if (joints.size() == 2 && slides.size() == 2) {
-    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
-    if (Parallel(a, b)) return std::nullopt;
-    return ComposedJoint{.type = JointType::kPlanar,
-                         .X_BJ = {Axes(a, a.cross(b)), Vector3d::Zero()},
-                         .keeps_angle = true};
-  }
-  if (joints.size() == 2 && hinges.size() == 1 && slides.size() == 1) {
-    const Vector3d &turn = hinges[0].axis, &slide = slides[0].axis, &at = hinges[0].position;
-    if (Parallel(turn, slide)) return ComposedJoint{JointType::kCylindrical, {TurnOfZ(turn), at}};
-    // the slot is on the parent when the slide comes first, else on the child
-    const bool from_is_child = joints[0].kind == SerialKind::kHinge;
-    if (Perpendicular(turn, slide)) {
-      return ComposedJoint{JointType::kPinInSlot, {Axes(slide, turn), at}, from_is_child};
-    }
-  }
-  if (slides.size() == 2 && hinges.size() == 1) {
-    const Vector3d &z = hinges[0].axis, &a = slides[0].axis, &b = slides[1].axis;
-    if (Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b)) {
-      return ComposedJoint{JointType::kPlanar, {Axes(a, z), hinges[0].position}};
-    }
-  }
-  const bool spans = slides.size() == 3 && Independent(slides);
-  if (spans && joints.size() == 3) {
-    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
-    return ComposedJoint{JointType::kTranslation, {Axes(a, a.cross(b)), Vector3d::Zero()}};
-  }
-  if (spans && joints.size() == 4 && hinges.size() == 1) {
-    return ComposedJoint{JointType::kSchoenflies, {TurnOfZ(hinges[0].axis), hinges[0].position}};
-  }
-  std::optional<Vector3d> centre;
-  if (balls.size() == 1 && hinges.empty()) centre = balls[0].position;
-  if (balls.empty() && hinges.size() == 3 && Independent(hinges)) centre = MeetingPoint(hinges);
-  if (centre && slides.empty()) return ComposedJoint{JointType::kSpherical, Placement(*centre)};
-  if (centre && spans) return ComposedJoint{JointType::kFree, Placement(*centre)};
-  // the line or plane is on the parent when the slides come first, on the child when they come last
-  const bool from_is_child = joints.front().kind != SerialKind::kSlide;
-  const bool is_mixed = !std::ranges::is_partitioned(joints, [&](const SerialJoint& joint) {
-    return (joint.kind == SerialKind::kSlide) != from_is_child;
-  });
-  if (!centre || is_mixed) return std::nullopt;
-  const Vector3d& x = slides[0].axis;
-  if (slides.size() == 1) {
-    const Vector3d other = std::abs(x.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
-    return ComposedJoint{JointType::kPointOnLine, {Axes(x, other), *centre}, from_is_child};
-  }
-  if (slides.size() == 2 && !Parallel(x, slides[1].axis)) {
-    const Vector3d z = x.cross(slides[1].axis);
-    return ComposedJoint{JointType::kPointInPlane, {Axes(x, z), *centre}, from_is_child};
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
-std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints) {
-  if (joints.size() == 1) {
-    constexpr JointType kTypes[] = {JointType::kRevolute, JointType::kPrismatic,
-                                    JointType::kSpherical, JointType::kFree};
-    return ComposedJoint{kTypes[static_cast<int>(joints[0].kind)], Placement(joints[0].position)};
-  }
-  std::map<SerialKind, std::vector<SerialJoint>> all;
-  for (const SerialJoint& joint : joints) all[joint.kind].push_back(joint);
-  return all.contains(SerialKind::kFree) ? std::nullopt : JointOf(joints, all);
-}
-
-Placement MotionOf(const SerialJoint& joint, const double* q) {
-  if (joint.kind == SerialKind::kSlide) return Placement((q[0] - joint.reference) * joint.axis);
-  Placement X;
-  X.q = joint.kind == SerialKind::kBall
-            ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
-            : Quaterniond(Eigen::AngleAxisd(q[0] - joint.reference, joint.axis));
-  X.p = joint.position - X.q * joint.position;
-  return X;
-}
-
 // Conversion of coordinates and speeds.
-
-namespace {
 
 /// Motion of a chain of joints at its coordinates, in drawn body axes.
 struct ChainMotion {
@@ -205,6 +105,84 @@ ChainMotion Move(const std::vector<SerialJoint>& series, const ComposedJoint& co
 }
 
 }  // namespace
+
+std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints) {
+  using enum JointType;
+  const SerialJoint& first = joints.front();
+  if (joints.size() == 1) {
+    return ComposedJoint{kSerialTypes[static_cast<int>(first.kind)], Placement(first.position)};
+  }
+  std::vector<SerialJoint> hinges, slides, balls;
+  for (const SerialJoint& joint : joints) {
+    if (joint.kind == SerialKind::kFree) return std::nullopt;
+    const bool turns = joint.kind == SerialKind::kHinge, slips = joint.kind == SerialKind::kSlide;
+    (turns ? hinges : slips ? slides : balls).push_back(joint);
+  }
+  const bool is_pair = joints.size() == 2;
+  // a slot, line or plane is on the parent when the slides come first, else on the child
+  const bool from_is_child = first.kind != SerialKind::kSlide;
+  if (is_pair && hinges.size() == 2) {
+    const Vector3d &a = hinges[0].axis, &b = hinges[1].axis;
+    const auto point = Perpendicular(a, b) ? MeetingPoint(hinges) : std::nullopt;
+    // about x of F, then about y of M
+    if (point) return ComposedJoint{kUniversal, {Axes(a, a.cross(b)), *point}};
+  }
+  if (is_pair && slides.size() == 2) {
+    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
+    if (Parallel(a, b)) return std::nullopt;
+    return ComposedJoint{kPlanar, {Axes(a, a.cross(b)), Vector3d::Zero()}, false, true};
+  }
+  if (is_pair && hinges.size() == 1 && slides.size() == 1) {
+    const Vector3d &turn = hinges[0].axis, &slide = slides[0].axis, &at = hinges[0].position;
+    if (Parallel(turn, slide)) return ComposedJoint{kCylindrical, {TurnOfZ(turn), at}};
+    if (Perpendicular(turn, slide)) {
+      return ComposedJoint{kPinInSlot, {Axes(slide, turn), at}, from_is_child};
+    }
+  }
+  if (slides.size() == 2 && hinges.size() == 1) {
+    const Vector3d &z = hinges[0].axis, &a = slides[0].axis, &b = slides[1].axis;
+    if (Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b)) {
+      return ComposedJoint{kPlanar, {Axes(a, z), hinges[0].position}};
+    }
+  }
+  const bool spans = slides.size() == 3 && Independent(slides);
+  if (spans && joints.size() == 3) {
+    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
+    return ComposedJoint{kTranslation, {Axes(a, a.cross(b)), Vector3d::Zero()}};
+  }
+  if (spans && joints.size() == 4 && hinges.size() == 1) {
+    return ComposedJoint{kSchoenflies, {TurnOfZ(hinges[0].axis), hinges[0].position}};
+  }
+  std::optional<Vector3d> centre;
+  if (balls.size() == 1 && hinges.empty()) centre = balls[0].position;
+  if (balls.empty() && hinges.size() == 3 && Independent(hinges)) centre = MeetingPoint(hinges);
+  if (centre && slides.empty()) return ComposedJoint{kSpherical, Placement(*centre)};
+  if (centre && spans) return ComposedJoint{kFree, Placement(*centre)};
+  const bool is_mixed = !std::ranges::is_partitioned(joints, [&](const SerialJoint& joint) {
+    return (joint.kind == SerialKind::kSlide) != from_is_child;
+  });
+  if (!centre || is_mixed) return std::nullopt;
+  const Vector3d& x = slides[0].axis;
+  if (slides.size() == 1) {
+    const Vector3d other = std::abs(x.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
+    return ComposedJoint{kPointOnLine, {Axes(x, other), *centre}, from_is_child};
+  }
+  if (slides.size() == 2 && !Parallel(x, slides[1].axis)) {
+    const Vector3d z = x.cross(slides[1].axis);
+    return ComposedJoint{kPointInPlane, {Axes(x, z), *centre}, from_is_child};
+  }
+  return std::nullopt;
+}
+
+Placement MotionOf(const SerialJoint& joint, const double* q) {
+  if (joint.kind == SerialKind::kSlide) return Placement((q[0] - joint.reference) * joint.axis);
+  Placement X;
+  X.q = joint.kind == SerialKind::kBall
+            ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
+            : Quaterniond(Eigen::AngleAxisd(q[0] - joint.reference, joint.axis));
+  X.p = joint.position - X.q * joint.position;
+  return X;
+}
 
 void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& composed,
                  const double* q, const double* u, std::vector<double>* coordinates,
@@ -243,9 +221,9 @@ void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& co
 
 JointDescription& ImportDraft::AddComposed(const std::string& name, const ComposedJoint& composed,
                                            int parent, const Placement& X_PF, int child) {
-  JointDescription& joint = composed.from_is_child
-                                ? AddJoint(name, composed.type, child, composed.X_BJ, parent, X_PF)
-                                : AddJoint(name, composed.type, parent, X_PF, child, composed.X_BJ);
+  FrameOn F{parent, X_PF}, M{child, composed.X_BJ};
+  if (composed.from_is_child) std::swap(F, M);
+  JointDescription& joint = AddJoint(name, composed.type, F, M);
   if (composed.keeps_angle) joint.motions.push_back({0, Polynomial{{0.0}}});
   return joint;
 }

@@ -1,13 +1,8 @@
 #include "harness/exchange/import_draft.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <numbers>
 #include <sstream>
 
 #include "harness/text/files.h"
@@ -17,281 +12,7 @@ namespace loopbench::harness {
 
 namespace {
 
-Eigen::Quaterniond About(int axis, double angle) {
-  Eigen::Quaterniond q(std::cos(0.5 * angle), 0.0, 0.0, 0.0);
-  q.vec()[axis] = std::sin(0.5 * angle);
-  return q;
-}
-
-}  // namespace
-
-Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
-  const double sine = q.vec().norm();
-  if (sine == 0.0) return Eigen::Vector3d::Zero();
-  const double angle = 2.0 * std::atan2(sine, std::abs(q.w()));
-  return (q.w() < 0.0 ? -angle : angle) / sine * q.vec();
-}
-
-Eigen::Quaterniond FromRollPitchYaw(const Eigen::Vector3d& angles) {
-  return About(2, angles.z()) * About(1, angles.y()) * About(0, angles.x());
-}
-
-Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d& angles) {
-  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
-  for (int i = 0; i < 3; ++i) {
-    const char letter = sequence[static_cast<std::size_t>(i)];
-    const bool fixed = std::isupper(static_cast<unsigned char>(letter)) != 0;
-    const Eigen::Quaterniond turn =
-        About(std::tolower(static_cast<unsigned char>(letter)) - 'x', angles[i]);
-    q = fixed ? turn * q : q * turn;
-  }
-  return q;
-}
-
-/// Eigen's FromTwoVectors would take the compiler eight seconds.
-Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
-  const Eigen::Vector3d z = to.normalized();
-  if (z.z() < 0.0) {
-    const double across = std::hypot(z.x(), z.y());
-    const Eigen::Vector3d axis = across > 0.0
-                                     ? Eigen::Vector3d(-z.y() / across, z.x() / across, 0.0)
-                                     : Eigen::Vector3d::UnitX();
-    return Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(across, z.z()), axis));
-  }
-  const double root = std::sqrt(2.0 * (1.0 + z.z())), inverse = 1.0 / root;
-  return {0.5 * root, -z.y() * inverse, z.x() * inverse, 0.0};
-}
-
-Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia) {
-  if (q.vec().isZero(0.0)) return inertia;
-  const Eigen::Matrix3d R = q.toRotationMatrix();
-  const Eigen::Matrix3d turned = R * inertia * R.transpose();
-  return 0.5 * (turned + turned.transpose());
-}
-
-Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz, double yz) {
-  Eigen::Matrix3d matrix;
-  matrix << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  return matrix;
-}
-
-Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q) {
-  const double length = q.norm();
-  if (!(length > 0.0 && std::isfinite(length))) {
-    value.Fail("a quaternion of finite length that is not zero");
-  }
-  return q.normalized();
-}
-
-ImportDraft::ImportDraft(const XmlFile& file, const ImportOptions& options)
-    : at_rest(1), file_(file), options_(options), elements_{file.root()} {
-  description.space = SpaceKind::kSpatial;
-  description.bodies[kGround].name = "ground";
-}
-
-int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
-  const int index = static_cast<int>(description.bodies.size());
-  BodyDescription body;
-  body.name = name.empty() ? fmt::format("body{}", index) : name;
-  if (name.empty()) {
-    while (bodies_.contains(body.name)) body.name += "_";
-  } else if (const auto known = bodies_.find(name); known != bodies_.end()) {
-    element.Fail(
-        "a second body of this name",
-        fmt::format("one that is not in use (line {} has it)", elements_[known->second].line()));
-  }
-  bodies_.emplace(body.name, index);
-  if (body.name == description.bodies[kGround].name) {
-    body.name += "_";
-    while (bodies_.contains(body.name)) body.name += "_";
-    Note(element, fmt::format("called \"{}\": \"ground\" is what does not move", body.name));
-    bodies_.emplace(body.name, index);
-  }
-  description.bodies.push_back(body);
-  at_rest.emplace_back();
-  elements_.push_back(element);
-  return index;
-}
-
-int ImportDraft::AddLink(const XmlElement& element, int body) {
-  BodyDescription link;
-  link.name = description.bodies[body].name + " link";
-  description.bodies.push_back(link);
-  at_rest.push_back(at_rest[body]);
-  elements_.push_back(element);
-  return static_cast<int>(description.bodies.size()) - 1;
-}
-
-int ImportDraft::BodyNamed(const XmlValue& value, const std::set<std::string>& also) const {
-  return also.contains(value.Name()) ? kGround : BodyNamed(value.Name(), value);
-}
-
-int ImportDraft::BodyNamed(const std::string& name, const XmlValue& user) const {
-  const auto found = bodies_.find(name);
-  if (found == bodies_.end()) user.Fail("the name of a body in this file");
-  return found->second;
-}
-
-int ImportDraft::BodyNamed(const std::string& name, const XmlElement& user) const {
-  const auto found = bodies_.find(name);
-  if (found == bodies_.end()) user.Fail('"' + name + '"', "the name of a body in this file");
-  return found->second;
-}
-
-std::string ImportDraft::NewJointName(const XmlElement& element, const std::string& name) {
-  if (!joints_.Add(name)) {
-    element.Fail(fmt::format("a second joint \"{}\"", name), "a name that is not in use");
-  }
-  return name;
-}
-
-std::string ImportDraft::NameLater(const std::string& stem) {
-  stems_.emplace_back(description.joints.size(), stem);
-  return "";
-}
-
-void ImportDraft::NameJoints() {
-  for (const auto& [joint, stem] : stems_) {
-    description.joints[joint].name = joints_.Take(stem);
-    found_names_.insert(description.joints[joint].name);
-  }
-  stems_.clear();
-}
-
-JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type, int from,
-                                        const Placement& X_PF, int to, const Placement& X_QM) {
-  JointDescription joint;
-  joint.name = name;
-  joint.type = type;
-  joint.from = {from, X_PF.p, RotationVector(X_PF.q)};
-  joint.to = {to, X_QM.p, RotationVector(X_QM.q)};
-  if (!name.empty()) numbers_.emplace(name, static_cast<int>(description.joints.size()));
-  description.joints.push_back(joint);
-  return description.joints.back();
-}
-
-JointDescription& ImportDraft::AddLoop(const XmlElement& element, const std::string& name,
-                                       JointType type, int from, const Placement& X_PF, int to,
-                                       const Placement& X_QM) {
-  if (from == to) element.Fail("one body twice", "two different bodies");
-  JointDescription& joint = AddJoint(name, type, from, X_PF, to, X_QM);
-  joint.cut = true;
-  return joint;
-}
-
-void ImportDraft::AddBall(const XmlElement& element,
-                          const std::function<int(const XmlElement&)>& body,
-                          const std::function<XmlValue(const XmlElement&)>& point) {
-  const auto child = [&](const char* name) {
-    return element.RequiredChild((std::string(kDrakeBall) + name).c_str());
-  };
-  const int a = body(child("_body_A")), b = body(child("_body_B"));
-  const Placement P(point(child("_p_AP")).Vector()), Q(point(child("_p_BQ")).Vector());
-  AddLoop(element, NameLater("ball"), JointType::kSpherical, a, P, b, Q);
-}
-
-void ImportDraft::Fix(int parent, const Placement& X, int body, const char* ending) {
-  const std::string name = description.bodies[body].name + ending;
-  AddJoint(NameLater(name), JointType::kWeld, parent, X, body, {});
-}
-
-void ImportDraft::AddSpringAndDamper(double stiffness, double rest, double damping) {
-  if (stiffness > 0.0) {
-    description.forces.emplace_back(JointSpring{last_joint(), stiffness, rest, 0.0});
-  }
-  if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
-}
-
-void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name,
-                              std::vector<CouplingDescription::Part> parts, double offset) {
-  const auto has_coordinate = [&](const CouplingDescription::Part& part) {
-    return NumValues(description.joints[part.joint].type, SpaceKind::kSpatial, false) == 1;
-  };
-  if (!std::ranges::all_of(parts, has_coordinate)) return Note(element, kNotCoupled, true);
-  std::erase_if(parts, [](const CouplingDescription::Part& part) { return part.ratio == 0.0; });
-  if (parts.empty()) {
-    Note(element, "dropped: all coefficients are 0", offset != 0.0);
-  } else if (parts.size() == 1) {
-    const auto [joint, ratio] = parts.front();
-    description.joints[joint].motions = {{0, Polynomial{{offset / ratio}}}};
-  } else {
-    description.couplings.push_back({joints_.Take(name), std::move(parts), offset});
-  }
-}
-
-void ImportDraft::AddFollower(const XmlElement& element, const std::string& name, int follower,
-                              CouplingDescription::Part leader, double offset) {
-  if (follower == leader.joint) {
-    element.Fail("a joint that follows itself", "another joint");
-  }
-  AddCoupling(element, name, {{follower, 1.0}, {leader.joint, -leader.ratio}}, offset);
-}
-
-void ImportDraft::AddMimic(const XmlElement& element, int follower,
-                           CouplingDescription::Part leader, double offset) {
-  const auto next = [&](int joint) {
-    const auto found = leaders_.find(joint);
-    return found == leaders_.end() ? joint : found->second;
-  };
-  int first = leader.joint;  // the leader of all leaders; paths to it are halved
-  for (; next(first) != first; first = next(first)) leaders_[first] = next(next(first));
-  if (first == follower && leader.joint != follower) {
-    element.Fail("joints that follow each other", "no cycle");
-  }
-  AddFollower(element, description.joints[follower].name + " mimic", follower, leader, offset);
-  leaders_[follower] = first;
-}
-
-int ImportDraft::JointNamed(const XmlValue& value, const std::string& prefix) const {
-  const auto found = numbers_.find(prefix + value.Name());
-  if (found == numbers_.end()) value.Fail("the name of a joint in this file");
-  return found->second;
-}
-
-void ImportDraft::AssumeGravity(const XmlElement& element, double gravity) {
-  description.gravity = {0.0, 0.0, -gravity};
-  assumed_gravity_ = element;
-}
-
-void ImportDraft::Note(const XmlElement& element, const std::string& attribute, std::string reason,
-                       bool changes_motion) {
-  const std::string shown = element.Shown() + (attribute.empty() ? "" : " ") + attribute;
-  notes_.push_back({element.file(), element.line(), shown, std::move(reason), changes_motion});
-}
-
-void ImportDraft::Drop(const XmlElement& element, const std::string& attribute,
-                       std::string_view reason) {
-  Note(element, attribute, fmt::format("dropped: {}", reason), true);
-}
-
-void ImportDraft::DropWhole(const XmlElement& element, std::string_view reason,
-                            bool changes_motion) {
-  element.Ignore();
-  Note(element, fmt::format("dropped: {}", reason), changes_motion);
-}
-
-void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
-  for (const auto& [element, attribute] : file_.Unread()) {
-    const auto find = [&](const std::string& what) {
-      return std::ranges::find_if(reasons, [&](const DroppedReason& row) { return row.Has(what); });
-    };
-    if (element.tag().starts_with("xacro:")) {
-      element.Fail("an element of xacro", "plain XML, as `xacro FILE` writes it");
-    }
-    if (attribute.starts_with("xmlns")) continue;
-    auto known = find(element.tag() + (attribute.empty() ? "" : "@") + attribute);
-    if (known == reasons.end() && !attribute.empty()) known = find("@" + attribute);
-    if (known == reasons.end()) {
-      Note(element, attribute, "dropped: not known to this reader", true);
-    } else if (!known->reason.empty()) {
-      Note(element, attribute, fmt::format("dropped: {}", known->reason), known->changes_motion);
-    }
-  }
-}
-
 // --planar: projects an imported mechanism onto its plane, with gravity along -y.
-
-namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
@@ -303,9 +24,7 @@ Quaterniond AxesOfPlane(const Vector3d& n, const Vector3d& gravity) {
   const Vector3d across = gravity - gravity.dot(n) * n;
   if (!(across.norm() > kRounding * gravity.norm())) return Quaterniond(AxesWithNormal(n));
   const Vector3d y = -across.normalized();
-  Eigen::Matrix3d R;
-  R << y.cross(n), y, n;
-  return Quaterniond(R);
+  return FromAxes(y.cross(n), y, n);
 }
 
 /// Rotates the ground axes of the mechanism; q_CW.
@@ -328,59 +47,10 @@ void TurnGround(const Quaterniond& q, MechanismDescription* description) {
   }
 }
 
-}  // namespace
-
-void ImportDraft::MakeBallsPins(const Vector3d& n) {
-  std::set<int> balls;
-  for (std::size_t j = 0; j < description.joints.size(); ++j) {
-    JointDescription& joint = description.joints[j];
-    if (joint.type != JointType::kSpherical) continue;
-    joint.type = JointType::kRevolute;  // the planar motion of a ball
-    for (JointSide* side : {&joint.from, &joint.to}) {
-      const Quaterniond& q = at_rest[side->body].q;
-      side->rotation = RotationVector(q.conjugate() * Quaterniond(AxesWithNormal(n)));
-    }
-    balls.insert(static_cast<int>(j));
-  }
-  for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
-    std::erase_if(*list, [&](const JointValues& one) { return balls.contains(one.joint); });
-  }
-}
-
-void ImportDraft::GoToPlane() {
-  const auto turns = std::ranges::find_if(description.joints, [](const JointDescription& joint) {
-    return TraitsOf(joint.type).flat.turns;
-  });
-  if (turns != description.joints.end()) {
-    const Vector3d n = at_rest[turns->from.body].q *
-                       (PoseOf(turns->from).R * AxisAlignment(*turns) * Vector3d::UnitZ());
-    MakeBallsPins(n);
-    TurnGround(AxesOfPlane(n, description.gravity).conjugate(), &description);
-  }
-  std::string why;
-  const std::optional<InPlane> plane = ExpressInPlane(description, &why);
-  if (!plane) {
-    throw ConfigError(
-        fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
-                    file_.name(), why));
-  }
-  const double least = kRounding * description.gravity.norm();
-  if (std::abs(plane->gravity_dropped) > least) {
-    Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
-                                         "dropped: it moves nothing",
-                                         plane->gravity_dropped));
-  }
-  description = plane->description;
-  description.gravity =
-      description.gravity.unaryExpr([=](double g) { return std::abs(g) <= least ? 0.0 : g; });
-}
-
 // Angles and directions with few digits in files: 1.5708 for a quarter turn.
 //
 // Loops close, and their redundant constraints are found, to round-off only if such numbers are
 // exact. A number is replaced by an exact value that rounds or truncates to it at its last digit.
-
-namespace {
 
 using std::numbers::pi;
 using List = std::vector<double>;
@@ -458,6 +128,188 @@ std::size_t CountOf(char kind) { return kind == 'd' ? 3 : kind == 'q' || kind ==
 
 }  // namespace
 
+Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d& angles) {
+  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  for (int i = 0; i < 3; ++i) {
+    const char letter = sequence[static_cast<std::size_t>(i)];
+    const bool fixed = std::isupper(static_cast<unsigned char>(letter)) != 0;
+    const Eigen::Quaterniond turn =
+        About(std::tolower(static_cast<unsigned char>(letter)) - 'x', angles[i]);
+    q = fixed ? turn * q : q * turn;
+  }
+  return q;
+}
+
+/// Eigen's FromTwoVectors would take the compiler eight seconds.
+Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
+  const Eigen::Vector3d z = to.normalized();
+  if (z.z() < 0.0) {
+    const double across = std::hypot(z.x(), z.y());
+    const Eigen::Vector3d axis = across > 0.0
+                                     ? Eigen::Vector3d(-z.y() / across, z.x() / across, 0.0)
+                                     : Eigen::Vector3d::UnitX();
+    return Eigen::Quaterniond(Eigen::AngleAxisd(std::atan2(across, z.z()), axis));
+  }
+  const double root = std::sqrt(2.0 * (1.0 + z.z())), inverse = 1.0 / root;
+  return {0.5 * root, -z.y() * inverse, z.x() * inverse, 0.0};
+}
+
+ImportDraft::ImportDraft(const XmlFile& file, const ImportOptions& options)
+    : at_rest(1), file_(file), options_(options), elements_{file.root()} {
+  description.space = SpaceKind::kSpatial;
+  description.bodies[kGround].name = "ground";
+}
+
+int ImportDraft::AddBody(const XmlElement& element, const std::string& name) {
+  const int index = static_cast<int>(description.bodies.size());
+  BodyDescription body;
+  body.name = name.empty() ? fmt::format("body{}", index) : name;
+  if (name.empty()) {
+    while (bodies_.contains(body.name)) body.name += "_";
+  } else if (const auto known = bodies_.find(name); known != bodies_.end()) {
+    element.Fail(
+        "a second body of this name",
+        fmt::format("one that is not in use (line {} has it)", elements_[known->second].line()));
+  }
+  bodies_.emplace(body.name, index);
+  if (body.name == description.bodies[kGround].name) {
+    body.name += "_";
+    while (bodies_.contains(body.name)) body.name += "_";
+    Note(element, fmt::format("called \"{}\": \"ground\" is what does not move", body.name));
+    bodies_.emplace(body.name, index);
+  }
+  description.bodies.push_back(body);
+  at_rest.emplace_back();
+  elements_.push_back(element);
+  return index;
+}
+
+void ImportDraft::NameJoints() {
+  for (const auto& [joint, stem] : stems_) {
+    description.joints[joint].name = joints_.Take(stem);
+    found_names_.insert(description.joints[joint].name);
+  }
+  stems_.clear();
+}
+
+JointDescription& ImportDraft::AddJoint(const std::string& name, JointType type, const FrameOn& F,
+                                        const FrameOn& M) {
+  if (!name.empty()) numbers_.emplace(name, static_cast<int>(description.joints.size()));
+  JointDescription& joint = description.joints.emplace_back();
+  joint.name = name;
+  joint.type = type;
+  joint.from = {F.body, F.X.p, RotationVector(F.X.q)};
+  joint.to = {M.body, M.X.p, RotationVector(M.X.q)};
+  return joint;
+}
+
+void ImportDraft::AddBall(const XmlElement& element,
+                          const std::function<int(const XmlElement&)>& body,
+                          const std::function<XmlValue(const XmlElement&)>& point) {
+  const auto child = [&](const char* name) {
+    return element.RequiredChild((std::string(kDrakeBall) + name).c_str());
+  };
+  const int a = body(child("_body_A")), b = body(child("_body_B"));
+  const Placement P(point(child("_p_AP")).Vector()), Q(point(child("_p_BQ")).Vector());
+  AddLoop(element, NameLater("ball"), JointType::kSpherical, {a, P}, {b, Q});
+}
+
+void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name,
+                              std::vector<CouplingDescription::Part> parts, double offset) {
+  const auto has_coordinate = [&](const CouplingDescription::Part& part) {
+    return NumValues(description.joints[part.joint].type, SpaceKind::kSpatial, false) == 1;
+  };
+  if (!std::ranges::all_of(parts, has_coordinate)) return Note(element, kNotCoupled, true);
+  std::erase_if(parts, [](const CouplingDescription::Part& part) { return part.ratio == 0.0; });
+  if (parts.empty()) {
+    Note(element, "dropped: all coefficients are 0", offset != 0.0);
+  } else if (parts.size() == 1) {
+    const auto [joint, ratio] = parts.front();
+    description.joints[joint].motions = {{0, Polynomial{{offset / ratio}}}};
+  } else {
+    description.couplings.push_back({joints_.Take(name), std::move(parts), offset});
+  }
+}
+
+void ImportDraft::AddMimic(const XmlElement& element, int follower,
+                           CouplingDescription::Part leader, double offset) {
+  const auto next = [&](int joint) {
+    const auto found = leaders_.find(joint);
+    return found == leaders_.end() ? joint : found->second;
+  };
+  int first = leader.joint;  // the leader of all leaders; paths to it are halved
+  for (; next(first) != first; first = next(first)) leaders_[first] = next(next(first));
+  if (first == follower && leader.joint != follower) {
+    element.Fail("joints that follow each other", "no cycle");
+  }
+  AddFollower(element, description.joints[follower].name + " mimic", follower, leader, offset);
+  leaders_[follower] = first;
+}
+
+void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
+  for (const auto& [element, attribute] : file_.Unread()) {
+    const auto find = [&](const std::string& what) {
+      return std::ranges::find_if(reasons, [&](const DroppedReason& row) { return row.Has(what); });
+    };
+    if (element.tag().starts_with("xacro:")) {
+      element.Fail("an element of xacro", "plain XML, as `xacro FILE` writes it");
+    }
+    if (attribute.starts_with("xmlns")) continue;
+    auto known = find(element.tag() + (attribute.empty() ? "" : "@") + attribute);
+    if (known == reasons.end() && !attribute.empty()) known = find("@" + attribute);
+    if (known == reasons.end()) {
+      Note(element, attribute, "dropped: not known to this reader", true);
+    } else if (!known->reason.empty()) {
+      Note(element, attribute, fmt::format("dropped: {}", known->reason), known->changes_motion);
+    }
+  }
+}
+
+void ImportDraft::MakeBallsPins(const Vector3d& n) {
+  std::set<int> balls;
+  for (std::size_t j = 0; j < description.joints.size(); ++j) {
+    JointDescription& joint = description.joints[j];
+    if (joint.type != JointType::kSpherical) continue;
+    joint.type = JointType::kRevolute;  // the planar motion of a ball
+    for (JointSide* side : {&joint.from, &joint.to}) {
+      const Quaterniond& q = at_rest[side->body].q;
+      side->rotation = RotationVector(q.conjugate() * Quaterniond(AxesWithNormal(n)));
+    }
+    balls.insert(static_cast<int>(j));
+  }
+  for (auto* list : {&description.initial.coordinates, &description.initial.speeds}) {
+    std::erase_if(*list, [&](const JointValues& one) { return balls.contains(one.joint); });
+  }
+}
+
+void ImportDraft::GoToPlane() {
+  const auto turns = std::ranges::find_if(description.joints, [](const JointDescription& joint) {
+    return TraitsOf(joint.type).flat.turns;
+  });
+  if (turns != description.joints.end()) {
+    const Vector3d n = at_rest[turns->from.body].q *
+                       (PoseOf(turns->from).R * AxisAlignment(*turns) * Vector3d::UnitZ());
+    MakeBallsPins(n);
+    TurnGround(AxesOfPlane(n, description.gravity).conjugate(), &description);
+  }
+  std::string why;
+  const std::optional<InPlane> plane = ExpressInPlane(description, &why);
+  if (!plane) {
+    throw ConfigError(
+        fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
+                    file_.name(), why));
+  }
+  const double least = kRounding * description.gravity.norm();
+  if (std::abs(plane->gravity_dropped) > least) {
+    Note(elements_[kGround], fmt::format("gravity of {:.6g} m/s^2 along the normal of the plane "
+                                         "dropped: it moves nothing",
+                                         plane->gravity_dropped));
+  }
+  description = plane->description;
+  description.gravity =
+      description.gravity.unaryExpr([=](double g) { return std::abs(g) <= least ? 0.0 : g; });
+}
+
 List ImportDraft::Numbers(const XmlValue& value, std::string_view kinds) {
   std::size_t count = 0;
   for (const char kind : kinds) count += CountOf(kind);
@@ -490,11 +342,6 @@ List ImportDraft::Numbers(const XmlValue& value, std::string_view kinds) {
     Note(value.element(), value.attribute(), *shown);
   }
   return numbers;
-}
-
-Eigen::Vector3d ImportDraft::Vector(const XmlValue& value, std::string_view kinds) {
-  const List numbers = Numbers(value, kinds);
-  return {numbers[0], numbers[1], numbers[2]};
 }
 
 }  // namespace loopbench::harness

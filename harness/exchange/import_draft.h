@@ -1,22 +1,20 @@
-// A mechanism during its import: poses, planar reduction, exact values.
+// A mechanism during its import: poses, planar reduction, exact values. The importer files rely on
+// the includes of this header.
 #pragma once
 
-#include <Eigen/Core>
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <set>
 #include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "harness/exchange/export_names.h"
 #include "harness/exchange/import.h"
-#include "harness/exchange/xml_file.h"
-#include "mechanism/description/joint_frames.h"
+#include "harness/exchange/xml_document.h"
 #include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {
@@ -49,24 +47,60 @@ struct Placement {
   }
 };
 
+/// A frame on a body.
+struct FrameOn {
+  int body = kGround;
+  Placement X;
+};
+
 /// Returns the rotation vector of a unit quaternion, at most half a turn [rad].
-Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q);
+inline Eigen::Vector3d RotationVector(const Eigen::Quaterniond& q) {
+  const double sine = q.vec().norm();
+  if (sine == 0.0) return Eigen::Vector3d::Zero();
+  const double angle = 2.0 * std::atan2(sine, std::abs(q.w()));
+  return (q.w() < 0.0 ? -angle : angle) / sine * q.vec();
+}
+
+/// Returns the rotation about an axis: 0 for x to 2 for z.
+inline Eigen::Quaterniond About(int axis, double angle) {
+  Eigen::Quaterniond q(std::cos(0.5 * angle), 0.0, 0.0, 0.0);
+  q.vec()[axis] = std::sin(0.5 * angle);
+  return q;
+}
 
 /// Returns Rz(yaw) Ry(pitch) Rx(roll): the fixed-axes angles of URDF and SDF [rad].
-Eigen::Quaterniond FromRollPitchYaw(const Eigen::Vector3d& angles);
+inline Eigen::Quaterniond FromRollPitchYaw(const Eigen::Vector3d& angles) {
+  return About(2, angles.z()) * About(1, angles.y()) * About(0, angles.x());
+}
 
 /// Returns successive rotations: 'x', 'y', 'z' about body-fixed axes, 'X', 'Y', 'Z' about
 /// space-fixed axes (MJCF's eulerseq) [rad].
 Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d& angles);
 
+/// Returns the rotation onto perpendicular axes of unit length.
+inline Eigen::Quaterniond FromAxes(const Eigen::Vector3d& x, const Eigen::Vector3d& y,
+                                   const Eigen::Vector3d& z) {
+  Eigen::Matrix3d R;
+  R << x, y, z;
+  return Eigen::Quaterniond(R);
+}
+
 /// Returns the shortest rotation from z to `to`; for -z half a turn about x, as in MuJoCo.
 Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to);
 
 /// Converts an inertia from axes B to A; q is R_AB. Bit-identical if the axes are parallel.
-Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia);
+inline Eigen::Matrix3d InTurnedAxes(const Eigen::Quaterniond& q, const Eigen::Matrix3d& inertia) {
+  if (q.vec().isZero(0.0)) return inertia;
+  const Eigen::Matrix3d R = q.toRotationMatrix();
+  const Eigen::Matrix3d turned = R * inertia * R.transpose();
+  return 0.5 * (turned + turned.transpose());
+}
 
 /// Returns the symmetric matrix with elements xx, yy, zz, xy, xz, yz.
-Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz, double yz);
+inline Eigen::Matrix3d SymmetricMatrix(double xx, double yy, double zz, double xy, double xz,
+                                       double yz) {
+  return Eigen::Matrix3d{{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
+}
 
 /// Returns true, after replacing all three principal moments by their mean, if one is larger than
 /// the sum of the others; as MuJoCo's balanceinertia.
@@ -79,6 +113,9 @@ Eigen::Matrix3d InertiaOf(const Get& get) {
   return SymmetricMatrix(get("ixx", true), get("iyy", true), get("izz", true), get("ixy", false),
                          get("ixz", false), get("iyz", false));
 }
+
+/// Returns, for each body, the first body that is fixed to it; Ground for those fixed to Ground.
+std::vector<int> FixedTogether(const MechanismDescription& description);
 
 // A mechanism during its import in any format: the format readers fill it, and Finish() completes
 // it.
@@ -106,11 +143,11 @@ inline constexpr const char* kNotCoupled =
 inline constexpr const char* kDrakeBall = "drake:ball_constraint";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
-/// Returns the entry that a value names; if there is none, rejects the value with `expected`.
+/// Returns the entry of a name; if there is none, rejects the value with `expected`.
 template <class Entry>
-const Entry& Named(const std::map<std::string, Entry>& entries, const XmlValue& value,
-                   std::string_view expected) {
-  const auto found = entries.find(value.Name());
+const Entry& Named(const std::map<std::string, Entry>& entries, const std::string& name,
+                   const XmlValue& value, std::string_view expected) {
+  const auto found = entries.find(name);
   if (found == entries.end()) value.Fail(expected);
   return found->second;
 }
@@ -118,6 +155,9 @@ const Entry& Named(const std::map<std::string, Entry>& entries, const XmlValue& 
 // Joints in series without mass between them (import_chain.cpp, import_links.cpp).
 
 enum class SerialKind { kHinge, kSlide, kBall, kFree };
+/// Joint types of single joints, by SerialKind.
+inline constexpr JointType kSerialTypes[] = {JointType::kRevolute, JointType::kPrismatic,
+                                             JointType::kSpherical, JointType::kFree};
 
 /// A joint of a series, in the drawn axes of the last body.
 struct SerialJoint {
@@ -161,26 +201,49 @@ class ImportDraft {
   /// initially 0.
   int AddBody(const XmlElement& element, const std::string& name);
   /// Adds a link without mass between joints of a body. References do not find it.
-  int AddLink(const XmlElement& element, int body);
-  /// Returns the index of an existing body; `also`: further names of Ground.
-  int BodyNamed(const XmlValue& value, const std::set<std::string>& also = {}) const;
-  int BodyNamed(const std::string& name, const XmlElement& user) const;
-  /// As above; a failure shows the value as in the file.
-  int BodyNamed(const std::string& name, const XmlValue& user) const;
+  int AddLink(const XmlElement& element, int body) {
+    description.bodies.emplace_back().name = description.bodies[body].name + " link";
+    at_rest.push_back(Placement(at_rest[body]));
+    elements_.push_back(element);
+    return static_cast<int>(description.bodies.size()) - 1;
+  }
+  /// Adds a name of Ground, in place of a body of this name.
+  void NameGround(const std::string& name) { bodies_[name] = kGround; }
+  /// Returns the index of an existing body; a failure shows the value as in the file.
+  int BodyNamed(const std::string& name, const XmlValue& user) const {
+    return Named(bodies_, name, user, "the name of a body in this file");
+  }
+  /// Sets mass, centre of mass and inertia about it.
+  void SetMass(int body, double mass, const Eigen::Vector3d& com, const Eigen::Matrix3d& inertia) {
+    description.bodies[body].mass = mass;
+    description.bodies[body].com = com;
+    description.bodies[body].inertia = inertia;
+  }
   /// Returns the element of a body; the root element for Ground.
   const XmlElement& element(int body) const { return elements_[body]; }
 
   /// Returns the name of a new joint; rejects a name in use.
-  std::string NewJointName(const XmlElement& element, const std::string& name);
+  std::string NewJointName(const XmlElement& element, const std::string& name) {
+    if (joints_.Add(name)) return name;
+    element.Fail(fmt::format("a second joint \"{}\"", name), "a name that is not in use");
+  }
   /// Returns "" for an unnamed joint that is added next. After all joints are read it is called
   /// `stem`, with a suffix if necessary.
-  std::string NameLater(const std::string& stem);
-  /// Adds a joint from X_PF on `from` to X_QM on `to`; the reference is valid until the next call.
-  JointDescription& AddJoint(const std::string& name, JointType type, int from,
-                             const Placement& X_PF, int to, const Placement& X_QM);
+  std::string NameLater(const std::string& stem) {
+    stems_.emplace_back(description.joints.size(), stem);
+    return "";
+  }
+  /// Adds a joint between frames; the reference is valid until the next call.
+  JointDescription& AddJoint(const std::string& name, JointType type, const FrameOn& F,
+                             const FrameOn& M);
   /// Adds a joint that closes a loop; rejects one body on both sides.
   JointDescription& AddLoop(const XmlElement& element, const std::string& name, JointType type,
-                            int from, const Placement& X_PF, int to, const Placement& X_QM);
+                            const FrameOn& F, const FrameOn& M) {
+    if (F.body == M.body) element.Fail("one body twice", "two different bodies");
+    JointDescription& joint = AddJoint(name, type, F, M);
+    joint.cut = true;
+    return joint;
+  }
   /// Adds a <drake:ball_constraint>: points of two bodies coincide. `body` and `point` read its
   /// children.
   void AddBall(const XmlElement& element, const std::function<int(const XmlElement&)>& body,
@@ -189,21 +252,36 @@ class ImportDraft {
   JointDescription& AddComposed(const std::string& name, const ComposedJoint& composed, int parent,
                                 const Placement& X_PF, int child);
   /// Adds a weld of a body, named after it with this ending.
-  void Fix(int parent, const Placement& X, int body, const char* ending);
+  void Fix(int parent, const Placement& X, int body, const char* ending) {
+    const std::string name = description.bodies[body].name + ending;
+    AddJoint(NameLater(name), JointType::kWeld, {parent, X}, {body, {}});
+  }
   /// Adds spring and damper of the joint that was added last, where they are not 0.
-  void AddSpringAndDamper(double stiffness, double rest, double damping);
+  void AddSpringAndDamper(double stiffness, double rest, double damping) {
+    if (stiffness > 0.0) {
+      description.forces.emplace_back(JointSpring{last_joint(), stiffness, rest, 0.0});
+    }
+    if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
+  }
   /// Adds the coupling sum_i ratio_i q_i = offset; a motion if one ratio is not 0. Dropped with a
   /// note unless all joints have one coordinate.
   void AddCoupling(const XmlElement& element, const std::string& name,
                    std::vector<CouplingDescription::Part> parts, double offset);
   /// Adds the coupling q_follower = ratio q_leader + offset.
   void AddFollower(const XmlElement& element, const std::string& name, int follower,
-                   CouplingDescription::Part leader, double offset);
+                   CouplingDescription::Part leader, double offset) {
+    if (follower == leader.joint) {
+      element.Fail("a joint that follows itself", "another joint");
+    }
+    AddCoupling(element, name, {{follower, 1.0}, {leader.joint, -leader.ratio}}, offset);
+  }
   /// Adds the coupling of a joint that follows another one by its description. Rejects cycles.
   void AddMimic(const XmlElement& element, int follower, CouplingDescription::Part leader,
                 double offset);
   /// Returns the index of a joint from its name in the file, without `prefix`.
-  int JointNamed(const XmlValue& value, const std::string& prefix = "") const;
+  int JointNamed(const XmlValue& value, const std::string& prefix = "") const {
+    return Named(numbers_, prefix + value.Name(), value, "the name of a joint in this file");
+  }
   int last_joint() const { return static_cast<int>(description.joints.size()) - 1; }
 
   /// Calls `read` at the end, unless the body is fixed to the ground: its mass then has no effect.
@@ -214,23 +292,36 @@ class ImportDraft {
   void AddLift(int body, double share) { lifts_.emplace_back(body, share); }
 
   /// Sets the default gravity of the format along -z [m/s^2].
-  void AssumeGravity(const XmlElement& element, double gravity);
+  void AssumeGravity(const XmlElement& element, double gravity) {
+    description.gravity = {0.0, 0.0, -gravity};
+    assumed_gravity_ = element;
+  }
 
   /// Returns the numbers of a value by `kinds`: 'a' angle [rad], 'd' direction (3), 'q' quaternion
   /// (4), 'r' quaternion with scalar last, 'n' others. Makes rounded values exact with a note.
   std::vector<double> Numbers(const XmlValue& value, std::string_view kinds);
   /// Returns three numbers in the same way.
-  Eigen::Vector3d Vector(const XmlValue& value, std::string_view kinds);
+  Eigen::Vector3d Vector(const XmlValue& value, std::string_view kinds) {
+    return Eigen::Vector3d(Numbers(value, kinds).data());
+  }
 
   void Note(const XmlElement& element, std::string reason, bool changes_motion = false) {
     Note(element, "", std::move(reason), changes_motion);
   }
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
-            bool changes_motion = false);
+            bool changes_motion = false) {
+    const std::string shown = element.Shown() + (attribute.empty() ? "" : " ") + attribute;
+    notes_.push_back({element.file(), element.line(), shown, std::move(reason), changes_motion});
+  }
   /// Adds a note of an attribute that is not there, a change of the motion.
-  void Drop(const XmlElement& element, const std::string& attribute, std::string_view reason);
+  void Drop(const XmlElement& element, const std::string& attribute, std::string_view reason) {
+    Note(element, attribute, fmt::format("dropped: {}", reason), true);
+  }
   /// Ignores an element with all its contents, with a note.
-  void DropWhole(const XmlElement& element, std::string_view reason, bool changes_motion = false);
+  void DropWhole(const XmlElement& element, std::string_view reason, bool changes_motion = false) {
+    element.Ignore();
+    Note(element, fmt::format("dropped: {}", reason), changes_motion);
+  }
   /// Adds a note for each unread part.
   void NoteUnread(std::span<const DroppedReason> reasons);
 
@@ -285,7 +376,13 @@ class ImportDraft {
 };
 
 /// Returns q normalized; rejects zero, given by `value`.
-Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q);
+inline Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Quaterniond& q) {
+  const double length = q.norm();
+  if (!(length > 0.0 && std::isfinite(length))) {
+    value.Fail("a quaternion of finite length that is not zero");
+  }
+  return q.normalized();
+}
 
 /// Read a format: fill the draft from the root element.
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);

@@ -4,13 +4,7 @@
 // nothing acts on one of them alone. The remaining links get a mass, because the solvers divide by
 // it. If possible, it is taken from the bodies beside a link without a change of the motion. For
 // example, a point mass on the axis of a hinge moves equally with both bodies of the hinge.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
-#include <map>
 
 #include "harness/exchange/import_draft.h"
 #include "mechanism/algebra/symmetric_eigen.h"
@@ -83,7 +77,7 @@ std::vector<MasslessChain> FindChains(const MechanismDescription& d) {
     for (const BodyPoint* point : PartsOf(force).points) is_link[point->body] = false;
   }
   for (std::size_t i = 1; i < is_link.size(); ++i) {
-    is_link[i] = is_link[i] && joints_of[i].size() == 2;
+    if (joints_of[i].size() != 2) is_link[i] = false;
   }
   const auto beyond = [&](int joint, int body) {
     const JointDescription& one = d.joints[joint];
@@ -129,11 +123,9 @@ void Place(const MechanismDescription& d, MasslessChain* chain) {
     ChainJoint& placed = chain->series[k];
     placed.leads_out = joint.to.body == (k + 1 < chain->size() ? chain->between[k] : chain->child);
     const Placement X = X_CB * PlacementOf(placed.leads_out ? joint.to : joint.from);
-    constexpr std::array kTypes = {JointType::kRevolute, JointType::kPrismatic,
-                                   JointType::kSpherical};
-    const auto type = std::ranges::find(kTypes, joint.type);
-    placed.is_simple = type != kTypes.end();
-    if (placed.is_simple) placed.kind = static_cast<SerialKind>(type - kTypes.begin());
+    const auto type = std::ranges::find(kSerialTypes, joint.type);
+    placed.is_simple = type != std::end(kSerialTypes) && joint.type != JointType::kFree;
+    if (placed.is_simple) placed.kind = static_cast<SerialKind>(type - kSerialTypes);
     placed.position = X.p;
     placed.axis = (placed.leads_out ? 1.0 : -1.0) * (X.q * DirectionOf(joint));
     placed.q_CJ = X.q;
@@ -144,24 +136,14 @@ void Place(const MechanismDescription& d, MasslessChain* chain) {
 
 /// Returns joints whose motion is determined without mass: by a rotor, a coupling or a motion.
 std::vector<bool> FindDetermined(const MechanismDescription& d) {
-  std::vector<bool> determined(d.joints.size());
-  for (std::size_t j = 0; j < determined.size(); ++j) {
-    determined[j] = d.joints[j].rotor_inertia != 0.0 || !d.joints[j].motions.empty();
+  std::vector<bool> determined;
+  for (const JointDescription& joint : d.joints) {
+    determined.push_back(joint.rotor_inertia != 0.0 || !joint.motions.empty());
   }
   for (const CouplingDescription& coupling : d.couplings) {
     for (const auto& part : coupling.parts) determined[part.joint] = true;
   }
   return determined;
-}
-
-/// Returns joints that cannot be a part of another one: something acts on their coordinate.
-std::vector<bool> FindSingleJoints(const MechanismDescription& d) {
-  std::vector<bool> single = FindDetermined(d);
-  for (ForceDescription force : d.forces) {
-    const int* joint = PartsOf(force).joint;
-    if (joint != nullptr) single[*joint] = true;
-  }
-  return single;
 }
 
 /// Returns the type of joint that all joints of a placed chain form, if there is one. Values that
@@ -220,55 +202,7 @@ bool TakeValues(const MasslessChain& chain, bool of_speeds, InitialDescription* 
   return list.size() < count;
 }
 
-}  // namespace
-
-/// Replaces the first joint of a chain by the joint that the chain forms; the others become welds.
-void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed) {
-  std::vector<std::string> names;
-  for (const int joint : chain.joints) {
-    const std::string& name = description.joints[joint].name;
-    if (!found_names_.contains(name)) names.push_back(name);
-  }
-  // without names in the file: the one that its last joint got from the body
-  if (names.empty()) names.push_back(description.joints[chain.joints.back()].name);
-  const std::string name =
-      names.size() == 1 ? names[0] : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
-  InitialDescription& initial = description.initial;
-  std::vector<double> q, u, coordinates, speeds;
-  const bool has_speeds = TakeValues(chain, true, &initial, &u);
-  double weight = 1.0;
-  bool is_cut = false;
-  for (const int part : chain.joints) {
-    const auto guess = std::ranges::find(initial.coordinates, part, &JointValues::joint);
-    if (guess != initial.coordinates.end()) weight = std::max(weight, guess->weight);
-    is_cut = is_cut || description.joints[part].cut;
-  }
-  const bool has_coordinates = TakeValues(chain, false, &initial, &q);
-  const bool is_held = std::erase_if(initial.held, [&](int joint) {
-                         return std::ranges::count(chain.joints, joint) > 0;
-                       }) > 0;
-  const int joint = chain.joints[0];
-  SetComposed({chain.series.begin(), chain.series.end()}, composed, q.data(), u.data(),
-              &coordinates, &speeds);
-  if (has_coordinates || composed.type == JointType::kFree) {
-    initial.coordinates.push_back({joint, coordinates, weight});
-  }
-  if (has_speeds) initial.speeds.push_back({joint, speeds});
-  if (is_held) initial.held.push_back(joint);
-  const Placement X_PC = chain.places[0].Inverse();
-  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child).cut = is_cut;
-  std::swap(description.joints[joint], description.joints.back());
-  description.joints.pop_back();
-  for (std::size_t k = 1; k < chain.size(); ++k) {
-    description.joints[chain.joints[k]].type = JointType::kWeld;
-  }
-  Note(elements_[chain.child],
-       fmt::format("{} joints are one here: {}", chain.size(), ToString(composed.type)));
-}
-
 // Masses of the remaining links.
-
-namespace {
 
 /// Mass and inertia that move equally with both bodies of a joint.
 struct Lump {
@@ -354,6 +288,50 @@ Lump Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axi
 
 }  // namespace
 
+/// Replaces the first joint of a chain by the joint that the chain forms; the others become welds.
+void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& composed) {
+  std::vector<std::string> names;
+  for (const int joint : chain.joints) {
+    const std::string& name = description.joints[joint].name;
+    if (!found_names_.contains(name)) names.push_back(name);
+  }
+  // without names in the file: the one that its last joint got from the body
+  if (names.empty()) names.push_back(description.joints[chain.joints.back()].name);
+  const std::string name =
+      names.size() == 1 ? names[0] : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
+  InitialDescription& initial = description.initial;
+  std::vector<double> q, u, coordinates, speeds;
+  const bool has_speeds = TakeValues(chain, true, &initial, &u);
+  double weight = 1.0;
+  bool is_cut = false;
+  for (const int part : chain.joints) {
+    const auto guess = std::ranges::find(initial.coordinates, part, &JointValues::joint);
+    if (guess != initial.coordinates.end()) weight = std::max(weight, guess->weight);
+    is_cut = is_cut || description.joints[part].cut;
+  }
+  const bool has_coordinates = TakeValues(chain, false, &initial, &q);
+  const bool is_held = std::erase_if(initial.held, [&](int joint) {
+                         return std::ranges::count(chain.joints, joint) > 0;
+                       }) > 0;
+  const int joint = chain.joints[0];
+  SetComposed({chain.series.begin(), chain.series.end()}, composed, q.data(), u.data(),
+              &coordinates, &speeds);
+  if (has_coordinates || composed.type == JointType::kFree) {
+    initial.coordinates.push_back({joint, coordinates, weight});
+  }
+  if (has_speeds) initial.speeds.push_back({joint, speeds});
+  if (is_held) initial.held.push_back(joint);
+  const Placement X_PC = chain.places[0].Inverse();
+  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child).cut = is_cut;
+  std::swap(description.joints[joint], description.joints.back());
+  description.joints.pop_back();
+  for (std::size_t k = 1; k < chain.size(); ++k) {
+    description.joints[chain.joints[k]].type = JointType::kWeld;
+  }
+  Note(elements_[chain.child],
+       fmt::format("{} joints are one here: {}", chain.size(), ToString(composed.type)));
+}
+
 void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
   constexpr double kSmall = 1e-6;  // of the mass of the child, where nothing can be taken
   auto& bodies = description.bodies;
@@ -436,24 +414,26 @@ void ImportDraft::RejectRepeated(const MasslessChain& chain,
   mechanism.Normalise(q);  // a position without symmetry
   kinematics.UpdatePosition(q);
   const auto last = static_cast<std::size_t>(std::ssize(d.bodies) - 1);
-  MatrixX<double> J(6, freedoms), U(freedoms, freedoms);
+  MatrixX<double> J(6, freedoms);
   for (int i = 0; i < freedoms; ++i) {
     kinematics.UpdateVelocity(VectorX<double>::Unit(freedoms, i));
     const Velocity<Spatial, double>& V = kinematics.motions()[last];
     J.col(i) << V.angular.eigen(), V.linear.eigen() / (length > 0.0 ? length : 1.0);
     J.col(i).normalize();
   }
-  MatrixX<double> A = J.transpose() * J;
-  VectorX<double> lambda(freedoms);
-  SymmetricEigen<double>(A, U, lambda);
+  const VectorX<double> lambda = SymmetricEigenvalues(J.transpose() * J);
   // squares of singular values: round-off of sums of six products if they depend on each other
   if (lambda[0] <= 64.0 * std::numeric_limits<double>::epsilon() * lambda[freedoms - 1]) reject();
 }
 
 void ImportDraft::ComposeChains() {
   std::vector<Attachment> attachments(description.bodies.size());
-  const std::vector<bool> determined = FindDetermined(description),
-                          single = FindSingleJoints(description);
+  const std::vector<bool> determined = FindDetermined(description);
+  std::vector<bool> single = determined;  // something acts on their coordinate
+  for (ForceDescription force : description.forces) {
+    const int* joint = PartsOf(force).joint;
+    if (joint != nullptr) single[*joint] = true;
+  }
   for (MasslessChain& chain : FindChains(description)) {
     Place(description, &chain);
     RejectRepeated(chain, determined);
@@ -467,14 +447,13 @@ void ImportDraft::ComposeChains() {
         if (!composed) continue;
         ReplaceChain(part, *composed);
         for (std::size_t k = 0; k < part.between.size(); ++k) {
-          attachments[part.between[k]] = {
-              .carrier = part.child, .X = part.places[k + 1].AsFrame(), .attached = true};
+          attachments[part.between[k]] = {part.child, part.places[k + 1].AsFrame(), 0.0, true};
         }
         break;
       }
     }
   }
-  if (std::ranges::any_of(attachments, &Attachment::attached)) Attach(attachments);
+  Attach(attachments);
   std::vector<MasslessChain> left = FindChains(description);
   std::set<int> links;
   for (const MasslessChain& chain : left) links.insert(chain.between.begin(), chain.between.end());

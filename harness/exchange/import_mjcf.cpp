@@ -1,11 +1,8 @@
 #include "harness/exchange/import_mjcf.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-
 namespace loopbench::harness {
+
+using Eigen::Quaterniond, Eigen::Vector3d;
 
 namespace {
 
@@ -59,6 +56,9 @@ void RefuseMacros(const XmlElement& root) {
 }
 
 void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
+  constexpr XmlChoice<MjcfSettings::Inertia> kInertias[] = {{"false", MjcfSettings::kFromInertial},
+                                                            {"true", MjcfSettings::kFromGeoms},
+                                                            {"auto", MjcfSettings::kAuto}};
   const auto flag = [&](const char* name, bool* value) {
     *value = BoolOr(element.Attribute(name), *value);
   };
@@ -78,11 +78,8 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
                        settings->euler.find_first_not_of("xyzXYZ") == std::string::npos;
     if (!whole) euler->Fail("three letters of x, y, z, X, Y, Z");
   }
-  if (const auto from = element.Attribute("inertiafromgeom")) {
-    settings->inertia = from->Choice<MjcfSettings::Inertia>({{"false", MjcfSettings::kFromInertial},
-                                                             {"true", MjcfSettings::kFromGeoms},
-                                                             {"auto", MjcfSettings::kAuto}});
-  }
+  const auto from = element.Attribute("inertiafromgeom");
+  if (from) settings->inertia = from->Choice(kInertias);
   if (const auto range = element.Attribute("inertiagrouprange")) {
     const std::vector<double> groups = range->Numbers(2, 2);
     settings->first_group = static_cast<int>(std::clamp(groups[0], -1e6, 1e6));
@@ -100,7 +97,7 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
 
 void ReadOption(const XmlElement& element, MjcfModel* model) {
   MjcfSettings& settings = model->settings;
-  Eigen::Vector3d& gravity = model->draft->description.gravity;
+  Vector3d& gravity = model->draft->description.gravity;
   if (const auto given = element.Attribute("gravity")) gravity = given->Vector();
   for (const char* name : {"density", "viscosity", "wind"}) {
     const auto given = element.Attribute(name);
@@ -116,7 +113,7 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
       settings.silent_groups.insert(static_cast<int>(group));
     }
   }
-  for (const XmlElement& flags : element.Children("flag")) {
+  for (const XmlElement& flags : element.Children({"flag"})) {
     bool has_gravity = true, has_passive = true, has_constraints = true;
     for (const auto& [name, value] : {std::pair{"gravity", &has_gravity},
                                       {"passive", &has_passive},
@@ -139,8 +136,8 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
 /// Keeps meshes for the masses of geoms; the name of a mesh is by default its file's without
 /// ending.
 void ReadAssets(const XmlElement& root, MjcfModel* model) {
-  for (const XmlElement& assets : root.Children("asset")) {
-    for (const XmlElement& mesh : assets.Children("mesh")) {
+  for (const XmlElement& assets : root.Children({"asset"})) {
+    for (const XmlElement& mesh : assets.Children({"mesh"})) {
       const MjcfElement element = model->defaults.Of(mesh, "");
       const auto name = mesh.Attribute("name"), file = element.Attribute("file");
       if (!name && !file) continue;
@@ -154,34 +151,8 @@ void ReadAssets(const XmlElement& root, MjcfModel* model) {
   }
 }
 
-}  // namespace
-
-void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
-  MjcfModel model(draft);
-  if (const auto name = root.Attribute("model")) draft->description.name = name->Name();
-  draft->description.gravity = {0.0, 0.0, -9.81};
-  RefuseMacros(root);
-  for (const XmlElement& element : root.Children("compiler")) {
-    ReadCompiler(element, &model.settings);
-  }
-  for (const XmlElement& element : root.Children("option")) ReadOption(element, &model);
-  for (const XmlElement& element : root.Children("default")) model.defaults.Read(element, "");
-  ReadAssets(root, &model);
-  const std::vector<XmlElement> worlds = root.Children("worldbody");
-  if (worlds.empty()) root.Fail("no <worldbody>", "one");
-  for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
-  AdjustMasses(&model);
-  ReadMjcfLoops(root, &model);
-  ReadMjcfKeys(root, &model);
-  model.defaults.IgnoreUnused();
-  draft->NoteUnread(kMjcfReasons);
-}
-
 // Default classes, and orientations.
 
-namespace {
-
-constexpr const char* kMain = "main";    // class of elements without one
 constexpr std::size_t kMaxLayers = 100;  // each element searches all its defaults
 
 /// Returns the element type of defaults: the tag, or "actuator".
@@ -194,19 +165,25 @@ std::string DescribedBy(const std::string& tag) {
 
 }  // namespace
 
-std::optional<XmlValue> MjcfElement::Attribute(const std::string& name) const {
-  std::optional<XmlValue> found;
-  for (const XmlElement& layer : layers_) {
-    auto value = layer.Attribute(name);
-    if (!found) found = std::move(value);
+void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
+  MjcfModel model(draft);
+  if (const auto name = root.Attribute("model")) draft->description.name = name->Name();
+  draft->description.gravity = {0.0, 0.0, -9.81};
+  RefuseMacros(root);
+  for (const XmlElement& element : root.Children({"compiler"})) {
+    ReadCompiler(element, &model.settings);
   }
-  return found;
-}
-
-XmlValue MjcfElement::Required(const std::string& name, std::string_view expected) const {
-  auto value = Attribute(name);
-  if (!value) own().Fail(fmt::format("no \"{}\"", name), expected);
-  return *std::move(value);
+  for (const XmlElement& element : root.Children({"option"})) ReadOption(element, &model);
+  for (const XmlElement& element : root.Children({"default"})) model.defaults.Read(element, "");
+  ReadAssets(root, &model);
+  const std::vector<XmlElement> worlds = root.Children({"worldbody"});
+  if (worlds.empty()) root.Fail("no <worldbody>", "one");
+  for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
+  AdjustMasses(&model);
+  ReadMjcfLoops(root, &model);
+  ReadMjcfKeys(root, &model);
+  model.defaults.IgnoreUnused();
+  draft->NoteUnread(kMjcfReasons);
 }
 
 void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
@@ -232,15 +209,6 @@ void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   }
 }
 
-std::string MjcfDefaults::Known(const std::string& name) const {
-  return names_of_main_.contains(name) ? kMain : name;
-}
-
-void MjcfDefaults::CheckClass(const XmlValue& value) const {
-  const std::string name = Known(value.text());
-  if (!classes_.contains(name) && name != kMain) value.Fail("a class described in <default>");
-}
-
 MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
                              const std::string& tag, bool uses) const {
   const std::string wanted = DescribedBy(tag.empty() ? element.tag() : tag);
@@ -258,9 +226,7 @@ MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& child
     std::for_each(defaults->second.rbegin(), defaults->second.rend(),
                   [&made](const XmlElement& layer) { made.Add(layer); });
     if (uses) used_.emplace(found->first, wanted);
-    if (made.layers().size() > kMaxLayers + 1) {
-      element.Fail(fmt::format("more than {} defaults of its kind", kMaxLayers), "fewer");
-    }
+    element.RequireFew(made.layers().size() - 1, kMaxLayers, "defaults of its kind");
   }
   return made;
 }
@@ -274,7 +240,7 @@ void MjcfDefaults::IgnoreUnused() const {
   }
 }
 
-Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
+Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
   constexpr const char* kWays[] = {"quat", "axisangle", "euler", "xyaxes", "zaxis"};
   std::optional<XmlValue> found;
   std::string way;
@@ -289,8 +255,8 @@ Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
     }
     if (way.empty()) way = here;
   }
-  if (!found) return Eigen::Quaterniond::Identity();
-  const auto unit = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
+  if (!found) return Quaterniond::Identity();
+  const auto unit = [&](const Vector3d& v) -> Vector3d {
     if (!(v.norm() > 0.0)) found->Fail("axes that are not zero");
     return v.normalized();
   };
@@ -299,54 +265,35 @@ Eigen::Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
     return UnitQuaternion(*found, {q[0], q[1], q[2], q[3]});
   }
   if (way == "euler") {
-    const Eigen::Vector3d angles = draft->Vector(*found, settings.degrees ? "nnn" : "aaa");
+    const Vector3d angles = draft->Vector(*found, settings.degrees ? "nnn" : "aaa");
     return FromEuler(settings.euler,
                      angles.unaryExpr([&](double angle) { return settings.Angle(angle); }));
   }
   if (way == "axisangle") {
     const std::vector<double> a = draft->Numbers(*found, settings.degrees ? "dn" : "da");
-    return Eigen::Quaterniond(Eigen::AngleAxisd(settings.Angle(a[3]), unit({a[0], a[1], a[2]})));
+    return Quaterniond(Eigen::AngleAxisd(settings.Angle(a[3]), unit({a[0], a[1], a[2]})));
   }
-  if (way == "zaxis") {
-    return TurnOfZ(unit(draft->Vector(*found, "d")));
-  }
+  if (way == "zaxis") return TurnOfZ(unit(draft->Vector(*found, "d")));
   const std::vector<double> a = draft->Numbers(*found, "dd");
-  const Eigen::Vector3d x = unit({a[0], a[1], a[2]}), y_given(a[3], a[4], a[5]);
-  const Eigen::Vector3d y = unit(y_given - x.dot(y_given) * x);
-  Eigen::Matrix3d R;
-  R << x, y, x.cross(y);
-  return Eigen::Quaterniond(R);
-}
-
-Placement MjcfModel::PlacementOf(const MjcfElement& element) const {
-  Placement X;
-  if (const auto position = element.Attribute("pos")) X.p = position->Vector();
-  X.q = OrientationOf(element);
-  return X;
+  const Vector3d x = unit({a[0], a[1], a[2]}), y_given(a[3], a[4], a[5]);
+  const Vector3d y = unit(y_given - x.dot(y_given) * x);
+  return FromAxes(x, y, x.cross(y));
 }
 
 std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const std::string& flag,
                                               const std::string& range) const {
-  enum Choice { kNever, kAlways, kByRange };
-  const auto limited = element.Attribute(flag);
-  const auto given = element.Attribute(range);
-  const Choice choice =
-      limited ? limited->Choice<Choice>({{"false", kNever}, {"true", kAlways}, {"auto", kByRange}})
-              : kByRange;
-  const bool by_range = given && settings.limits_by_range;
-  if (choice == kNever || (choice == kByRange && !by_range)) return std::nullopt;
+  const auto limited = element.Attribute(flag), given = element.Attribute(range);
+  std::optional<bool> choice;  // none: by the range
+  if (limited) {
+    choice = limited->Choice<std::optional<bool>>(
+        {{"false", false}, {"true", true}, {"auto", std::nullopt}});
+  }
+  if (!choice.value_or(given && settings.limits_by_range)) return std::nullopt;
   if (!given) element.own().Fail(fmt::format("\"{}\" without \"{}\"", flag, range), "both");
   const std::vector<double> ends = given->Numbers(2, 2);
   if (ends[0] < ends[1]) return MjcfLimits{ends[0], ends[1]};
-  if (choice == kAlways) given->Fail("two numbers, the first below the second");
+  if (choice) given->Fail("two numbers, the first below the second");
   return std::nullopt;  // as in MuJoCo, whose default is 0 0
-}
-
-void MjcfModel::NoteLimits(const MjcfElement& element, const char* reason) const {
-  const auto flag = element.Attribute("limited"), range = element.Attribute("range");
-  if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
-    draft->Drop(element.own(), range ? "range" : "limited", reason);
-  }
 }
 
 }  // namespace loopbench::harness

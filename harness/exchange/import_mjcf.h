@@ -4,16 +4,7 @@
 #pragma once
 
 #include <deque>
-#include <filesystem>
-#include <functional>
-#include <map>
-#include <optional>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "harness/exchange/import_draft.h"
 #include "harness/exchange/solids.h"
 
 namespace loopbench::harness {
@@ -31,12 +22,22 @@ class MjcfElement {
   const std::vector<XmlElement>& layers() const { return layers_; }
   void Add(const XmlElement& layer) { layers_.push_back(layer); }
 
-  std::optional<XmlValue> Attribute(const std::string& name) const;
+  std::optional<XmlValue> Attribute(const std::string& name) const {
+    std::optional<XmlValue> found;
+    for (const XmlElement& layer : layers_) {
+      auto value = layer.Attribute(name);
+      if (!found) found = std::move(value);
+    }
+    return found;
+  }
   double Number(const std::string& name, double otherwise, const Range& range = {}) const {
     return NumberOr(Attribute(name), otherwise, range);
   }
   /// Returns an attribute; if absent, throws with `expected`.
-  XmlValue Required(const std::string& name, std::string_view expected) const;
+  XmlValue Required(const std::string& name, std::string_view expected) const {
+    const auto value = Attribute(name);
+    return value ? *value : own().Required(name, expected);
+  }
 
  private:
   std::vector<XmlElement> layers_;
@@ -53,7 +54,10 @@ class MjcfDefaults {
   MjcfElement Of(const XmlElement& element, const std::string& childclass,
                  const std::string& tag = "", bool uses = true) const;
   /// Rejects an undefined class.
-  void CheckClass(const XmlValue& value) const;
+  void CheckClass(const XmlValue& value) const {
+    const std::string name = Known(value.text());
+    if (!classes_.contains(name) && name != kMain) value.Fail("a class described in <default>");
+  }
   /// Marks unused defaults as read.
   void IgnoreUnused() const;
 
@@ -63,8 +67,11 @@ class MjcfDefaults {
     /// Defaults by element type, in file order: actuators of all tags have one default.
     std::map<std::string, std::vector<XmlElement>> elements;
   };
+  static constexpr const char* kMain = "main";  ///< class of elements without one
   /// Returns the name under which a class is defined.
-  std::string Known(const std::string& name) const;
+  std::string Known(const std::string& name) const {
+    return names_of_main_.contains(name) ? kMain : name;
+  }
 
   std::map<std::string, Class> classes_;
   std::set<std::string> names_of_main_;
@@ -108,21 +115,11 @@ struct MjcfStep {
   int joint = -1;  ///< in MjcfModel::joints; -1: fixed
 };
 
-/// A site: a point of a body, and the orientation of its frame there.
-struct MjcfSite : BodyPoint {
-  Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
-};
-
 /// One copy of the contents of a <replicate>, within a copy of each <replicate> around it.
 struct MjcfReplica {
   std::size_t replicate = 0;  ///< index into MjcfModel::replicates
   const MjcfReplica* around = nullptr;
   std::string suffix;  ///< of names: its own, then that of the replica around it
-};
-
-struct MjcfReplicate {
-  std::optional<std::size_t> around;  ///< the next <replicate> around it
-  std::vector<const MjcfReplica*> replicas;
 };
 
 class MjcfModel {
@@ -134,20 +131,26 @@ class MjcfModel {
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
   std::vector<MjcfStep> steps;    ///< of all bodies and links, in the order of the file
-  std::map<std::string, MjcfSite> sites;
+  std::map<std::string, FrameOn> sites;
   std::map<std::string, MjcfElement> meshes;
   mutable std::map<std::string, Solid> mesh_solids;  ///< of meshes that have been read
   std::map<std::string, std::size_t> joint_names;
   std::set<int> links;  ///< bodies without mass between joints of one body of MuJoCo
-  std::vector<MjcfReplicate> replicates;
+  std::vector<std::vector<const MjcfReplica*>> replicates;  ///< all copies of each <replicate>
 
   /// Returns the next copy of the contents of a <replicate>; nullptr stands for no replica.
   const MjcfReplica* AddReplica(const XmlElement& element, const MjcfReplica* around,
                                 const std::string& suffix);
   /// Counts an element that is read in a replica; rejects too many.
-  void CountCopy(const XmlElement& element);
+  void CountCopy(const XmlElement& element) {
+    element.RequireFew(++num_copies_, 100000, "elements of replicas");
+  }
   /// Returns a new name of this kind ("joint"), with the suffix of its replica.
-  std::string NewName(const std::string& kind, const XmlValue& name, const MjcfReplica* replica);
+  std::string NewName(const std::string& kind, const XmlValue& name, const MjcfReplica* replica) {
+    if (replica == nullptr) return name.Name();
+    replicated_.emplace(kind + " " + name.Name(), replica->replicate);
+    return name.Name() + replica->suffix;
+  }
   /// Returns the name that a reference stands for in the replica that is read at present.
   std::string NameOf(const std::string& kind, const XmlValue& reference) const;
   /// Returns the suffix of names in the replica that is read at present.
@@ -159,12 +162,20 @@ class MjcfModel {
 
   /// Returns the orientation of the element in any notation; by default the one of its class.
   Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
-  Placement PlacementOf(const MjcfElement& element) const;
+  Placement PlacementOf(const MjcfElement& element) const {
+    const Eigen::Vector3d p = VectorOr(element.Attribute("pos"));
+    return {OrientationOf(element), p};
+  }
   /// Returns the limits in `range`, if `flag` or, without it, the range itself makes them active.
   std::optional<MjcfLimits> LimitsOf(const MjcfElement& element, const std::string& flag,
                                      const std::string& range) const;
   /// Notes that limits of a joint or tendon are dropped, with or without a range.
-  void NoteLimits(const MjcfElement& element, const char* reason) const;
+  void NoteLimits(const MjcfElement& element, const char* reason) const {
+    const auto flag = element.Attribute("limited"), range = element.Attribute("range");
+    if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
+      draft->Drop(element.own(), range ? "range" : "limited", reason);
+    }
+  }
   /// Notes that a nonzero number is dropped.
   void DropNonzero(const MjcfElement& element, const char* name, const char* reason) const {
     if (element.Number(name, 0.0) != 0.0) draft->Drop(element.own(), name, reason);
@@ -172,15 +183,11 @@ class MjcfModel {
   /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
   /// rest length of tendons.
   std::vector<Placement> WhereSpringsAreFree() const;
-  const MjcfSite& SiteNamed(const XmlValue& value) const {
-    const auto found = sites.find(NameOf("site", value));
-    if (found == sites.end()) value.Fail("the name of a site");
-    return found->second;
+  const FrameOn& SiteNamed(const XmlValue& value) const {
+    return Named(sites, NameOf("site", value), value, "the name of a site");
   }
   std::size_t JointNamed(const XmlValue& value) const {
-    const auto found = joint_names.find(NameOf("joint", value));
-    if (found == joint_names.end()) value.Fail("the name of a joint");
-    return found->second;
+    return Named(joint_names, NameOf("joint", value), value, "the name of a joint");
   }
   int BodyNamed(const XmlValue& value) const {
     return value.text() == "world" ? kGround : draft->BodyNamed(NameOf("body", value), value);

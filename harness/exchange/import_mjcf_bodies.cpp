@@ -1,15 +1,12 @@
 // <worldbody>: bodies, their masses and their sites; <replicate>: copies of elements.
-#include <fmt/format.h>
-
-#include <cmath>
-
 #include "harness/exchange/import_mjcf.h"
-#include "harness/exchange/solids.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 
 namespace {
+
+using Eigen::Vector3d;
 
 /// A geom of a body, its class, and its enclosing frame.
 struct MjcfGeom {
@@ -30,8 +27,7 @@ enum Type { kSphere, kCapsule, kCylinder, kBox, kEllipsoid, kWithoutMass, kOfMes
 constexpr std::size_t kSizes[] = {1, 2, 2, 3, 3};
 
 /// Returns the sizes of a geom and its frame; `fromto` gives position, axis and half length.
-Eigen::Vector3d PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, Type type,
-                             Placement* X) {
+Vector3d PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, Type type, Placement* X) {
   const auto size = geom.Attribute("size");
   const auto along = geom.Attribute("fromto");
   *X = model.PlacementOf(geom);
@@ -39,9 +35,9 @@ Eigen::Vector3d PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, Ty
   const bool has_ends = along && type != kSphere;
   std::vector<double> sizes = size->Numbers(has_ends ? 1 : kSizes[type], 3);
   sizes.resize(3);
-  if (!has_ends) return Eigen::Vector3d(sizes.data());
+  if (!has_ends) return Vector3d(sizes.data());
   const std::vector<double> ends = along->Numbers(6, 6);
-  const Eigen::Vector3d from(ends.data()), to(ends.data() + 3);
+  const Vector3d from(ends.data()), to(ends.data() + 3);
   const double length = (to - from).norm();
   if (!(length > 0.0)) along->Fail("two different points");
   X->p = 0.5 * (from + to);
@@ -51,30 +47,30 @@ Eigen::Vector3d PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, Ty
   return {sizes[0], sizes[0], 0.5 * length};
 }
 
-Solid ShapeOf(Type type, const Eigen::Vector3d& size) {
+Solid ShapeOf(Type type, const Vector3d& size) {
   if (type == kCapsule) return CapsuleOf(size[0], size[1]);
   if (type == kCylinder) return CylinderOf(size[0], size[1]);
   if (type == kBox) return BoxOf(size);
-  return EllipsoidOf(type == kSphere ? Eigen::Vector3d(size[0], size[0], size[0]) : size);
+  return EllipsoidOf(type == kSphere ? Vector3d(size[0], size[0], size[0]) : size);
+}
+
+/// Returns numbers in threes.
+std::vector<double> Triples(const XmlValue& value, std::size_t most, const char* what) {
+  std::vector<double> numbers = value.Numbers(12, most);
+  if (numbers.size() % 3 == 0) return numbers;
+  value.element().Fail(fmt::format("{} numbers in \"{}\"", numbers.size(), value.attribute()),
+                       fmt::format("three for each {}", what));
 }
 
 /// Reads the points of a mesh from `vertex`, and triangles from `face`, if any.
 TriangleMesh ReadVertices(const XmlValue& vertex, const std::optional<XmlValue>& face) {
   TriangleMesh mesh;
-  const std::vector<double> numbers = vertex.Numbers(12, 3 * kMostHullPoints);
-  if (numbers.size() % 3 != 0) {
-    vertex.element().Fail(fmt::format("{} numbers in \"vertex\"", numbers.size()),
-                          "three for each point");
-  }
+  const std::vector<double> numbers = Triples(vertex, 3 * kMostHullPoints, "point");
   for (std::size_t i = 0; i < numbers.size(); i += 3) {
     mesh.points.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
   }
   if (!face) return mesh;
-  const std::vector<double> corners = face->Numbers(12, 6 * kMostHullPoints);
-  if (corners.size() % 3 != 0) {
-    face->element().Fail(fmt::format("{} numbers in \"face\"", corners.size()),
-                         "three for each triangle");
-  }
+  const std::vector<double> corners = Triples(*face, 6 * kMostHullPoints, "triangle");
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const double corner = corners[i];
     if (corner != std::floor(corner) || corner < 0.0 ||
@@ -98,17 +94,12 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
   }
   const auto inertia = asset.Attribute("inertia");
   const bool is_convex = inertia && inertia->text() == "convex";
-  const MeshRule rule = inertia ? inertia->Choice<MeshRule>({{"convex", MeshRule::kEnclosed},
-                                                             {"legacy", MeshRule::kPyramids},
-                                                             {"exact", MeshRule::kEnclosed},
-                                                             {"shell", MeshRule::kShell}})
-                                : MeshRule::kPyramids;
-  const auto vector = [&](const char* attribute, const Eigen::Vector3d& otherwise) {
-    const auto given = asset.Attribute(attribute);
-    return given ? given->Vector() : otherwise;
-  };
-  const Eigen::Vector3d scale = vector("scale", Eigen::Vector3d::Ones());
-  const Eigen::Vector3d origin = vector("refpos", Eigen::Vector3d::Zero());
+  using enum MeshRule;
+  constexpr XmlChoice<MeshRule> kRules[] = {
+      {"convex", kEnclosed}, {"legacy", kPyramids}, {"exact", kEnclosed}, {"shell", kShell}};
+  const MeshRule rule = inertia ? inertia->Choice(kRules) : kPyramids;
+  const Vector3d scale = VectorOr(asset.Attribute("scale"), Vector3d::Ones());
+  const Vector3d origin = VectorOr(asset.Attribute("refpos"));
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
   if (const auto given = asset.Attribute("refquat")) {
     const std::vector<double> q = given->Numbers(4, 4);
@@ -127,7 +118,7 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
       given.element().Fail("points in a plane", "points that enclose a volume");
     }
   }
-  for (Eigen::Vector3d& point : mesh.points) {
+  for (Vector3d& point : mesh.points) {
     point = scale.cwiseProduct(turn.conjugate() * (point - origin));
   }
   if (scale.prod() < 0.0) {
@@ -139,10 +130,10 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
                          "a volume > 0, with triangles counter-clockwise from outside");
   }
   const std::size_t open = NumOpenEdges(mesh);
-  if (open > 0 && rule == MeshRule::kEnclosed) {
+  if (open > 0 && rule == kEnclosed) {
     given.Fail(fmt::format("a closed mesh: {} edges have a triangle on one side only", open));
   }
-  if (open > 0 && rule == MeshRule::kPyramids) {
+  if (open > 0 && rule == kPyramids) {
     model.draft->Note(asset.own(), file ? "file" : "vertex",
                       fmt::format("not closed at {} edges: mass by MuJoCo's legacy rule", open));
   }
@@ -150,10 +141,10 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
 }
 
 const Solid& MeshSolid(const MjcfModel& model, const XmlValue& name) {
-  const MjcfElement& asset = Named(model.meshes, name, "the name of a mesh");
-  const auto known = model.mesh_solids.find(name.text());
-  if (known != model.mesh_solids.end()) return known->second;
-  return model.mesh_solids.emplace(name.text(), ReadMeshSolid(model, asset)).first->second;
+  const MjcfElement& asset = Named(model.meshes, name.Name(), name, "the name of a mesh");
+  const auto [known, is_new] = model.mesh_solids.try_emplace(name.text());
+  if (is_new) known->second = ReadMeshSolid(model, asset);
+  return known->second;
 }
 
 /// Reads a geom; returns false if it has no mass.
@@ -161,16 +152,12 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, P
   const MjcfElement& element = geom.element;
   const auto given = element.Attribute("type");
   const auto mesh = element.Attribute("mesh");
-  const Type type = given ? given->Choice<Type>({{"sphere", kSphere},
-                                                 {"capsule", kCapsule},
-                                                 {"cylinder", kCylinder},
-                                                 {"box", kBox},
-                                                 {"ellipsoid", kEllipsoid},
-                                                 {"plane", kWithoutMass},
-                                                 {"hfield", kWithoutMass},
-                                                 {"mesh", kOfMesh},
-                                                 {"sdf", kOfMesh}})
-                          : kSphere;
+  constexpr XmlChoice<Type> kTypes[] = {{"sphere", kSphere},       {"capsule", kCapsule},
+                                        {"cylinder", kCylinder},   {"box", kBox},
+                                        {"ellipsoid", kEllipsoid}, {"plane", kWithoutMass},
+                                        {"hfield", kWithoutMass},  {"mesh", kOfMesh},
+                                        {"sdf", kOfMesh}};
+  const Type type = given ? given->Choice(kTypes) : kSphere;
   const double kg = element.Number("mass", -1.0, kNotNegative);
   const double density = element.Number("density", kDensity, kNotNegative);
   const double group = element.Number("group", 0.0);
@@ -185,7 +172,7 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, P
     read->solid = MeshSolid(model, element.Required("mesh", "the name of a mesh"));
     read->X = model.PlacementOf(element);
   } else {
-    const Eigen::Vector3d size = PlaceAndSize(model, element, type, &read->X);
+    const Vector3d size = PlaceAndSize(model, element, type, &read->X);
     for (std::size_t i = 0; i < kSizes[type]; ++i) {
       if (!(size[i] > 0.0)) element.own().Fail("a size that is not > 0", "sizes > 0");
     }
@@ -223,10 +210,8 @@ void IgnoreGeom(const MjcfElement& geom, const std::string& fate, MjcfModel* mod
 
 // Bodies.
 
-/// Contents of a body, without intermediate <frame> elements.
-struct Contents {
-  std::vector<MjcfPlaced> bodies, geoms, sites, joints, inertials;
-};
+/// Contents of a body by tag, without intermediate <frame> elements.
+using Contents = std::map<std::string, std::vector<MjcfPlaced>>;
 
 std::string ClassWithin(const MjcfModel& model, const XmlElement& element,
                         const std::string& around) {
@@ -249,19 +234,18 @@ void GatherReplicas(MjcfModel* model, const MjcfPlaced& placed, Contents* conten
     given.Fail("a whole number from 1 to 100000");
   }
   constexpr std::size_t kMostLetters = 32;
-  const auto separator = element.Attribute("sep"), shift = element.Attribute("offset"),
-             euler = element.Attribute("euler");
+  const auto separator = element.Attribute("sep"), euler = element.Attribute("euler");
   if (separator && !separator->text().empty() && separator->Name().size() > kMostLetters) {
     separator->Fail(fmt::format("at most {} bytes", kMostLetters));
   }
   const bool degrees = model->settings.degrees;
-  const Eigen::Vector3d offset = shift ? shift->Vector() : Eigen::Vector3d::Zero();
-  const Eigen::Vector3d angles =
-      euler ? model->draft->Vector(*euler, degrees ? "nnn" : "aaa") : Eigen::Vector3d::Zero();
+  const Vector3d offset = VectorOr(element.Attribute("offset"));
+  const Vector3d angles =
+      euler ? model->draft->Vector(*euler, degrees ? "nnn" : "aaa") : Vector3d::Zero();
   const auto digits = fmt::format("{}", count).size();
   Placement X;
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d turned = (degrees ? kDegree : 1.0) * i * angles;
+    const Vector3d turned = (degrees ? kDegree : 1.0) * i * angles;
     X.q = FromEuler(model->settings.euler, turned);
     const std::string suffix =
         fmt::format("{}{:0{}}", separator ? separator->text() : "", i, digits);
@@ -273,10 +257,6 @@ void GatherReplicas(MjcfModel* model, const MjcfPlaced& placed, Contents* conten
 
 /// Collects contents in file order, inside and outside of frames; this is the order of qpos.
 void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
-  std::map<std::string, std::vector<MjcfPlaced>*> lists = {
-      {"body", &contents->bodies},        {"geom", &contents->geoms},
-      {"site", &contents->sites},         {"joint", &contents->joints},
-      {"inertial", &contents->inertials}, {"freejoint", &contents->joints}};
   for (const XmlElement& child : placed.element.Children(
            {"body", "geom", "site", "joint", "freejoint", "inertial", "frame", "replicate"})) {
     const std::string tag = child.tag();
@@ -284,8 +264,9 @@ void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
     if (tag.ends_with("joint") && placed.element.tag() == "replicate") {
       child.Fail("a joint in a <replicate>", "joints in its bodies");
     }
-    if (std::vector<MjcfPlaced>* list = lists[tag]) {
-      list->push_back({child, placed.X, placed.childclass, placed.replica});
+    if (tag != "frame" && tag != "replicate") {
+      (*contents)[tag == "freejoint" ? "joint" : tag].push_back(
+          {child, placed.X, placed.childclass, placed.replica});
       continue;
     }
     child.Attribute("name");
@@ -307,7 +288,7 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
     const Placement X = site.X * model->PlacementOf(element);
     if (!given) continue;
     const std::string name = model->NewName("site", *given, site.replica);
-    if (!model->sites.emplace(name, MjcfSite{{body, X.p}, X.q}).second) {
+    if (!model->sites.emplace(name, FrameOn{body, X}).second) {
       given->Fail("a name that no other site has");
     }
     model->draft->description.bodies[body].points.emplace(name, X.p);
@@ -335,14 +316,15 @@ BodyDescription ReadInertial(const MjcfPlaced& placed, const MjcfModel& model) {
 }
 
 /// Reads masses. `is_fixed`: fixed to the ground, where masses matter only for a total mass.
-void ReadMasses(const Contents& contents, int body, bool is_fixed, MjcfModel* model) {
-  const bool has_inertial = !contents.inertials.empty();
-  if (contents.inertials.size() > 1) {
-    contents.inertials[1].element.Fail("a second <inertial>", "at most one in a body");
+void ReadMasses(Contents& contents, int body, bool is_fixed, MjcfModel* model) {
+  const std::vector<MjcfPlaced>& inertials = contents["inertial"];
+  const bool has_inertial = !inertials.empty();
+  if (inertials.size() > 1) {
+    inertials[1].element.Fail("a second <inertial>", "at most one in a body");
   }
   const MjcfSettings& settings = model->settings;
   std::vector<MjcfGeom> geoms;
-  for (const MjcfPlaced& geom : contents.geoms) {
+  for (const MjcfPlaced& geom : contents["geom"]) {
     geoms.push_back({model->defaults.Of(geom.element, geom.childclass), geom.X});
   }
   const bool wants_geoms = settings.inertia == MjcfSettings::kFromGeoms ||
@@ -351,15 +333,11 @@ void ReadMasses(const Contents& contents, int body, bool is_fixed, MjcfModel* mo
   if (wants_geoms) masses = MassOfGeoms(*model, geoms, is_fixed && settings.total_mass <= 0.0);
   const bool from_geoms = masses.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains
   if (from_geoms && has_inertial) {
-    model->draft->DropWhole(contents.inertials[0].element,
-                            "inertiafromgeom asks for the geoms' masses");
+    model->draft->DropWhole(inertials[0].element, "inertiafromgeom asks for the geoms' masses");
   } else if (has_inertial) {
-    masses = ReadInertial(contents.inertials[0], *model);
+    masses = ReadInertial(inertials[0], *model);
   }
-  BodyDescription& described = model->draft->description.bodies[body];
-  described.mass = masses.mass;
-  described.com = masses.com;
-  described.inertia = masses.inertia;
+  model->draft->SetMass(body, masses.mass, masses.com, masses.inertia);
   for (const MjcfGeom& geom : geoms) {
     IgnoreGeom(geom.element, from_geoms ? "no shape here, only its mass: " : "dropped: ", model);
   }
@@ -377,16 +355,16 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   draft->at_rest[body] = draft->at_rest[parent] * X_PB;
   Contents contents;
   Gather(model, {element, {}, childclass, placed.replica}, &contents);
-  is_fixed = is_fixed && contents.joints.empty();
+  is_fixed = is_fixed && contents["joint"].empty();
   ReadMasses(contents, body, is_fixed, model);
-  ReadSites(contents.sites, body, model);
+  ReadSites(contents["site"], body, model);
   const double lift = NumberOr(element.Attribute("gravcomp"), 0.0);
   if (lift != 0.0 && model->settings.has_passive()) draft->AddLift(body, lift);
   if (BoolOr(element.Attribute("mocap"))) {
     draft->Note(element, "mocap", "stays where the file draws it", true);
   }
-  AddMjcfJoints(model, element, parent, body, X_PB, contents.joints);
-  for (const MjcfPlaced& child : contents.bodies) ReadBody(child, body, is_fixed, model);
+  AddMjcfJoints(model, element, parent, body, X_PB, contents["joint"]);
+  for (const MjcfPlaced& child : contents["body"]) ReadBody(child, body, is_fixed, model);
 }
 
 void BoundBelow(double least, Eigen::Matrix3d* inertia) {
@@ -395,8 +373,16 @@ void BoundBelow(double least, Eigen::Matrix3d* inertia) {
   SymmetricEigen<double>(A, U, moments);
   if (moments[0] >= least) return;
   const Eigen::Matrix3d axes = U;
-  const Eigen::Vector3d bounded = moments.cwiseMax(least);
+  const Vector3d bounded = moments.cwiseMax(least);
   *inertia = axes * bounded.asDiagonal() * axes.transpose();
+}
+
+// <replicate>: copies of elements, their names, and the elements that refer to them.
+
+/// Returns the replica itself or the one around it of this <replicate>, if any.
+const MjcfReplica* ReplicaOf(std::size_t replicate, const MjcfReplica* replica) {
+  while (replica != nullptr && replica->replicate != replicate) replica = replica->around;
+  return replica;
 }
 
 }  // namespace
@@ -404,17 +390,17 @@ void BoundBelow(double least, Eigen::Matrix3d* inertia) {
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model) {
   Contents contents;
   Gather(model, {world, {}, ClassWithin(*model, world, "")}, &contents);
-  for (const MjcfPlaced& geom : contents.geoms) {
+  for (const MjcfPlaced& geom : contents["geom"]) {
     IgnoreGeom(model->defaults.Of(geom.element, geom.childclass), "dropped: ", model);
   }
-  for (const MjcfPlaced& joint : contents.joints) {
+  for (const MjcfPlaced& joint : contents["joint"]) {
     joint.element.Fail("a joint of the world", "joints in bodies");
   }
-  for (const MjcfPlaced& inertial : contents.inertials) {
+  for (const MjcfPlaced& inertial : contents["inertial"]) {
     inertial.element.Fail("a mass of the world", "masses of bodies");
   }
-  ReadSites(contents.sites, kGround, model);
-  for (const MjcfPlaced& body : contents.bodies) ReadBody(body, kGround, true, model);
+  ReadSites(contents["site"], kGround, model);
+  for (const MjcfPlaced& body : contents["body"]) ReadBody(body, kGround, true, model);
 }
 
 void AdjustMasses(MjcfModel* model) {
@@ -438,70 +424,40 @@ void AdjustMasses(MjcfModel* model) {
   }
 }
 
-// <replicate>: copies of elements, their names, and the elements that refer to them.
-
-namespace {
-
-constexpr std::size_t kMostCopies = 100000;  // of elements in replicas
-constexpr std::size_t kMostNested = 16;
-
-}  // namespace
-
-void MjcfModel::CountCopy(const XmlElement& element) {
-  if (++num_copies_ <= kMostCopies) return;
-  element.Fail(fmt::format("more than {} elements of replicas", kMostCopies), "fewer");
-}
-
 const MjcfReplica* MjcfModel::AddReplica(const XmlElement& element, const MjcfReplica* around,
                                          const std::string& suffix) {
   draft->has_replicas = true;
   CountCopy(element);
   std::size_t depth = 1;
   for (const MjcfReplica* outer = around; outer != nullptr; outer = outer->around) ++depth;
-  if (depth > kMostNested) {
-    element.Fail(fmt::format("more than {} nested <replicate>", kMostNested), "fewer");
-  }
+  element.RequireFew(depth, 16, "nested <replicate>");
   const auto [known, is_new] = known_.emplace(element.id(), replicates.size());
-  if (is_new) {
-    MjcfReplicate& added = replicates.emplace_back();
-    if (around != nullptr) added.around = around->replicate;
-  }
+  if (is_new) replicates.emplace_back();
   const std::string outer = around != nullptr ? around->suffix : "";
   replicas_.push_back({known->second, around, suffix + outer});
-  replicates[known->second].replicas.push_back(&replicas_.back());
-  return &replicas_.back();
-}
-
-std::string MjcfModel::NewName(const std::string& kind, const XmlValue& name,
-                               const MjcfReplica* replica) {
-  if (replica == nullptr) return name.Name();
-  replicated_.emplace(kind + " " + name.Name(), replica->replicate);
-  return name.Name() + replica->suffix;
+  return replicates[known->second].emplace_back(&replicas_.back());
 }
 
 std::string MjcfModel::NameOf(const std::string& kind, const XmlValue& reference) const {
   const auto found = replicated_.find(kind + " " + reference.Name());
-  const MjcfReplica* replica = found == replicated_.end() ? nullptr : present_;
-  while (replica != nullptr && replica->replicate != found->second) replica = replica->around;
+  const MjcfReplica* replica =
+      found == replicated_.end() ? nullptr : ReplicaOf(found->second, present_);
   return reference.Name() + (replica != nullptr ? replica->suffix : "");
 }
 
 void MjcfModel::ForReplicas(const References& references, const std::function<void()>& read) {
-  const auto is_around = [&](std::size_t outer, std::optional<std::size_t> inner) {
-    while (inner && *inner != outer) inner = replicates[*inner].around;
-    return inner.has_value();
-  };
-  std::optional<std::size_t> innermost;
+  const MjcfReplica* innermost = nullptr;  // the first of its <replicate>
   for (const auto& [kind, name] : references) {
     const auto found = name ? replicated_.find(kind + " " + name->text()) : replicated_.end();
-    if (found == replicated_.end() || is_around(found->second, innermost)) continue;
-    if (innermost && !is_around(*innermost, found->second)) {
+    if (found == replicated_.end() || ReplicaOf(found->second, innermost) != nullptr) continue;
+    const MjcfReplica* first = replicates[found->second].front();
+    if (innermost != nullptr && ReplicaOf(innermost->replicate, first) == nullptr) {
       name->Fail("names in one <replicate>, or in others around it");
     }
-    innermost = found->second;
+    innermost = first;
   }
-  if (!innermost) return read();
-  for (const MjcfReplica* replica : replicates[*innermost].replicas) {
+  if (innermost == nullptr) return read();
+  for (const MjcfReplica* replica : replicates[innermost->replicate]) {
     present_ = replica;
     CountCopy(references[0].second ? references[0].second->element() : draft->element(kGround));
     read();

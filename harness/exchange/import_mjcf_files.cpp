@@ -4,7 +4,6 @@
 #include <set>
 
 #include "harness/exchange/xml_document.h"
-#include "harness/exchange/xml_file.h"
 #include "harness/text/files.h"
 
 namespace loopbench::harness {
@@ -24,6 +23,15 @@ constexpr std::pair<const char*, const char*> kReferences[] = {
     {"tendon", "tendon"}, {"tendon1", "tendon"},     {"tendon2", "tendon"},
     {"refsite", "site"},  {"cranksite", "site"},     {"slidersite", "site"},
     {"sidesite", "site"}, {"jointinparent", "joint"}};
+
+/// Attributes of <compiler> that attached models share, and their defaults.
+constexpr std::pair<const char*, const char*> kSettings[] = {
+    {"angle", "degree"},         {"eulerseq", "xyz"},          {"autolimits", "true"},
+    {"inertiafromgeom", "auto"}, {"inertiagrouprange", "0 5"}, {"balanceinertia", "false"},
+    {"boundmass", "0"},          {"boundinertia", "0"},        {"settotalmass", "-1"}};
+
+/// Sections of elements that refer to others.
+constexpr auto kReferring = {"tendon", "equality", "actuator"};
 
 /// Returns the value of an attribute without surrounding blanks, or "".
 std::string ValueOf(const Element* element, const char* key) {
@@ -97,6 +105,15 @@ class Includer {
     std::erase_if(named, [&](Element* child) { return child->Name() != tag; });
     return named;
   }
+  /// Calls `use` for the elements of these sections, with the tag of the section.
+  template <class Use>
+  void ForElements(Element* root, std::initializer_list<const char*> tags, const Use& use) const {
+    for (const char* tag : tags) {
+      for (Element* section : Named(root, tag)) {
+        for (Element* one : document_->ChildrenOf(section)) use(one, tag);
+      }
+    }
+  }
   /// Adds the descendants of an element with this tag and not those within them, or all without
   /// tag.
   void AddWithin(Element* element, std::string_view tag, std::vector<Element*>* found) const {
@@ -140,7 +157,7 @@ class Includer {
     if (!given_model) return AttachCopy(attach, place, root);
     const XmlValue& model = *given_model;
     std::optional<XmlValue> file;
-    for (const XmlElement& given : XmlElement(document_, root).InSections("asset", "model")) {
+    for (const XmlElement& given : XmlElement(document_, root).InSections("asset", {"model"})) {
       const XmlValue path = given.Required("file", "a MJCF file");
       if (NameOf(given, path, folder) == model.text()) file = path;
     }
@@ -152,15 +169,7 @@ class Includer {
     Resolve(other, shown.parent_path());
     open_.pop_back();
     std::swap(known, known_);
-    for (const auto& [name, otherwise] : {std::pair{"angle", "degree"},
-                                          {"eulerseq", "xyz"},
-                                          {"autolimits", "true"},
-                                          {"inertiafromgeom", "auto"},
-                                          {"inertiagrouprange", "0 5"},
-                                          {"balanceinertia", "false"},
-                                          {"boundmass", "0"},
-                                          {"boundinertia", "0"},
-                                          {"settotalmass", "-1"}}) {
+    for (const auto& [name, otherwise] : kSettings) {
       const std::string wanted = Setting(root, name, otherwise);
       if (Setting(other, name, otherwise) == wanted) continue;
       model.Fail(fmt::format("a model with {}=\"{}\" in its <compiler>, as in {}", name, wanted,
@@ -274,32 +283,23 @@ class Includer {
   void CopyReferring(Element* root, std::set<std::string>* inside, const std::string& prefix,
                      const XmlElement& attach) {
     std::vector<Element*> sections;
-    for (const char* tag : {"tendon", "equality", "actuator"}) {
-      for (Element* section : Named(root, tag)) {
-        for (Element* one : document_->ChildrenOf(section)) {
-          ++visited_;
-          if (NumReferences(one, *inside) <= 0) continue;
-          if (const std::string name = ValueOf(one, "name"); !name.empty()) {
-            inside->insert(std::string(tag) + " " + name);
-          }
-          sections.push_back(root->GetDocument()->NewElement(tag));
-          sections.back()->InsertEndChild(Copy(one, prefix, root->GetDocument(), attach));
-        }
+    ForElements(root, kReferring, [&](Element* one, const char* tag) {
+      ++visited_;
+      if (NumReferences(one, *inside) <= 0) return;
+      if (const std::string name = ValueOf(one, "name"); !name.empty()) {
+        inside->insert(std::string(tag) + " " + name);
       }
-    }
+      sections.push_back(root->GetDocument()->NewElement(tag));
+      sections.back()->InsertEndChild(Copy(one, prefix, root->GetDocument(), attach));
+    });
     std::ranges::copy(sections, std::back_inserter(document_->added[root]));
-    constexpr std::size_t kMostVisited = 10000000;
-    if (visited_ <= kMostVisited) return;
-    attach.Fail(fmt::format("more than {} elements to search for copies", kMostVisited), "fewer");
+    attach.RequireFew(visited_, 10000000, "elements to search for copies");
   }
 
   /// Returns a copy of an element and its contents, with prefixed names.
   Element* Copy(Element* element, const std::string& prefix, tinyxml2::XMLDocument* document,
                 const XmlElement& attach, int depth = 1) {
-    constexpr std::size_t kMostCopied = 100000;
-    if (++copied_ > kMostCopied) {
-      attach.Fail(fmt::format("more than {} elements of copies", kMostCopied), "fewer");
-    }
+    attach.RequireFew(++copied_, 100000, "elements of copies");
     if (depth > TINYXML2_MAX_ELEMENT_DEPTH) {
       attach.Fail(fmt::format("a copy with more than {} elements within each other",
                               TINYXML2_MAX_ELEMENT_DEPTH),
@@ -358,22 +358,15 @@ class Includer {
       if (const char* name = one->Attribute("class")) names_of_main.insert(name);
       one->SetAttribute("class", "main");
     }
-    for (const char* tag : {"asset", "tendon", "equality", "actuator"}) {
-      for (Element* section : Named(root, tag)) {
-        for (Element* one : document_->ChildrenOf(section)) {
-          if (one->Attribute("class") == nullptr) one->SetAttribute("class", "main");
-          const char* file = one->Attribute("file");
-          if (file == nullptr || std::string_view(one->Name()) != "mesh") continue;
-          const std::string path = file;
-          if (one->Attribute("name") == nullptr) {
-            one->SetAttribute("name", fs::path(path).stem().c_str());
-          }
-          const std::string meshes =
-              Setting(root, "meshdir", Setting(root, "assetdir", "").c_str());
-          one->SetAttribute("file", fs::absolute(folder / meshes / path).c_str());
-        }
-      }
-    }
+    ForElements(root, {"asset", "tendon", "equality", "actuator"}, [&](Element* one, const char*) {
+      if (one->Attribute("class") == nullptr) one->SetAttribute("class", "main");
+      const char* file = one->Attribute("file");
+      if (file == nullptr || std::string_view(one->Name()) != "mesh") return;
+      const fs::path path = file;
+      if (one->Attribute("name") == nullptr) one->SetAttribute("name", path.stem().c_str());
+      const std::string meshes = Setting(root, "meshdir", Setting(root, "assetdir", "").c_str());
+      one->SetAttribute("file", fs::absolute(folder / meshes / path).c_str());
+    });
     std::vector<Element*> all;
     AddWithin(root, "", &all);
     for (Element* one : all) {
@@ -399,17 +392,13 @@ class Includer {
     AddWithin(frame, "", &parts);
     for (const Element* one : parts) inside.insert(KindAndName(one));
     Element* none = root->GetDocument()->NewElement("none");
-    for (const char* tag : {"tendon", "equality", "actuator"}) {
-      for (Element* section : Named(root, tag)) {
-        for (Element* one : document_->ChildrenOf(section)) {
-          if (NumReferences(one, inside) >= 0) {
-            inside.insert(std::string(tag) + " " + ValueOf(one, "name"));
-          } else {
-            document_->included.emplace(one, none);  // copies refer to it
-          }
-        }
+    ForElements(root, kReferring, [&](Element* one, const char* tag) {
+      if (NumReferences(one, inside) >= 0) {
+        inside.insert(std::string(tag) + " " + ValueOf(one, "name"));
+      } else {
+        document_->included.emplace(one, none);  // copies refer to it
       }
-    }
+    });
   }
 
   std::shared_ptr<XmlDocument> document_;

@@ -1,30 +1,12 @@
 // Joints and actuators of MuJoCo. Joints of one body act in series, with links without mass
 // between.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <map>
-
 #include "harness/exchange/import_mjcf.h"
-#include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 
 namespace {
 
 using Eigen::Vector3d;
-
-void DropParts(const MjcfModel& model, const MjcfJoint& joint) {
-  const XmlElement& own = joint.element.own();
-  model.DropNonzero(joint.element, "frictionloss", kDryFriction);
-  model.NoteLimits(joint.element, kNoEnds);
-  if (BoolOr(joint.element.Attribute("actuatorgravcomp")) &&
-      (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
-    model.draft->Drop(own, "actuatorgravcomp", "gravcomp acts whatever actuators may do");
-  }
-}
 
 /// Adds springs, dampers and the rotor of the joint that was added last; a ball's are dropped.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
@@ -56,30 +38,31 @@ MjcfJoint ReadJoint(MjcfModel* written, const MjcfPlaced& placed) {
     joint.kind = SerialKind::kFree;
     return joint;
   }
-  if (const auto type = joint.element.Attribute("type")) {
-    joint.kind = type->Choice<SerialKind>({{"hinge", SerialKind::kHinge},
-                                           {"slide", SerialKind::kSlide},
-                                           {"ball", SerialKind::kBall},
-                                           {"free", SerialKind::kFree}});
-  }
+  using enum SerialKind;
+  constexpr XmlChoice<SerialKind> kTypes[] = {
+      {"hinge", kHinge}, {"slide", kSlide}, {"ball", kBall}, {"free", kFree}};
+  if (const auto type = joint.element.Attribute("type")) joint.kind = type->Choice(kTypes);
   const auto position = joint.element.Attribute("pos");
-  if (joint.kind != SerialKind::kFree) {
-    joint.position = X.At(position ? position->Vector() : Vector3d::Zero());
-  }
+  if (joint.kind != kFree) joint.position = X.At(VectorOr(position));
   if (const auto axis = joint.element.Attribute("axis")) {
     joint.axis = model.draft->Vector(*axis, "d");
-    const bool matters = joint.kind == SerialKind::kHinge || joint.kind == SerialKind::kSlide;
+    const bool matters = joint.kind == kHinge || joint.kind == kSlide;
     if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
     if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
   }
   joint.axis = X.q * joint.axis;
   const auto angle_or_length = [&](const char* name) {
     const double value = joint.element.Number(name, 0.0);
-    return joint.kind == SerialKind::kHinge ? model.settings.Angle(value) : value;
+    return joint.kind == kHinge ? model.settings.Angle(value) : value;
   };
   joint.reference = angle_or_length("ref");
   joint.spring_reference = angle_or_length("springref");
-  DropParts(model, joint);
+  model.DropNonzero(joint.element, "frictionloss", kDryFriction);
+  model.NoteLimits(joint.element, kNoEnds);
+  if (BoolOr(joint.element.Attribute("actuatorgravcomp")) &&
+      (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
+    model.draft->Drop(element, "actuatorgravcomp", "gravcomp acts whatever actuators may do");
+  }
   return joint;
 }
 
@@ -109,47 +92,11 @@ void AddJoint(MjcfModel* model, const XmlElement& body, const MjcfStep& step, Mj
   model->joints.push_back(std::move(joint));
 }
 
-}  // namespace
-
-void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int child,
-                   const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
-  ImportDraft* draft = model->draft;
-  std::vector<MjcfJoint> joints;
-  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(model, joint));
-  if (joints.size() > 1 && std::ranges::count(joints, SerialKind::kFree, &MjcfJoint::kind) > 0) {
-    body.Fail(fmt::format("{} joints on one body, one of them free", joints.size()),
-              "a free joint alone");
-  }
-  int freedoms = 0;
-  for (const MjcfJoint& joint : joints) freedoms += joint.num_u();
-  if (freedoms > 6) {
-    body.Fail(fmt::format("joints with {} degrees of freedom on one body", freedoms),
-              "at most 6, as in MuJoCo");
-  }
-  MjcfStep step{parent, child, X_PB};
-  if (joints.empty()) {
-    draft->Fix(parent, X_PB, child, " fixed");
-    model->steps.push_back(step);
-  }
-  for (std::size_t i = 0; i < joints.size(); ++i) {
-    const bool is_last = i + 1 == joints.size();
-    step.child = is_last ? child : draft->AddLink(body, child);
-    if (!is_last) model->links.insert(step.child);
-    step.joint = static_cast<int>(model->joints.size());
-    AddJoint(model, body, step, std::move(joints[i]));
-    model->steps.push_back(step);
-    step.parent = step.child;
-    step.X_PB = {};
-  }
-}
-
 // <actuator>: at constant controls, actuators of joints are efforts, springs and dampers.
 //
 // MuJoCo: force = gain * ctrl + bias, with ctrl within ctrlrange and force within forcerange; gain
 // and bias are linear in length = gear * qpos and its rate. The joint's effort is the sum of gear *
 // force over its actuators, within its actuatorfrcrange.
-
-namespace {
 
 double Within(const std::optional<MjcfLimits>& limits, double value) {
   return limits ? std::clamp(value, limits->first, limits->second) : value;
@@ -314,6 +261,38 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
 }
 
 }  // namespace
+
+void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int child,
+                   const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
+  ImportDraft* draft = model->draft;
+  std::vector<MjcfJoint> joints;
+  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(model, joint));
+  if (joints.size() > 1 && std::ranges::count(joints, SerialKind::kFree, &MjcfJoint::kind) > 0) {
+    body.Fail(fmt::format("{} joints on one body, one of them free", joints.size()),
+              "a free joint alone");
+  }
+  int freedoms = 0;
+  for (const MjcfJoint& joint : joints) freedoms += joint.num_u();
+  if (freedoms > 6) {
+    body.Fail(fmt::format("joints with {} degrees of freedom on one body", freedoms),
+              "at most 6, as in MuJoCo");
+  }
+  MjcfStep step{parent, child, X_PB};
+  if (joints.empty()) {
+    draft->Fix(parent, X_PB, child, " fixed");
+    model->steps.push_back(step);
+  }
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const bool is_last = i + 1 == joints.size();
+    step.child = is_last ? child : draft->AddLink(body, child);
+    if (!is_last) model->links.insert(step.child);
+    step.joint = static_cast<int>(model->joints.size());
+    AddJoint(model, body, step, std::move(joints[i]));
+    model->steps.push_back(step);
+    step.parent = step.child;
+    step.X_PB = {};
+  }
+}
 
 void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& controls,
                        MjcfModel* model) {

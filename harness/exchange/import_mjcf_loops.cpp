@@ -1,40 +1,33 @@
 // <equality> and <tendon>: constraints that close loops, and forces between two points.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "harness/exchange/import_mjcf.h"
 
 namespace loopbench::harness {
 
 namespace {
 
-/// Two frames of a loop, each on its body, coincident at zero coordinates.
+/// Two frames of a loop, coincident at zero coordinates.
 struct Ends {
-  int first = kGround, second = kGround;
-  Placement X_first, X_second;
+  FrameOn first, second;
 };
 
-/// Returns the frame on the second body that coincides with `X` on the first at rest.
-Placement AtRestOn(const MjcfModel& model, int first, const Placement& X, int second) {
+/// Returns the frame on a body that coincides with `F` at rest.
+Placement AtRestOn(const MjcfModel& model, const FrameOn& F, int body) {
   const auto& rest = model.draft->at_rest;
-  return rest[second].Inverse() * rest[first] * X;
+  return rest[body].Inverse() * rest[F.body] * F.X;
 }
 
 std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equality) {
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
   if (!site1) return std::nullopt;
   if (!site2) equality.own().Fail("no \"site2\"", "a site of the other body");
-  const MjcfSite &a = model.SiteNamed(*site1), &b = model.SiteNamed(*site2);
-  return Ends{a.body, b.body, {a.q, a.at}, {b.q, b.at}};
+  return Ends{model.SiteNamed(*site1), model.SiteNamed(*site2)};
 }
 
 Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
   Ends ends;
   const auto body2 = equality.Attribute("body2");
-  ends.first = model.BodyNamed(equality.Required("body1", "the name of a body"));
-  if (body2) ends.second = model.BodyNamed(*body2);
+  ends.first.body = model.BodyNamed(equality.Required("body1", "the name of a body"));
+  if (body2) ends.second.body = model.BodyNamed(*body2);
   return ends;
 }
 
@@ -44,18 +37,18 @@ void AddLoopJoint(const MjcfElement& equality, JointType type, const Ends& ends,
   model.draft->AddLoop(
       equality.own(),
       model.draft->NameLater((name ? name->Name() : equality.own().tag()) + model.Suffix()), type,
-      ends.first, ends.X_first, ends.second, ends.X_second);
+      ends.first, ends.second);
 }
 
 void AddConnect(const MjcfElement& equality, MjcfModel* model) {
   auto ends = EndsAtSites(*model, equality);
   if (!ends) {
     ends = EndsOnBodies(*model, equality);
-    ends->X_first.p = equality.Required("anchor", "3 numbers").Vector();
-    ends->X_second.p = AtRestOn(*model, ends->first, ends->X_first, ends->second).p;
+    ends->first.X.p = equality.Required("anchor", "3 numbers").Vector();
+    ends->second.X.p = AtRestOn(*model, ends->first, ends->second.body).p;
   }
-  ends->X_first.q.setIdentity();
-  ends->X_second.q.setIdentity();
+  ends->first.X.q.setIdentity();
+  ends->second.X.q.setIdentity();
   AddLoopJoint(equality, JointType::kSpherical, *ends, *model);
 }
 
@@ -63,12 +56,12 @@ void AddConnect(const MjcfElement& equality, MjcfModel* model) {
 /// anchor on the second.
 Ends EndsOfBodies(const MjcfElement& equality, const MjcfModel& model) {
   Ends ends = EndsOnBodies(model, equality);
-  ends.X_first = AtRestOn(model, ends.second, {}, ends.first);
+  ends.first.X = AtRestOn(model, ends.second, ends.first.body);
   if (const auto pose = equality.Attribute("relpose")) {
     const std::vector<double> p = model.draft->Numbers(*pose, "nnnq");
     const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
     // a zero quaternion selects the drawn poses
-    if (q.norm() > 0.0) ends.X_first = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
+    if (q.norm() > 0.0) ends.first.X = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
   }
   return ends;
 }
@@ -158,7 +151,7 @@ void ReadEquality(const XmlElement& root, MjcfModel* model) {
 /// Returns tendons whose length an active <equality><tendon> keeps constant.
 std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
   std::map<std::string, XmlElement> held;
-  for (const XmlElement& element : root.InSections("equality", "tendon")) {
+  for (const XmlElement& element : root.InSections("equality", {"tendon"})) {
     const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
     const auto active = equality.Attribute("active");
     const auto first = equality.Attribute("tendon1");
@@ -171,11 +164,12 @@ std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const Mjcf
 /// Returns the two sites of a straight tendon, or nothing.
 std::optional<std::pair<BodyPoint, BodyPoint>> StraightEnds(const XmlElement& element,
                                                             const MjcfModel& model) {
-  const std::vector<XmlElement> sites = element.Children("site");
-  const bool wraps = !element.Children("geom").empty() || !element.Children("pulley").empty();
+  const std::vector<XmlElement> sites = element.Children({"site"});
+  const bool wraps = !element.Children({"geom"}).empty() || !element.Children({"pulley"}).empty();
   if (sites.size() != 2 || wraps) return std::nullopt;
   const auto end = [&](const XmlElement& site) {
-    return model.SiteNamed(site.Required("site", "the name of a site"));
+    const FrameOn& at = model.SiteNamed(site.Required("site", "the name of a site"));
+    return BodyPoint{at.body, at.X.p};
   };
   return std::pair{end(sites[0]), end(sites[1])};
 }
@@ -210,7 +204,7 @@ double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<P
 /// the drawn position.
 void AddFixedTendon(const XmlElement& element, const XmlElement& held, MjcfModel* model) {
   std::vector<CouplingDescription::Part> parts;
-  for (const XmlElement& child : element.Children("joint")) {
+  for (const XmlElement& child : element.Children({"joint"})) {
     const MjcfJoint& joint =
         model->joints[model->JointNamed(child.Required("joint", "the name of a joint"))];
     if (joint.num_q() != 1) return model->draft->Note(element, kNotCoupled, true);
@@ -257,44 +251,16 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   if (!(length > 0.0)) element.Fail("a length that is not > 0", "one that is");
   ImportDraft* draft = model->draft;
   const auto& [a, b] = *ends;
-  draft
-      ->AddJoint(draft->NameLater(name->Name() + model->Suffix()), JointType::kRod, a.body,
-                 Placement(a.at), b.body, Placement(b.at))
+  const std::string rod = draft->NameLater(name->Name() + model->Suffix());
+  draft->AddJoint(rod, JointType::kRod, {a.body, Placement(a.at)}, {b.body, Placement(b.at)})
       .parameter = length;
   draft->Note(equality.own(), "a rod here, exactly of its length");
 }
 
-}  // namespace
-
-void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
-  const std::map<std::string, XmlElement> held = HeldTendons(root, *model);
-  ReadEquality(root, model);
-  const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
-  for (const XmlElement& element : root.InSections("tendon")) {
-    MjcfModel::References parts;
-    for (const char* kind : {"site", "joint"}) {
-      for (const XmlElement& part : element.Children(kind)) {
-        parts.emplace_back(kind, part.Attribute(kind));
-      }
-    }
-    model->ForReplicas(parts, [&] { ReadTendon(element, held, free_poses, model); });
-  }
-}
-
 // <keyframe>: conversion of coordinates and speeds from MuJoCo's joints.
-
-namespace {
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-void RefuseZeroQuaternions(const MjcfModel& model, const XmlValue& qpos, const double* q) {
-  for (const MjcfJoint& joint : model.joints) {
-    const double* turn = q + (joint.kind == SerialKind::kFree ? 3 : 0);
-    if (joint.num_q() > 1) UnitQuaternion(qpos, {turn[0], turn[1], turn[2], turn[3]});
-    q += joint.num_q();
-  }
-}
 
 /// Returns the coordinates in the drawn position: qpos0 of MuJoCo.
 std::vector<double> DrawnCoordinates(const MjcfModel& model) {
@@ -315,13 +281,19 @@ std::vector<double> DrawnCoordinates(const MjcfModel& model) {
 
 /// Sets coordinates, and speeds if given, of the Loopbench joints from MuJoCo's.
 void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<double>& qpos,
-                  const std::vector<double>& qvel, bool has_speeds) {
+                  const std::vector<double>& qvel) {
+  const auto positions = key.Attribute("qpos");
+  const bool has_speeds = key.Attribute("qvel").has_value();
   InitialDescription& initial = model->draft->description.initial;
   initial.coordinates.clear();
   const double *q = qpos.data(), *u = qvel.data();
   for (const MjcfJoint& joint : model->joints) {
     const JointDescription& ours = model->draft->description.joints[joint.joint];
     std::vector<double> coordinates, speeds;
+    if (positions && joint.num_q() > 1) {
+      const double* turn = q + (joint.kind == SerialKind::kFree ? 3 : 0);
+      UnitQuaternion(*positions, {turn[0], turn[1], turn[2], turn[3]});  // rejects zero
+    }
     if (joint.kind == SerialKind::kFree) {
       // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
@@ -339,9 +311,7 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
       const double held = std::get<Polynomial>(ours.motions[0].value).coefficients[0];
       const std::string reason =
           fmt::format("of joint \"{}\" dropped: an <equality> holds it at {:.6g}", ours.name, held);
-      if (key.Attribute("qpos") && coordinates[0] != held) {
-        model->draft->Note(key, "qpos", reason, true);
-      }
+      if (positions && coordinates[0] != held) model->draft->Note(key, "qpos", reason, true);
       if (speeds[0] != 0.0) model->draft->Note(key, "qvel", reason, true);
     } else {
       initial.coordinates.push_back({joint.joint, coordinates});
@@ -353,6 +323,21 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
 }
 
 }  // namespace
+
+void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
+  const std::map<std::string, XmlElement> held = HeldTendons(root, *model);
+  ReadEquality(root, model);
+  const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
+  for (const XmlElement& element : root.InSections("tendon")) {
+    MjcfModel::References parts;
+    for (const char* kind : {"site", "joint"}) {
+      for (const XmlElement& part : element.Children({kind})) {
+        parts.emplace_back(kind, part.Attribute(kind));
+      }
+    }
+    model->ForReplicas(parts, [&] { ReadTendon(element, held, free_poses, model); });
+  }
+}
 
 std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
   std::vector<Placement> poses(draft->at_rest.size());
@@ -366,7 +351,7 @@ std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
 }
 
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
-  const std::vector<XmlElement> keys = root.InSections("keyframe", "key");
+  const std::vector<XmlElement> keys = root.InSections("keyframe", {"key"});
   std::optional<XmlValue> controls;
   const bool has_start = !keys.empty() && model->replicates.empty();
   if (has_start) {
@@ -377,11 +362,8 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
     const auto positions = keys[0].Attribute("qpos");
     const auto speeds = keys[0].Attribute("qvel");
     if (speeds) qvel = speeds->Numbers(qvel.size(), qvel.size());
-    if (positions) {
-      qpos = positions->Numbers(qpos.size(), qpos.size());
-      RefuseZeroQuaternions(*model, *positions, qpos.data());
-    }
-    if (positions || speeds) SetMjcfStart(model, keys[0], qpos, qvel, speeds.has_value());
+    if (positions) qpos = positions->Numbers(qpos.size(), qpos.size());
+    if (positions || speeds) SetMjcfStart(model, keys[0], qpos, qvel);
     controls = keys[0].Attribute("ctrl");
     keys[0].Attribute("name");
     keys[0].Attribute("time");

@@ -1,11 +1,6 @@
 // SDF (sdformat.org, versions 1.4 to 1.12).
 #include "harness/exchange/import_sdf.h"
 
-#include <fmt/format.h>
-
-#include <string>
-#include <vector>
-
 #include "harness/exchange/solids.h"
 
 namespace loopbench::harness {
@@ -37,112 +32,8 @@ constexpr DroppedReason kSdfReasons[] = {
      "road gripper link@name model@canonical_link sdf@version",
      ""}};
 
-constexpr std::string_view kWithin = "::";
-
-}  // namespace
-
-void SdfScope::Add(const std::string& name, SdfFrame frame) {
-  const auto [known, is_new] = frames.emplace(name, frame);
-  if (is_new) return;
-  frame.element.Fail(
-      fmt::format("a second \"{}\"", name),
-      fmt::format("a name that is not in use (line {} has it)", known->second.element.line()));
-}
-
-Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
-  // chain of relative frames, up to a known one
-  std::vector<std::pair<std::string, Placement>> chain;
-  Placement X;
-  std::string here = name;
-  while (!IsOwn(here)) {
-    if (const auto known = resolved_.find(here); known != resolved_.end()) {
-      X = known->second;
-      break;
-    }
-    // without a cycle, a chain has at most each frame and a name within each model
-    if (chain.size() > 2 * frames.size()) {
-      user.Fail("frames that are relative to each other", "no cycle");
-    }
-    std::string rest, next = here.substr(0, here.find(kWithin));
-    if (const SdfScope* nested = NestedScope(here, &rest)) {
-      chain.emplace_back(here, nested->Resolve(rest, user));
-    } else {
-      const SdfFrame& frame = FrameNamed(here, user);
-      chain.emplace_back(here, frame.raw);
-      next = frame.relative_to;
-    }
-    here = next;
-  }
-  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
-    X = X * link->second;
-    resolved_.emplace(link->first, X);
-  }
-  return X;
-}
-
-SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
-  std::vector<std::string> chain;  // each attached to the next
-  std::string here = name;
-  std::optional<Link> link;
-  while (!link) {
-    if (const auto known = links_.find(here); known != links_.end()) {
-      link = known->second;
-      break;
-    }
-    if (chain.size() > frames.size() + 1) {
-      user.Fail("frames that are attached to each other", "no cycle");
-    }
-    chain.push_back(here);
-    std::string rest;
-    if (const SdfScope* nested = NestedScope(here, &rest)) {
-      link = nested->LinkOf(rest, user);
-    } else if (IsOwn(here) && is_world()) {
-      link = Link{nullptr, ""};
-    } else if (IsOwn(here)) {
-      // a model moves with its canonical link, by default the first one
-      const auto canonical = element.Filled("canonical_link");
-      const std::vector<XmlElement> links = element.Children("link");
-      if (canonical) {
-        here = canonical->text();
-      } else if (links.empty()) {
-        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
-      } else {
-        here = links[0].RequiredName();
-      }
-    } else {
-      const SdfFrame& frame = FrameNamed(here, user);
-      const std::string tag = frame.element.tag();
-      if (tag == "link") link = Link{this, here};
-      if (tag == "model") link = models.at(here)->LinkOf("", user);
-      here = frame.attached_to;
-    }
-  }
-  for (const std::string& attached : chain) links_.emplace(attached, *link);
-  return *link;
-}
-
-const SdfFrame& SdfScope::FrameNamed(const std::string& name, const XmlElement& user) const {
-  const auto found = frames.find(name);
-  if (found == frames.end()) {
-    user.Fail(fmt::format("the frame \"{}\", which is not there", name),
-              "a link, joint, frame or nested model of the same model");
-  }
-  return found->second;
-}
-
-const SdfScope* SdfScope::NestedScope(const std::string& name, std::string* rest) const {
-  const std::size_t cut = name.find(kWithin);
-  if (cut == std::string::npos) return nullptr;
-  const auto found = models.find(name.substr(0, cut));
-  if (found == models.end()) return nullptr;
-  *rest = name.substr(cut + kWithin.size());
-  return found->second.get();
-}
-
-namespace {
-
 void RefuseIncludes(const XmlElement& element) {
-  for (const XmlElement& include : element.Children("include")) {
+  for (const XmlElement& include : element.Children({"include"})) {
     include.Fail("a model in another file", "all in one file (gz sdf -p FILE writes it)");
   }
 }
@@ -196,48 +87,16 @@ Solid ShapeIn(const XmlElement& geometry) {
                 "box, sphere, ellipsoid, cylinder, capsule or mesh");
 }
 
-}  // namespace
-
-void SdfReader::Read(const XmlElement& root) {
-  ReadVersion(root.Required("version", "1.4 to 1.12"));
-  const auto world = root.Child("world");
-  RefuseIncludes(root);
-  const XmlElement& top = world ? *world : root;
-  if (world && !root.Children("model").empty()) {
-    root.Fail("a <world> and a <model> beside it", "one of the two");
-  }
-  const std::vector<XmlElement> models = top.Children("model");
-  if (models.empty()) top.Fail("no <model>", "at least one");
-  if (const auto gravity = world ? world->Content("gravity") : std::nullopt) {
-    draft_->description.gravity = gravity->Vector();
-  } else {
-    draft_->AssumeGravity(top, kSdfGravity);
-  }
-  SdfScope scope(top, "", false);
-  ReadNames(&scope);
-  const auto name = world ? world->Attribute("name") : std::nullopt;
-  if (models.size() == 1) {
-    // names within the only model need no model prefix
-    SdfScope& only = *scope.models.begin()->second;
-    draft_->description.name = models[0].RequiredName();
-    Shorten(&only, only.prefix.size());
-  } else if (name) {
-    draft_->description.name = name->Name();
-  }
-  ReadLinks(&scope);
-  ReadJoints(scope);
-  ReadCouplings();
-  draft_->NoteUnread(kSdfReasons);
-}
-
-void SdfReader::ReadVersion(const XmlValue& value) {
-  for (minor_ = kFirstVersion; minor_ <= kLastVersion; ++minor_) {
-    if (value.text() == fmt::format("1.{}", minor_)) return;
+int VersionOf(const XmlElement& root) {
+  const XmlValue value = root.Required("version", "1.4 to 1.12");
+  for (int minor = kFirstVersion; minor <= kLastVersion; ++minor) {
+    if (value.text() == fmt::format("1.{}", minor)) return minor;
   }
   value.Fail("a version from 1.4 to 1.12");
 }
 
-SdfFrame SdfReader::ReadPose(const XmlElement& element) const {
+/// Reads the <pose> of an element and its `relative_to`.
+SdfFrame ReadPose(const XmlElement& element, const SdfFile& file) {
   SdfFrame frame{element};
   const auto pose = element.Child("pose");
   if (!pose) return frame;
@@ -245,7 +104,7 @@ SdfFrame SdfReader::ReadPose(const XmlElement& element) const {
     old->Fail("none: what it means was said only from 1.7 on, as relative_to");
   }
   if (const auto relative = pose->Filled("relative_to")) {
-    if (minor_ < 7) relative->Fail("none before version 1.7");
+    if (file.minor < 7) relative->Fail("none before version 1.7");
     frame.relative_to = relative->Name();
   }
   const bool in_degrees = BoolOr(pose->Attribute("degrees"));
@@ -254,67 +113,130 @@ SdfFrame SdfReader::ReadPose(const XmlElement& element) const {
       format && format->Choice<bool>({{"euler_rpy", false}, {"quat_xyzw", true}});
   const XmlValue content = pose->Content();
   if (content.text().empty()) return frame;
-  const std::vector<double> p = draft_->Numbers(content, quaternion   ? "nnnr"
-                                                         : in_degrees ? "nnnnnn"
-                                                                      : "nnnaaa");
+  const char* kinds = quaternion ? "nnnr" : in_degrees ? "nnnnnn" : "nnnaaa";
+  const std::vector<double> p = file.draft->Numbers(content, kinds);
   frame.raw.p = {p[0], p[1], p[2]};
-  if (quaternion) {
-    frame.raw.q = UnitQuaternion(content, {p[6], p[3], p[4], p[5]});
-  } else {
-    frame.raw.q = FromRollPitchYaw((in_degrees ? kDegree : 1.0) * Vector3d(p[3], p[4], p[5]));
-  }
+  frame.raw.q = quaternion
+                    ? UnitQuaternion(content, {p[6], p[3], p[4], p[5]})
+                    : FromRollPitchYaw((in_degrees ? kDegree : 1.0) * Vector3d(p[3], p[4], p[5]));
   return frame;
 }
 
-void SdfReader::ReadName(const XmlElement& child, SdfScope* scope) const {
-  SdfFrame frame = ReadPose(child);
-  if (child.tag() == "frame") {
-    if (const auto attached = child.Attribute("attached_to")) {
-      frame.attached_to = attached->text();
-    }
-  } else if (child.tag() == "joint") {
+/// Returns the pose of a part in its link.
+Placement PoseInLink(const XmlElement& part, const XmlElement& link, const SdfFile& file) {
+  const SdfFrame pose = ReadPose(part, file);
+  if (!pose.relative_to.empty() && pose.relative_to != link.RequiredName()) {
+    part.RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
+  }
+  return pose.raw;
+}
+
+/// Reads the name and frame of a link, frame or joint.
+void ReadName(const XmlElement& child, SdfScope* scope) {
+  SdfFrame frame = ReadPose(child, scope->file);
+  const bool is_joint = child.tag() == "joint";
+  if (is_joint) {
     const XmlValue moved = child.RequiredChild("child").Content();
     if (moved.Name() == kSdfWorld) {
       moved.Fail("a link, frame or nested model: the world is no child, it can be the <parent>");
     }
     frame.attached_to = moved.text();
+  } else if (child.tag() == "frame") {
+    if (const auto attached = child.Attribute("attached_to")) frame.attached_to = attached->text();
   }
   if (frame.relative_to.empty()) {
     frame.relative_to = frame.attached_to;
-    frame.is_raw_to_child = child.tag() == "joint";
+    frame.is_raw_to_child = is_joint;
   }
   const std::string name = child.RequiredName();
-  scope->Add(child.tag() == "joint" ? FrameOf(name) : name, std::move(frame));
+  scope->Add(is_joint ? scope->FrameOf(name) : name, std::move(frame));
 }
 
-void SdfReader::ReadNames(SdfScope* scope) const {
+/// Reads all names of a world or model, including nested models.
+void ReadNames(SdfScope* scope) {
   const XmlElement& element = scope->element;
   RefuseIncludes(element);
+  scope->joints = element.Children({"joint"});
   for (const char* tag : {"link", "frame", "joint"}) {
-    for (const XmlElement& child : element.Children(tag)) ReadName(child, scope);
+    for (const XmlElement& child : element.Children({tag})) ReadName(child, scope);
   }
-  for (const XmlElement& child : element.Children("model")) {
+  for (const XmlElement& child : element.Children({"model"})) {
     const std::string name = child.RequiredName();
     if (const auto placement = child.Filled("placement_frame")) {
       placement->Fail("none: poses are those of the model's frame");
     }
     const auto fixed = child.Content("static");
     const bool is_static = scope->is_static || BoolOr(fixed);
-    scope->Add(name, ReadPose(child));
-    auto model = std::make_unique<SdfScope>(child, scope->prefix + name + "::", is_static);
+    scope->Add(name, ReadPose(child, scope->file));
+    const auto& model = scope->models[name] =
+        std::make_unique<SdfScope>(child, scope->file, scope->prefix + name + "::", is_static);
     ReadNames(model.get());
-    scope->models.emplace(name, std::move(model));
   }
 }
 
-void SdfReader::ReadLinks(SdfScope* scope) const {
-  for (const XmlElement& child : scope->element.Children("link")) {
+/// Computes the mass of a link from its collision shapes.
+void ReadShapes(const XmlElement& link, const XmlElement& inertial, int body, const SdfFile& file) {
+  const double density = NumberOr(inertial.Content("density"), kSdfDensity, kPositive);
+  std::vector<PlacedSolid> parts;
+  for (const XmlElement& collision : link.Children({"collision"})) {
+    PlacedSolid part;
+    part.solid = ShapeIn(collision.RequiredChild("geometry"));
+    part.X = PoseInLink(collision, link, file);
+    part.mass = part.solid.volume * NumberOr(collision.Content("density"), density, kPositive);
+    parts.push_back(part);
+  }
+  const BodyDescription sum = SumOf(parts);
+  if (!(sum.mass > 0.0)) inertial.Fail("auto without a <collision>", "one with a volume");
+  file.draft->SetMass(body, sum.mass, sum.com, sum.inertia);
+}
+
+/// Reads <inertial> and the other properties of a link.
+void ReadLink(const XmlElement& link, int body, bool is_static, const SdfFile& file) {
+  ImportDraft* draft = file.draft;
+  const bool has_weight = BoolOr(link.Content("gravity"), true);
+  if (!has_weight && !is_static) draft->AddLift(body, 1.0);
+  const auto kinematic = link.Child("kinematic");
+  if (kinematic && kinematic->Content().Bool()) {
+    draft->Note(*kinematic, "dropped: bodies move as forces make them", true);
+  }
+  const auto inertial = link.Child("inertial");
+  if (is_static) {
+    if (inertial) inertial->Ignore();
+    return;  // merged with the ground
+  }
+  if (!inertial) {
+    draft->SetMass(body, 1.0, Vector3d::Zero(), Eigen::Matrix3d::Identity());
+    return draft->Note(link, "no <inertial>: 1 kg and 1 kg m^2, the defaults of SDF");
+  }
+  if (BoolOr(inertial->Attribute("auto"))) {
+    draft->ReadMassLater(body, [=] { ReadShapes(link, *inertial, body, file); });
+    inertial->Ignore();
+    for (const XmlElement& collision : link.Children({"collision"})) {
+      draft->DropWhole(collision, "only its mass matters");
+    }
+    return;
+  }
+  const double mass = NumberOr(inertial->Content("mass"), 1.0, kNotNegative);
+  Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  if (const auto inertia = inertial->Child("inertia")) {
+    I = InertiaOf([&](const char* name, bool is_moment) {
+      return NumberOr(inertia->Content(name), is_moment ? 1.0 : 0.0);
+    });
+  }
+  const Placement X = PoseInLink(*inertial, link, file);
+  draft->SetMass(body, mass, X.p, InTurnedAxes(X.q, I));
+}
+
+/// Sets poses of models and links, and adds links as bodies.
+void ReadLinks(SdfScope* scope) {
+  ImportDraft* draft = scope->file.draft;
+  for (const XmlElement& child : scope->element.Children({"link"})) {
     const std::string name = child.RequiredName();
-    const int body = draft_->AddBody(child, scope->prefix + name);
+    const int body = draft->AddBody(child, scope->prefix + name);
     const Placement X = scope->at_rest * scope->Resolve(name, child);
-    draft_->at_rest[body] = X;
-    ReadLink(child, body, scope->is_static);
-    if (scope->is_static) draft_->Fix(kGround, X, body, " fixed");
+    draft->at_rest[body] = X;
+    ReadLink(child, body, scope->is_static, scope->file);
+    if (scope->is_static) draft->Fix(kGround, X, body, " fixed");
   }
   for (auto& [name, model] : scope->models) {
     model->at_rest = scope->at_rest * scope->Resolve(name, model->element);
@@ -322,94 +244,128 @@ void SdfReader::ReadLinks(SdfScope* scope) const {
   }
 }
 
-void SdfReader::ReadLink(const XmlElement& element, int index, bool is_static) const {
-  const bool has_weight = BoolOr(element.Content("gravity"), true);
-  if (!has_weight && !is_static) draft_->AddLift(index, 1.0);
-  const auto kinematic = element.Child("kinematic");
-  if (kinematic && kinematic->Content().Bool()) {
-    draft_->Note(*kinematic, "dropped: bodies move as forces make them", true);
-  }
-  const auto inertial = element.Child("inertial");
-  if (is_static) {
-    if (inertial) inertial->Ignore();
-    return;  // merged with the ground
-  }
-  if (inertial && BoolOr(inertial->Attribute("auto"))) {
-    draft_->ReadMassLater(index, [reader = *this, element, inertial = *inertial, index] {
-      reader.ReadShapes(element, inertial, index);
-    });
-    inertial->Ignore();
-    for (const XmlElement& collision : element.Children("collision")) {
-      draft_->DropWhole(collision, "only its mass matters");
-    }
-    return;
-  }
-  BodyDescription& body = draft_->description.bodies[index];
-  body.mass = 1.0;
-  body.inertia.setIdentity();
-  if (!inertial) {
-    draft_->Note(element, "no <inertial>: 1 kg and 1 kg m^2, the defaults of SDF");
-    return;
-  }
-  body.mass = NumberOr(inertial->Content("mass"), 1.0, kNotNegative);
-  if (const auto inertia = inertial->Child("inertia")) {
-    body.inertia = InertiaOf([&](const char* name, bool is_moment) {
-      return NumberOr(inertia->Content(name), is_moment ? 1.0 : 0.0);
-    });
-  }
-  const SdfFrame pose = ReadPose(*inertial);
-  if (!pose.relative_to.empty() && pose.relative_to != element.RequiredName()) {
-    inertial->RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
-  }
-  body.com = pose.raw.p;
-  body.inertia = InTurnedAxes(pose.raw.q, body.inertia);
+}  // namespace
+
+void SdfScope::Add(const std::string& name, SdfFrame frame) {
+  const auto [known, is_new] = frames.emplace(name, frame);
+  if (is_new) return;
+  frame.element.Fail(
+      fmt::format("a second \"{}\"", name),
+      fmt::format("a name that is not in use (line {} has it)", known->second.element.line()));
 }
 
-void SdfReader::ReadShapes(const XmlElement& element, const XmlElement& inertial, int index) const {
-  const double density = NumberOr(inertial.Content("density"), kSdfDensity, kPositive);
-  std::vector<PlacedSolid> parts;
-  for (const XmlElement& collision : element.Children("collision")) {
-    const XmlElement geometry = collision.RequiredChild("geometry");
-    PlacedSolid part;
-    part.solid = ShapeIn(geometry);
-    const SdfFrame pose = ReadPose(collision);
-    if (!pose.relative_to.empty() && pose.relative_to != element.RequiredName()) {
-      collision.RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
+Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
+  // chain of relative frames, up to a known one
+  std::vector<std::pair<std::string, Placement>> chain;
+  Placement X;
+  for (std::string here = name, next; !IsOwn(here); here = next) {
+    if (const auto known = resolved_.find(here); known != resolved_.end()) {
+      X = known->second;
+      break;
     }
-    part.X = pose.raw;
-    part.mass = part.solid.volume * NumberOr(collision.Content("density"), density, kPositive);
-    parts.push_back(part);
+    // without a cycle, a chain has at most each frame and a name within each model
+    if (chain.size() > 2 * frames.size()) {
+      user.Fail("frames that are relative to each other", "no cycle");
+    }
+    std::string rest;
+    if (const SdfScope* nested = NestedScope(here, &rest)) {
+      chain.emplace_back(here, nested->Resolve(rest, user));
+      next = here.substr(0, here.find(kWithin));
+    } else {
+      const SdfFrame& frame = FrameNamed(here, user);
+      chain.emplace_back(here, frame.raw);
+      next = frame.relative_to;
+    }
   }
-  const BodyDescription sum = SumOf(parts);
-  if (!(sum.mass > 0.0)) inertial.Fail("auto without a <collision>", "one with a volume");
-  BodyDescription& body = draft_->description.bodies[index];
-  body.mass = sum.mass;
-  body.com = sum.com;
-  body.inertia = sum.inertia;
+  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
+    X = X * link->second;
+    resolved_.emplace(link->first, X);
+  }
+  return X;
+}
+
+SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
+  std::vector<std::string> chain;  // each attached to the next
+  std::string here = name;
+  std::optional<Link> link;
+  while (!link) {
+    if (const auto known = links_.find(here); known != links_.end()) {
+      link = known->second;
+      break;
+    }
+    if (chain.size() > frames.size() + 1) {
+      user.Fail("frames that are attached to each other", "no cycle");
+    }
+    chain.push_back(here);
+    std::string rest;
+    if (const SdfScope* nested = NestedScope(here, &rest)) {
+      link = nested->LinkOf(rest, user);
+    } else if (IsOwn(here) && is_world()) {
+      link = Link{nullptr, ""};
+    } else if (IsOwn(here)) {
+      // a model moves with its canonical link, by default the first one
+      const auto canonical = element.Filled("canonical_link");
+      const std::vector<XmlElement> links = element.Children({"link"});
+      if (!canonical && links.empty()) {
+        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
+      }
+      here = canonical ? canonical->text() : links[0].RequiredName();
+    } else {
+      const SdfFrame& frame = FrameNamed(here, user);
+      const std::string tag = frame.element.tag();
+      if (tag == "link") link = Link{this, here};
+      if (tag == "model") link = models.at(here)->LinkOf("", user);
+      here = frame.attached_to;
+    }
+  }
+  for (const std::string& attached : chain) links_.emplace(attached, *link);
+  return *link;
+}
+
+void ReadSdf(const XmlElement& root, ImportDraft* draft) {
+  const SdfFile file{draft, VersionOf(root)};
+  const auto world = root.Child("world");
+  RefuseIncludes(root);
+  const XmlElement& top = world ? *world : root;
+  if (world && !root.Children({"model"}).empty()) {
+    root.Fail("a <world> and a <model> beside it", "one of the two");
+  }
+  const std::vector<XmlElement> models = top.Children({"model"});
+  if (models.empty()) top.Fail("no <model>", "at least one");
+  if (const auto gravity = world ? world->Content("gravity") : std::nullopt) {
+    draft->description.gravity = gravity->Vector();
+  } else {
+    draft->AssumeGravity(top, kSdfGravity);
+  }
+  SdfScope scope(top, file);
+  ReadNames(&scope);
+  const auto name = world ? world->Attribute("name") : std::nullopt;
+  if (models.size() == 1) {
+    // names within the only model need no model prefix
+    SdfScope& only = *scope.models.begin()->second;
+    draft->description.name = models[0].RequiredName();
+    Shorten(&only, only.prefix.size());
+  } else if (name) {
+    draft->description.name = name->Name();
+  }
+  ReadLinks(&scope);
+  ReadSdfJoints(scope);
+  draft->NoteUnread(kSdfReasons);
 }
 
 // libsdformat converts a robot to SDF 1.11 and inserts <gazebo> (parser_urdf.cc,
 // InitModelString()). Links have the frames of URDF, the model has the frame of the root.
-void SdfReader::ReadGazebo(const XmlElement& robot, const std::vector<XmlElement>& joints) {
-  minor_ = 11;
-  is_urdf_ = true;
-  SdfScope scope(robot, "", false);
-  for (int i = 1; i < std::ssize(draft_->at_rest); ++i) {
-    const XmlElement& link = draft_->element(i);
-    scope.Add(link.RequiredName(), {link, draft_->at_rest[i]});
-  }
-  for (const XmlElement& joint : joints) ReadName(joint, &scope);
-  const int first = draft_->last_joint() + 1;
-  for (const XmlElement& joint : joints) ReadJoint(joint, scope);
-  for (int j = first; j <= draft_->last_joint(); ++j) draft_->description.joints[j].cut = true;
-  ReadCouplings();
-}
-
-void ReadSdf(const XmlElement& root, ImportDraft* draft) { SdfReader(draft).Read(root); }
-
 void ReadGazeboJoints(const XmlElement& robot, const std::vector<XmlElement>& joints,
                       ImportDraft* draft) {
-  if (!joints.empty()) SdfReader(draft).ReadGazebo(robot, joints);
+  if (joints.empty()) return;
+  SdfScope scope(robot, {draft, 11});
+  for (int i = 1; i < std::ssize(draft->at_rest); ++i) {
+    const XmlElement& link = draft->element(i);
+    scope.Add(link.RequiredName(), {link, draft->at_rest[i]});
+  }
+  scope.joints = joints;
+  for (const XmlElement& joint : joints) ReadName(joint, &scope);
+  ReadSdfJoints(scope);
 }
 
 }  // namespace loopbench::harness

@@ -1,8 +1,4 @@
 // URDF (wiki.ros.org/urdf/XML): a tree of links, each in the frame of the joint that leads to it.
-#include <fmt/format.h>
-
-#include <algorithm>
-
 #include "harness/exchange/import_draft.h"
 
 namespace loopbench::harness {
@@ -46,14 +42,12 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   const Placement X = OriginOf(*inertial, draft);
   const XmlElement mass = inertial->RequiredChild("mass");
   const XmlElement inertia = inertial->RequiredChild("inertia");
-  BodyDescription& described = draft->description.bodies[body];
-  described.mass = mass.Required("value", "a number [kg]").Number(kNotNegative);
-  described.com = X.p;
-  described.inertia =
-      InTurnedAxes(X.q, InertiaOf([&](const char* name, bool is_moment) {
-                     return is_moment ? inertia.Required(name, "a number [kg m^2]").Number()
-                                      : NumberOr(inertia.Attribute(name), 0.0);
-                   }));
+  const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
+  const Eigen::Matrix3d I = InertiaOf([&](const char* name, bool is_moment) {
+    return is_moment ? inertia.Required(name, "a number [kg m^2]").Number()
+                     : NumberOr(inertia.Attribute(name), 0.0);
+  });
+  draft->SetMass(body, kg, X.p, InTurnedAxes(X.q, I));
 }
 
 /// A joint as given in the file, before poses are known.
@@ -64,26 +58,24 @@ struct UrdfJoint {
   JointType type = JointType::kRevolute;
 };
 
-/// Names of Ground.
-using GroundNames = std::set<std::string>;
+int LinkNamed(const XmlElement& element, const char* attribute, const ImportDraft& draft) {
+  const XmlValue name = element.Required(attribute, "the name of a link");
+  return draft.BodyNamed(name.Name(), name);
+}
 
-std::vector<UrdfJoint> ReadJoints(const XmlElement& root, const GroundNames& ground,
-                                  ImportDraft* draft) {
+std::vector<UrdfJoint> ReadJoints(const XmlElement& root, ImportDraft* draft) {
+  using enum JointType;
+  constexpr XmlChoice<JointType> kTypes[] = {{"revolute", kRevolute},   {"continuous", kRevolute},
+                                             {"prismatic", kPrismatic}, {"fixed", kWeld},
+                                             {"floating", kFree},       {"planar", kPlanar}};
   std::vector<UrdfJoint> joints;
   const auto link = [&](const XmlElement& element, const char* side) {
-    return draft->BodyNamed(element.RequiredChild(side).Required("link", "the name of a link"),
-                            ground);
+    return LinkNamed(element.RequiredChild(side), "link", *draft);
   };
-  for (const XmlElement& element : root.Children("joint")) {
+  for (const XmlElement& element : root.Children({"joint"})) {
     UrdfJoint joint{element, link(element, "parent"), link(element, "child"),
                     OriginOf(element, draft)};
-    joint.type = element.Required("type", "a joint type")
-                     .Choice<JointType>({{"revolute", JointType::kRevolute},
-                                         {"continuous", JointType::kRevolute},
-                                         {"prismatic", JointType::kPrismatic},
-                                         {"fixed", JointType::kWeld},
-                                         {"floating", JointType::kFree},
-                                         {"planar", JointType::kPlanar}});
+    joint.type = element.Required("type", "a joint type").Choice(kTypes);
     if (joint.child == kGround) element.Fail("\"world\" as a child", "a link that can move");
     joints.push_back(joint);
   }
@@ -146,8 +138,9 @@ void ReadAxis(const XmlElement& element, JointDescription* joint, ImportDraft* d
 void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
   const XmlElement& element = read.element;
   const std::string name = draft->NewJointName(element, element.RequiredName());
-  ReadAxis(element, &draft->AddJoint(name, read.type, read.parent, read.X_PC, read.child, {}),
-           draft);
+  JointDescription& joint =
+      draft->AddJoint(name, read.type, {read.parent, read.X_PC}, {read.child, {}});
+  ReadAxis(element, &joint, draft);
   const auto dynamics = element.Child("dynamics");
   if (!dynamics) return;
   const double c = NumberOr(dynamics->Attribute("damping"), 0.0, kNotNegative);
@@ -197,32 +190,31 @@ void PlaceFollowers(ImportDraft* draft) {
 /// Reads a <loop_joint>. Drake's RigidBodyTree (parseLoop): frames on `link1` and `link2` with one
 /// origin and one axis, in axes of both frames; type continuous. Isaac Sim: type spherical, and
 /// both sides may be called `link1`.
-void AddLoop(const XmlElement& element, const GroundNames& ground, ImportDraft* draft) {
-  const auto type = element.Required("type", "a joint type")
-                        .Choice<JointType>({{"continuous", JointType::kRevolute},
-                                            {"revolute", JointType::kRevolute},
-                                            {"spherical", JointType::kSpherical},
-                                            {"prismatic", JointType::kPrismatic},
-                                            {"fixed", JointType::kWeld}});
+void AddLoop(const XmlElement& element, ImportDraft* draft) {
+  using enum JointType;
+  constexpr XmlChoice<JointType> kTypes[] = {{"continuous", kRevolute},
+                                             {"revolute", kRevolute},
+                                             {"spherical", kSpherical},
+                                             {"prismatic", kPrismatic},
+                                             {"fixed", kWeld}};
+  const JointType type = element.Required("type", "a joint type").Choice(kTypes);
   const std::vector<XmlElement> sides = element.Children({"link1", "link2"});
   if (sides.size() != 2) {
     element.Fail(fmt::format("{} of <link1> and <link2>", sides.size()), "two, its sides");
   }
-  const auto body = [&](const XmlElement& side) {
-    return draft->BodyNamed(side.Required("link", "the name of a link"), ground);
-  };
   const std::string name = draft->NewJointName(element, element.RequiredName());
-  const int first = body(sides[0]), second = body(sides[1]);
-  JointDescription& joint = draft->AddLoop(element, name, type, first, PoseIn(sides[0], draft),
-                                           second, PoseIn(sides[1], draft));
+  const int first = LinkNamed(sides[0], "link", *draft);
+  const int second = LinkNamed(sides[1], "link", *draft);
+  JointDescription& joint = draft->AddLoop(element, name, type, {first, PoseIn(sides[0], draft)},
+                                           {second, PoseIn(sides[1], draft)});
   ReadAxis(element, &joint, draft);
 }
 
 /// Reads joints of SDF; other contents of <gazebo> are dropped.
 void ReadGazebo(const XmlElement& root, ImportDraft* draft) {
   std::vector<XmlElement> joints;
-  for (const XmlElement& gazebo : root.Children("gazebo")) {
-    const bool is_model = !gazebo.Attribute("reference") && !gazebo.Children("joint").empty();
+  for (const XmlElement& gazebo : root.Children({"gazebo"})) {
+    const bool is_model = !gazebo.Attribute("reference") && !gazebo.Children({"joint"}).empty();
     if (!is_model) draft->DropWhole(gazebo, kOtherProgram, true);
     for (const XmlElement& child : is_model ? gazebo.Children() : std::vector<XmlElement>()) {
       if (child.tag() == "joint") joints.push_back(child);
@@ -237,7 +229,7 @@ void ReadGazebo(const XmlElement& root, ImportDraft* draft) {
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft) {
   if (const auto name = root.Attribute("name")) draft->description.name = name->Name();
   bool has_world = false;
-  for (const XmlElement& link : root.Children("link")) {
+  for (const XmlElement& link : root.Children({"link"})) {
     const XmlValue name = link.Required("name", "a name");
     // "world" is by convention the fixed link
     if (name.Name() == "world" && !link.Child("inertial")) {
@@ -247,20 +239,17 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
     }
     ReadInertial(link, draft->AddBody(link, name.Name()), draft);
   }
-  const GroundNames ground = has_world ? GroundNames{"world"} : GroundNames();
-  const std::vector<UrdfJoint> joints = ReadJoints(root, ground, draft);
+  if (has_world) draft->NameGround("world");
+  const std::vector<UrdfJoint> joints = ReadJoints(root, draft);
   const int base = PlaceLinks(joints, root, has_world, draft);
   const int first = draft->last_joint() + 1;
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);
   PlaceFollowers(draft);
-  for (const XmlElement& loop : root.Children("loop_joint")) AddLoop(loop, ground, draft);
-  for (const XmlElement& ball : root.Children(kDrakeBall)) {
+  for (const XmlElement& loop : root.Children({"loop_joint"})) AddLoop(loop, draft);
+  for (const XmlElement& ball : root.Children({kDrakeBall})) {
     draft->AddBall(
-        ball,
-        [&](const XmlElement& side) {
-          return draft->BodyNamed(side.Required("name", "the name of a link"), ground);
-        },
+        ball, [&](const XmlElement& side) { return LinkNamed(side, "name", *draft); },
         [](const XmlElement& point) { return point.Required("value", "3 numbers [m]"); });
   }
   ReadGazebo(root, draft);

@@ -1,18 +1,8 @@
 #include "harness/exchange/solids.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <map>
-#include <numbers>
-#include <set>
-#include <string>
-#include <string_view>
 #include <tuple>
 
 #include "harness/text/files.h"
@@ -30,6 +20,164 @@ Solid FromMoments(double volume, const Vector3d& moments) {
 }
 
 Vector3d SumsOfOthers(const Vector3d& v) { return {v.y() + v.z(), v.x() + v.z(), v.x() + v.y()}; }
+
+/// A triangle of a hull with its plane, normal . r = height.
+struct HullFace {
+  std::array<int, 3> corners;
+  Vector3d normal;
+  double height;
+
+  HullFace(const std::vector<Vector3d>& points, int a, int b, int c)
+      : corners{a, b, c},
+        normal((points[b] - points[a]).cross(points[c] - points[a]).normalized()),
+        height(normal.dot(points[a])) {}
+};
+
+/// Returns four points that span the most volume, chosen one after the other; the last one lies
+/// below the triangle of the first three. Empty if they lie in a plane.
+std::vector<int> SpanningPoints(const std::vector<Vector3d>& points, double negligible) {
+  std::vector<int> chosen;
+  const auto add_farthest = [&](const auto& distance_of) {
+    const auto farthest = std::ranges::max_element(points, {}, distance_of);
+    if (!(distance_of(*farthest) > negligible)) return false;
+    chosen.push_back(static_cast<int>(farthest - points.begin()));
+    return true;
+  };
+  const auto at = [&](std::size_t i) -> const Vector3d& { return points[chosen[i]]; };
+  chosen.push_back(0);
+  if (!add_farthest([&](const Vector3d& p) { return (p - at(0)).norm(); })) return {};
+  const Vector3d along = (at(1) - at(0)).normalized();
+  if (!add_farthest([&](const Vector3d& p) { return along.cross(p - at(0)).norm(); })) return {};
+  const Vector3d normal = along.cross(at(2) - at(0)).normalized();
+  if (!add_farthest([&](const Vector3d& p) { return std::abs(normal.dot(p - at(0))); })) return {};
+  if (normal.dot(at(3) - at(0)) > 0.0) std::swap(chosen[1], chosen[2]);
+  return chosen;
+}
+
+[[noreturn]] void Fail(const std::filesystem::path& path, std::size_t line, std::string_view found,
+                       std::string_view expected) {
+  const std::string place = line == 0 ? "" : fmt::format(":{}", line);
+  throw ConfigError(
+      fmt::format("{}{}: found {}, expected {}", path.string(), place, found, expected));
+}
+
+std::string ReadBytes(const std::filesystem::path& path) {
+  constexpr std::uintmax_t kMost = 64 << 20;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || !std::filesystem::is_regular_file(path)) Fail(path, 0, "no such file", "a mesh");
+  if (size > kMost) Fail(path, 0, fmt::format("{} bytes", size), "at most 64 MiB");
+  std::string bytes(size, '\0');
+  std::ifstream in(path, std::ios::binary);
+  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    Fail(path, 0, "a file that cannot be read", "a mesh");
+  }
+  return bytes;
+}
+
+/// Returns a mesh from the corners of its triangles, three for each; equal points become one.
+TriangleMesh MeshOf(const std::vector<Vector3d>& corners) {
+  TriangleMesh mesh;
+  std::map<std::tuple<double, double, double>, int> known;
+  std::array<int, 3> triangle = {};
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vector3d& p = corners[i];
+    const auto [at, is_new] =
+        known.try_emplace({p.x(), p.y(), p.z()}, static_cast<int>(mesh.points.size()));
+    if (is_new) mesh.points.push_back(p);
+    triangle[i % 3] = at->second;
+    if (i % 3 == 2) mesh.triangles.push_back(triangle);
+  }
+  return mesh;
+}
+
+/// 80 bytes, the number of triangles, and for each the normal, three corners and two bytes.
+TriangleMesh ReadBinaryStl(const std::filesystem::path& path, std::string_view bytes) {
+  constexpr std::size_t kHeader = 84, kTriangle = 50;
+  std::uint32_t count = 0;
+  if (bytes.size() >= kHeader) std::memcpy(&count, bytes.data() + kHeader - 4, 4);
+  if (bytes.size() != kHeader + kTriangle * count) {
+    Fail(path, 0, fmt::format("{} bytes", bytes.size()),
+         fmt::format("{} for {} triangles", kHeader + kTriangle * count, count));
+  }
+  std::vector<Vector3d> corners;
+  for (std::size_t i = 0; i < count; ++i) {
+    std::array<float, 9> values;
+    std::memcpy(values.data(), bytes.data() + kHeader + kTriangle * i + 12, sizeof values);
+    for (const float value : values) {
+      if (!std::isfinite(value)) {
+        Fail(path, 0, fmt::format("a corner that is not finite in triangle {}", i), "numbers");
+      }
+    }
+    for (std::size_t k = 0; k < 9; k += 3) {
+      corners.emplace_back(values[k], values[k + 1], values[k + 2]);
+    }
+  }
+  return MeshOf(corners);
+}
+
+/// Calls `read` with the words and the number of each line.
+template <class Read>
+void ForEachLine(std::string_view text, const Read& read) {
+  for (std::size_t line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::vector<std::string_view> words = xml::Words(text.substr(0, end));
+    if (!words.empty()) read(words, line);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+}
+
+Vector3d PointOf(const std::filesystem::path& path, std::size_t line,
+                 const std::vector<std::string_view>& words) {
+  Vector3d point;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (words.size() <= k + 1 || !xml::ReadNumber(words[k + 1], &point[k]) ||
+        !std::isfinite(point[k])) {
+      Fail(path, line, "a point without three numbers", "\"x y z\"");
+    }
+  }
+  return point;
+}
+
+TriangleMesh ReadTextStl(const std::filesystem::path& path, std::string_view text) {
+  std::vector<Vector3d> corners;
+  ForEachLine(text, [&](const auto& words, std::size_t line) {
+    if (words[0] == "vertex") corners.push_back(PointOf(path, line, words));
+    if (words[0] == "endloop" && corners.size() % 3 != 0) {
+      Fail(path, line, "a facet that is no triangle", "three points");
+    }
+  });
+  return MeshOf(corners);
+}
+
+/// Points "v x y z" and polygons "f i j k ..." of point numbers from 1, or from -1 backwards, each
+/// with further numbers after a slash. Polygons are fans of triangles from their first corner.
+TriangleMesh ReadObj(const std::filesystem::path& path, std::string_view text) {
+  std::vector<Vector3d> points, all;
+  ForEachLine(text, [&](const auto& words, std::size_t line) {
+    if (words[0] == "v") points.push_back(PointOf(path, line, words));
+    if (words[0] != "f") return;
+    const int count = static_cast<int>(points.size());
+    std::vector<int> corners;
+    for (std::size_t k = 1; k < words.size(); ++k) {
+      int number = 0;
+      const bool is_number = xml::ReadNumber(words[k].substr(0, words[k].find('/')), &number);
+      if (!is_number || number == 0 || number > count || number < -count) {
+        Fail(path, line, fmt::format("the corner \"{:.20}\"", words[k]),
+             fmt::format("numbers of points, 1 to {} above this line", count));
+      }
+      corners.push_back(number > 0 ? number - 1 : count + number);
+    }
+    if (corners.size() < 3) Fail(path, line, "a face with fewer than 3 corners", "3 or more");
+    for (std::size_t k = 2; k < corners.size(); ++k) {
+      for (const int corner : {corners[0], corners[k - 1], corners[k]})
+        all.push_back(points[corner]);
+    }
+  });
+  TriangleMesh read = MeshOf(all);
+  if (read.triangles.empty()) read.points = points;
+  return read;
+}
 
 }  // namespace
 
@@ -88,43 +236,6 @@ std::size_t NumOpenEdges(const TriangleMesh& mesh) {
   return static_cast<std::size_t>(
       std::ranges::count_if(sides, [](const auto& side) { return side.second != 0; }));
 }
-
-namespace {
-
-/// A triangle of a hull with its plane, normal . r = height.
-struct HullFace {
-  std::array<int, 3> corners;
-  Vector3d normal;
-  double height;
-
-  HullFace(const std::vector<Vector3d>& points, int a, int b, int c)
-      : corners{a, b, c},
-        normal((points[b] - points[a]).cross(points[c] - points[a]).normalized()),
-        height(normal.dot(points[a])) {}
-};
-
-/// Returns four points that span the most volume, chosen one after the other; the last one lies
-/// below the triangle of the first three. Empty if they lie in a plane.
-std::vector<int> SpanningPoints(const std::vector<Vector3d>& points, double negligible) {
-  std::vector<int> chosen;
-  const auto add_farthest = [&](const auto& distance_of) {
-    const auto farthest = std::ranges::max_element(points, {}, distance_of);
-    if (!(distance_of(*farthest) > negligible)) return false;
-    chosen.push_back(static_cast<int>(farthest - points.begin()));
-    return true;
-  };
-  const auto at = [&](std::size_t i) -> const Vector3d& { return points[chosen[i]]; };
-  chosen.push_back(0);
-  if (!add_farthest([&](const Vector3d& p) { return (p - at(0)).norm(); })) return {};
-  const Vector3d along = (at(1) - at(0)).normalized();
-  if (!add_farthest([&](const Vector3d& p) { return along.cross(p - at(0)).norm(); })) return {};
-  const Vector3d normal = along.cross(at(2) - at(0)).normalized();
-  if (!add_farthest([&](const Vector3d& p) { return std::abs(normal.dot(p - at(0))); })) return {};
-  if (normal.dot(at(3) - at(0)) > 0.0) std::swap(chosen[1], chosen[2]);
-  return chosen;
-}
-
-}  // namespace
 
 /// Adds one point after the other: triangles that see it, or lie in a plane with it, are replaced
 /// by those from their outline to the point. An edge in line with the point is within that outline.
@@ -212,157 +323,6 @@ Solid SolidOf(const TriangleMesh& mesh, MeshRule rule) {
   }
   return solid;
 }
-
-namespace {
-
-[[noreturn]] void Fail(const std::filesystem::path& path, std::size_t line, std::string_view found,
-                       std::string_view expected) {
-  const std::string place = line == 0 ? "" : fmt::format(":{}", line);
-  throw ConfigError(
-      fmt::format("{}{}: found {}, expected {}", path.string(), place, found, expected));
-}
-
-std::string ReadBytes(const std::filesystem::path& path) {
-  constexpr std::uintmax_t kMost = 64 << 20;
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error || !std::filesystem::is_regular_file(path)) Fail(path, 0, "no such file", "a mesh");
-  if (size > kMost) Fail(path, 0, fmt::format("{} bytes", size), "at most 64 MiB");
-  std::string bytes(size, '\0');
-  std::ifstream in(path, std::ios::binary);
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    Fail(path, 0, "a file that cannot be read", "a mesh");
-  }
-  return bytes;
-}
-
-/// A mesh from triangles with corners of their own; equal points become one.
-class MeshFromCorners {
- public:
-  void Add(const Vector3d& point) {
-    const auto [at, is_new] = known_.try_emplace({point.x(), point.y(), point.z()},
-                                                 static_cast<int>(mesh_.points.size()));
-    if (is_new) mesh_.points.push_back(point);
-    triangle_[corner_++] = at->second;
-    if (corner_ < 3) return;
-    mesh_.triangles.push_back(triangle_);
-    corner_ = 0;
-  }
-  bool is_complete() const { return corner_ == 0; }
-  TriangleMesh mesh() && { return std::move(mesh_); }
-
- private:
-  TriangleMesh mesh_;
-  std::map<std::tuple<double, double, double>, int> known_;
-  std::array<int, 3> triangle_ = {};
-  std::size_t corner_ = 0;
-};
-
-/// 80 bytes, the number of triangles, and for each the normal, three corners and two bytes.
-TriangleMesh ReadBinaryStl(const std::filesystem::path& path, std::string_view bytes) {
-  constexpr std::size_t kHeader = 84, kTriangle = 50;
-  std::uint32_t count = 0;
-  if (bytes.size() >= kHeader) std::memcpy(&count, bytes.data() + kHeader - 4, 4);
-  if (bytes.size() != kHeader + kTriangle * count) {
-    Fail(path, 0, fmt::format("{} bytes", bytes.size()),
-         fmt::format("{} for {} triangles", kHeader + kTriangle * count, count));
-  }
-  MeshFromCorners corners;
-  for (std::size_t i = 0; i < count; ++i) {
-    std::array<float, 9> values;
-    std::memcpy(values.data(), bytes.data() + kHeader + kTriangle * i + 12, sizeof values);
-    for (const float value : values) {
-      if (!std::isfinite(value)) {
-        Fail(path, 0, fmt::format("a corner that is not finite in triangle {}", i), "numbers");
-      }
-    }
-    for (std::size_t k = 0; k < 9; k += 3) corners.Add({values[k], values[k + 1], values[k + 2]});
-  }
-  return std::move(corners).mesh();
-}
-
-std::vector<std::string_view> WordsOf(std::string_view line) {
-  std::vector<std::string_view> words;
-  constexpr std::string_view kBlanks = " \t\r";
-  while (true) {
-    const std::size_t start = line.find_first_not_of(kBlanks);
-    if (start == std::string_view::npos) return words;
-    const std::size_t end = std::min(line.find_first_of(kBlanks, start), line.size());
-    words.push_back(line.substr(start, end - start));
-    line.remove_prefix(end);
-  }
-}
-
-template <class Number>
-bool ReadNumber(std::string_view word, Number* number) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), *number);
-  return error == std::errc() && end == word.data() + word.size();
-}
-
-/// Calls `read` with the words and the number of each line.
-template <class Read>
-void ForEachLine(std::string_view text, const Read& read) {
-  for (std::size_t line = 1; !text.empty(); ++line) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::vector<std::string_view> words = WordsOf(text.substr(0, end));
-    if (!words.empty()) read(words, line);
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-}
-
-Vector3d PointOf(const std::filesystem::path& path, std::size_t line,
-                 const std::vector<std::string_view>& words) {
-  Vector3d point;
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (words.size() <= k + 1 || !ReadNumber(words[k + 1], &point[k]) || !std::isfinite(point[k])) {
-      Fail(path, line, "a point without three numbers", "\"x y z\"");
-    }
-  }
-  return point;
-}
-
-TriangleMesh ReadTextStl(const std::filesystem::path& path, std::string_view text) {
-  MeshFromCorners corners;
-  ForEachLine(text, [&](const auto& words, std::size_t line) {
-    if (words[0] == "vertex") corners.Add(PointOf(path, line, words));
-    if (words[0] == "endloop" && !corners.is_complete()) {
-      Fail(path, line, "a facet that is no triangle", "three points");
-    }
-  });
-  return std::move(corners).mesh();
-}
-
-/// Points "v x y z" and polygons "f i j k ..." of point numbers from 1, or from -1 backwards, each
-/// with further numbers after a slash. Polygons are fans of triangles from their first corner.
-TriangleMesh ReadObj(const std::filesystem::path& path, std::string_view text) {
-  MeshFromCorners mesh;
-  std::vector<Vector3d> points;
-  ForEachLine(text, [&](const auto& words, std::size_t line) {
-    if (words[0] == "v") points.push_back(PointOf(path, line, words));
-    if (words[0] != "f") return;
-    const int count = static_cast<int>(points.size());
-    std::vector<int> corners;
-    for (std::size_t k = 1; k < words.size(); ++k) {
-      int number = 0;
-      const bool is_number = ReadNumber(words[k].substr(0, words[k].find('/')), &number);
-      if (!is_number || number == 0 || number > count || number < -count) {
-        Fail(path, line, fmt::format("the corner \"{:.20}\"", words[k]),
-             fmt::format("numbers of points, 1 to {} above this line", count));
-      }
-      corners.push_back(number > 0 ? number - 1 : count + number);
-    }
-    if (corners.size() < 3) Fail(path, line, "a face with fewer than 3 corners", "3 or more");
-    for (std::size_t k = 2; k < corners.size(); ++k) {
-      for (const std::size_t corner : {std::size_t{0}, k - 1, k}) mesh.Add(points[corners[corner]]);
-    }
-  });
-  TriangleMesh read = std::move(mesh).mesh();
-  if (read.triangles.empty()) read.points = points;
-  return read;
-}
-
-}  // namespace
 
 TriangleMesh ReadMesh(const std::filesystem::path& path) {
   std::string ending = path.extension().string();

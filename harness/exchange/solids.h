@@ -1,10 +1,7 @@
 // Mass properties of solids of uniform density: shapes of MJCF and SDF, and triangle meshes.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
-#include <filesystem>
-#include <vector>
 
 #include "harness/exchange/import_draft.h"
 

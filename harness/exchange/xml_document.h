@@ -1,21 +1,36 @@
-// The parsed files of an XmlFile.
+// XML files for the importers: elements and values with their location, strict parsing, and a
+// record of the parts that were read.
 //
-// Internal to xml_file.cpp and import_mjcf_files.cpp.
+// XmlFile::Unread lists all unread parts at the end, so that none is lost silently. All errors are
+// ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...". Rejected files: larger
+// than kMaxConfigBytes, nested deeper than the parser's limit, invalid UTF-8, or with a document
+// type, the only place for entity declarations (no entity is expanded).
+//
+// A file may contain others (Include()): their elements are read in place of <include> or <attach>,
+// with their own file names and lines in messages.
 #pragma once
 
 #include <tinyxml2.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <charconv>
 #include <deque>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
+#include "harness/json/json_reader.h"
+
 namespace loopbench::harness {
+
+struct XmlDocument;
 
 namespace xml {
 
@@ -35,6 +50,26 @@ inline std::vector<Element*> ChildrenIn(Element* element) {
 inline Element* OriginalOf(Element* element) {
   void* original = element->GetUserData();
   return original != nullptr ? static_cast<Element*>(original) : element;
+}
+
+/// Adds a parsed file and returns its root element. Throws ConfigError.
+Element* Parse(std::string_view text, const std::string& file, XmlDocument* document);
+/// Returns "" for files that do not exist.
+inline std::filesystem::path CanonicalOf(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::canonical(path, error);
+}
+/// Returns the text without surrounding blanks.
+std::string_view Trimmed(std::string_view text);
+/// Returns the words between blanks.
+std::vector<std::string_view> Words(std::string_view text);
+
+/// Reads a number, with a decimal point in any locale and nothing after it.
+template <class Number>
+bool ReadNumber(std::string_view word, Number* number) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), *number);
+  return error == std::errc() && end == word.data() + word.size();
 }
 
 }  // namespace xml
@@ -73,16 +108,154 @@ struct XmlDocument {
   }
 };
 
-namespace xml {
+class XmlValue;
 
-/// Adds a parsed file and returns its root element. Throws ConfigError.
-Element* Parse(std::string_view text, const std::string& file, XmlDocument* document);
+class XmlElement {
+ public:
+  XmlElement(std::shared_ptr<XmlDocument> document, xml::Element* element)
+      : document_(std::move(document)), element_(element) {
+    document_->read.insert(element_);
+  }
 
-/// Returns "" for files that do not exist.
-std::filesystem::path CanonicalOf(const std::filesystem::path& path);
-/// Returns the text without surrounding blanks.
-std::string_view Trimmed(std::string_view text);
+  /// Returns an identity that no other element has.
+  const void* id() const { return element_; }
+  std::string tag() const { return element_->Name(); }
+  int line() const { return xml::OriginalOf(element_)->GetLineNum(); }
+  /// Returns the name of its file.
+  const std::string& file() const {
+    return *static_cast<std::string*>(xml::OriginalOf(element_)->GetDocument()->GetUserData());
+  }
+  /// Returns <tag name="...">, for messages and notes.
+  std::string Shown() const;
 
-}  // namespace xml
+  /// Returns its children in file order, of these tags if any, and marks them as read.
+  std::vector<XmlElement> Children(const std::vector<std::string_view>& tags = {}) const;
+  /// Returns the children of all its children with tag `section`, of these tags if any.
+  std::vector<XmlElement> InSections(const char* section,
+                                     const std::vector<std::string_view>& tags = {}) const;
+  /// Returns the only child with this tag; throws if there are several.
+  std::optional<XmlElement> Child(const char* tag) const;
+  /// Returns the only child with this tag; throws if it is absent.
+  XmlElement RequiredChild(const char* tag) const;
+
+  std::optional<XmlValue> Attribute(const std::string& name) const;
+  /// Returns an attribute that is not empty.
+  std::optional<XmlValue> Filled(const std::string& name) const;
+  /// Returns an attribute; if absent, throws with `expected`.
+  XmlValue Required(const std::string& name, std::string_view expected) const;
+  /// Returns the attribute "name".
+  std::string RequiredName() const;
+  /// Returns the text of the element itself.
+  XmlValue Content() const;
+  /// Returns the text of the only child with this tag, if any.
+  std::optional<XmlValue> Content(const char* tag) const;
+
+  /// Returns the first descendant with one of these tags; marks only that element as read.
+  std::optional<XmlElement> Within(const std::vector<std::string_view>& tags) const;
+
+  /// Returns true for the outermost <default> of an attached model.
+  bool is_attached_default() const { return document_->attached_defaults.contains(element_); }
+
+  /// Marks the element and all its contents as read.
+  void Ignore() const;
+
+  [[noreturn]] void Fail(std::string_view found, std::string_view expected,
+                         const std::string& attribute = "") const;
+  /// Rejects more than `most` of something.
+  void RequireFew(std::size_t count, std::size_t most, std::string_view what) const;
+
+ private:
+  friend class XmlValue;
+
+  std::shared_ptr<XmlDocument> document_;
+  xml::Element* element_;
+};
+
+/// A word and its value.
+template <class T>
+using XmlChoice = std::pair<std::string_view, T>;
+
+/// The name and text of an attribute, or the text within an element (name "").
+class XmlValue {
+ public:
+  XmlValue(XmlElement element, std::string attribute, std::string_view text)
+      : element_(std::move(element)), attribute_(std::move(attribute)), text_(xml::Trimmed(text)) {}
+
+  /// Returns the text without surrounding blanks; may be empty.
+  const std::string& text() const { return text_; }
+  const std::string& attribute() const { return attribute_; }
+  const XmlElement& element() const { return element_; }
+  /// Returns a non-empty printable text: UTF-8 without zero bytes.
+  std::string Name() const;
+  /// Returns a finite number, with a decimal point in any locale and nothing after it.
+  double Number(const Range& range = {}) const;
+  /// Returns `least` to `most` numbers separated by blanks.
+  std::vector<double> Numbers(std::size_t least, std::size_t most) const;
+  Eigen::Vector3d Vector() const { return Eigen::Vector3d(Numbers(3, 3).data()); }
+  /// Returns the regular file that the text names, from `subfolder` of the main file's folder, else
+  /// from `otherwise`. Rejects files that are not below the main file's folder.
+  std::filesystem::path File(const std::filesystem::path& subfolder = {},
+                             const std::filesystem::path& otherwise = {}) const;
+  /// Accepts true, false, 1 or 0.
+  bool Bool() const;
+  /// Returns the value of the row with this word.
+  template <class T, std::size_t size>
+  T Choice(const XmlChoice<T> (&rows)[size]) const {
+    std::string words;
+    for (const auto& [word, value] : rows) {
+      if (word == text_) return value;
+      words.append(words.empty() ? "one of " : ", ").append(word);
+    }
+    Fail(words);
+  }
+
+  [[noreturn]] void Fail(std::string_view expected) const;
+
+ private:
+  double OneNumber(std::string_view word) const;
+
+  XmlElement element_;
+  std::string attribute_, text_;
+};
+
+inline double NumberOr(const std::optional<XmlValue>& value, double otherwise,
+                       const Range& range = {}) {
+  return value ? value->Number(range) : otherwise;
+}
+inline bool BoolOr(const std::optional<XmlValue>& value, bool otherwise = false) {
+  return value ? value->Bool() : otherwise;
+}
+inline Eigen::Vector3d VectorOr(const std::optional<XmlValue>& value,
+                                const Eigen::Vector3d& otherwise = Eigen::Vector3d::Zero()) {
+  return value ? value->Vector() : otherwise;
+}
+
+class XmlFile {
+ public:
+  /// `file` is the name in messages; `path` its place, without which it has no other files.
+  XmlFile(std::string_view text, const std::string& file,
+          const std::optional<std::filesystem::path>& path = {}) {
+    document_->path = path;
+    xml::Parse(text, file, document_.get());
+  }
+
+  /// Resolves the elements of MJCF that stand for other files, at most kMaxConfigBytes in all, or
+  /// for copies.
+  ///   <include file="...">: the children of the root element of that file, which is read once.
+  ///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
+  ///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.
+  ///   Without `model`: a copy of a body of the file itself, then of tendons and so on.
+  void Include();
+
+  XmlElement root() const { return XmlElement(document_, document_->root()); }
+  const std::string& name() const { return document_->files.front().name; }
+
+  /// Returns all unread parts in file order: an element with its contents (attribute ""), or an
+  /// attribute of an element that was read.
+  std::vector<std::pair<XmlElement, std::string>> Unread() const;
+
+ private:
+  std::shared_ptr<XmlDocument> document_ = std::make_shared<XmlDocument>();
+};
 
 }  // namespace loopbench::harness

@@ -1,12 +1,10 @@
-#include "harness/exchange/xml_file.h"
+#include "harness/exchange/xml_document.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <functional>
 
-#include "harness/exchange/xml_document.h"
 #include "harness/text/files.h"
 #include "harness/text/words.h"
 
@@ -16,19 +14,9 @@ namespace fs = std::filesystem;
 
 using xml::Element;
 
-fs::path xml::CanonicalOf(const fs::path& path) {
-  std::error_code error;
-  return fs::canonical(path, error);
-}
-
-std::string_view xml::Trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n";
-  const std::size_t start = text.find_first_not_of(kBlanks);
-  if (start == std::string_view::npos) return {};
-  return text.substr(start, text.find_last_not_of(kBlanks) - start + 1);
-}
-
 namespace {
+
+constexpr std::string_view kBlanks = " \t\r\n";
 
 std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '"'; }
 
@@ -36,23 +24,9 @@ std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '
 /// which would garble messages and cannot be written as JSON.
 bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
 
-std::vector<std::string_view> Words(std::string_view text) {
-  std::vector<std::string_view> words;
-  for (text = xml::Trimmed(text); !text.empty(); text = xml::Trimmed(text)) {
-    const std::size_t end = std::min(text.find_first_of(" \t\r\n"), text.size());
-    words.push_back(text.substr(0, end));
-    text.remove_prefix(end);
-  }
-  return words;
-}
-
-void RefuseDocumentTypes(const XmlDocument::File& document) {
-  for (const auto* node = document.xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
-    if (node->ToUnknown() == nullptr) continue;
-    throw ConfigError(fmt::format(
-        "{}:{}: found a document type or declaration of entities, expected none: they are not read",
-        document.name, node->GetLineNum()));
-  }
+[[noreturn]] void FailParsing(const std::string& file, std::ptrdiff_t line, std::string_view found,
+                              std::string_view expected) {
+  throw ConfigError(fmt::format("{}:{}: found {}, expected {}", file, line, found, expected));
 }
 
 /// Limits attributes before parsing, since the parser compares all attributes of an element.
@@ -74,9 +48,9 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
       if (quote == '\0' || quote == c) quote = quote == c ? '\0' : c;
     }
     if (count <= kMost) continue;
-    const auto line = 1 + std::ranges::count(text.substr(0, at), '\n');
-    throw ConfigError(fmt::format("{}:{}: found an element with {} attributes, expected at most {}",
-                                  file, line, count, kMost));
+    FailParsing(file, 1 + std::ranges::count(text.substr(0, at), '\n'),
+                fmt::format("an element with {} attributes", count),
+                fmt::format("at most {}", kMost));
   }
 }
 
@@ -99,11 +73,24 @@ Element* FirstWithin(const XmlDocument& document, Element* element,
 
 }  // namespace
 
-XmlValue::XmlValue(XmlElement element, std::string attribute, std::string_view text)
-    : element_(std::move(element)), attribute_(std::move(attribute)), text_(xml::Trimmed(text)) {}
+std::string_view xml::Trimmed(std::string_view text) {
+  const std::size_t start = text.find_first_not_of(kBlanks);
+  if (start == std::string_view::npos) return {};
+  return text.substr(start, text.find_last_not_of(kBlanks) - start + 1);
+}
+
+std::vector<std::string_view> xml::Words(std::string_view text) {
+  std::vector<std::string_view> words;
+  for (text = Trimmed(text); !text.empty(); text = Trimmed(text)) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks), text.size());
+    words.push_back(text.substr(0, end));
+    text.remove_prefix(end);
+  }
+  return words;
+}
 
 void XmlValue::Fail(std::string_view expected) const {
-  element_.FailAt(attribute_, IsText(text_) ? Quoted(text_) : "a text that is not UTF-8", expected);
+  element_.Fail(IsText(text_) ? Quoted(text_) : "a text that is not UTF-8", expected, attribute_);
 }
 
 std::string XmlValue::Name() const {
@@ -114,22 +101,19 @@ std::string XmlValue::Name() const {
 
 double XmlValue::OneNumber(std::string_view word) const {
   double number = 0.0;
-  if (word.starts_with('+')) word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  const bool whole = error == std::errc() && end == word.data() + word.size();
-  if (!whole || word.empty() || !std::isfinite(number)) Fail("finite numbers only");
+  if (!xml::ReadNumber(word, &number) || !std::isfinite(number)) Fail("finite numbers only");
   return number;
 }
 
 double XmlValue::Number(const Range& range) const {
-  const std::vector<std::string_view> words = Words(text_);
+  const std::vector<std::string_view> words = xml::Words(text_);
   const double number = words.size() == 1 ? OneNumber(words[0]) : std::nan("");
   if (!range.Contains(number)) Fail("a number" + range.Text());
   return number;
 }
 
 std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const {
-  const std::vector<std::string_view> words = Words(text_);
+  const std::vector<std::string_view> words = xml::Words(text_);
   if (words.size() < least || words.size() > most) {
     Fail(least == most ? WithCount(least, "number") : fmt::format("{} to {} numbers", least, most));
   }
@@ -137,8 +121,6 @@ std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const
   for (const std::string_view word : words) numbers.push_back(OneNumber(word));
   return numbers;
 }
-
-Eigen::Vector3d XmlValue::Vector() const { return Eigen::Vector3d(Numbers(3, 3).data()); }
 
 fs::path XmlValue::File(const fs::path& subfolder, const fs::path& otherwise) const {
   const auto& main = element_.document_->path;
@@ -162,25 +144,6 @@ bool XmlValue::Bool() const {
   return false;
 }
 
-void XmlValue::FailChoice(const std::vector<std::string>& words) const {
-  Fail(fmt::format("one of {}", fmt::join(words, ", ")));
-}
-
-XmlElement::XmlElement(std::shared_ptr<XmlDocument> document, Element* element)
-    : document_(std::move(document)), element_(element) {
-  document_->read.insert(element_);
-}
-
-std::string XmlElement::tag() const { return element_->Name(); }
-int XmlElement::line() const { return xml::OriginalOf(element_)->GetLineNum(); }
-const std::string& XmlElement::file() const {
-  return *static_cast<const std::string*>(xml::OriginalOf(element_)->GetDocument()->GetUserData());
-}
-
-bool XmlElement::is_attached_default() const {
-  return document_->attached_defaults.contains(element_);
-}
-
 std::string XmlElement::Shown() const {
   const char* name = element_->Attribute("name");
   std::string shown = "<" + Abbreviated(element_->Name());
@@ -188,15 +151,15 @@ std::string XmlElement::Shown() const {
   return shown + ">";
 }
 
-void XmlElement::FailAt(const std::string& attribute, std::string_view found,
-                        std::string_view expected) const {
+void XmlElement::Fail(std::string_view found, std::string_view expected,
+                      const std::string& attribute) const {
   const std::string where = attribute.empty() ? "" : " " + Abbreviated(attribute);
   throw ConfigError(Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", file(), line(),
                                           Shown(), where, found, expected)));
 }
 
-void XmlElement::Fail(std::string_view found, std::string_view expected) const {
-  FailAt("", found, expected);
+void XmlElement::RequireFew(std::size_t count, std::size_t most, std::string_view what) const {
+  if (count > most) Fail(fmt::format("more than {} {}", most, what), "fewer");
 }
 
 std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>& tags) const {
@@ -209,28 +172,22 @@ std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>
   return children;
 }
 
-std::vector<XmlElement> XmlElement::Children(const char* tag) const {
-  return Children(std::vector<std::string_view>{tag});
-}
-
-std::vector<XmlElement> XmlElement::InSections(const char* section, const char* tag) const {
+std::vector<XmlElement> XmlElement::InSections(const char* section,
+                                               const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> all;
-  for (const XmlElement& one : Children(section)) {
-    for (const XmlElement& child : tag != nullptr ? one.Children(tag) : one.Children()) {
-      all.push_back(child);
-    }
+  for (const XmlElement& one : Children({section})) {
+    std::ranges::copy(one.Children(tags), std::back_inserter(all));
   }
   return all;
 }
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
   Element* found = FirstWithin(*document_, element_, tags);
-  if (found == nullptr) return std::nullopt;
-  return XmlElement(document_, found);
+  return found != nullptr ? std::optional(XmlElement(document_, found)) : std::nullopt;
 }
 
 std::optional<XmlElement> XmlElement::Child(const char* tag) const {
-  const std::vector<XmlElement> children = Children(tag);
+  const std::vector<XmlElement> children = Children({tag});
   if (children.empty()) return std::nullopt;
   if (children.size() > 1) {
     children[1].Fail(fmt::format("a second <{}> in {}", tag, Shown()), "one");
@@ -272,8 +229,7 @@ XmlValue XmlElement::Content() const {
 
 std::optional<XmlValue> XmlElement::Content(const char* tag) const {
   const auto child = Child(tag);
-  if (!child) return std::nullopt;
-  return child->Content();
+  return child ? std::optional(child->Content()) : std::nullopt;
 }
 
 void XmlElement::Ignore() const {
@@ -284,63 +240,48 @@ void XmlElement::Ignore() const {
 Element* xml::Parse(std::string_view text, const std::string& file, XmlDocument* document) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  XmlDocument::File& parsed = document->files.emplace_back();
-  parsed.name = file;
-  parsed.xml.SetUserData(&parsed.name);
+  auto& [xml, name] = document->files.emplace_back();
+  name = file;
+  xml.SetUserData(&name);
   if (const std::string fault = EncodingFault(text); !fault.empty()) {
     throw ConfigError(file + ":" + fault);
   }
   RefuseManyAttributes(text, file);
-  const auto error = parsed.xml.Parse(text.data(), text.size());
+  const auto error = xml.Parse(text.data(), text.size());
   if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
-    throw ConfigError(
-        fmt::format("{}:{}: found more than {} elements within each other, expected "
-                    "fewer",
-                    file, parsed.xml.ErrorLineNum(), TINYXML2_MAX_ELEMENT_DEPTH));
+    FailParsing(file, xml.ErrorLineNum(),
+                fmt::format("more than {} elements within each other", TINYXML2_MAX_ELEMENT_DEPTH),
+                "fewer");
   }
   if (error != tinyxml2::XML_SUCCESS) {
-    throw ConfigError(fmt::format("{}:{}: found a fault of syntax ({}), expected well-formed XML",
-                                  file, std::max(1, parsed.xml.ErrorLineNum()),
-                                  tinyxml2::XMLDocument::ErrorIDToName(error)));
+    FailParsing(file, std::max(1, xml.ErrorLineNum()),
+                fmt::format("a fault of syntax ({})", xml.ErrorIDToName(error)), "well-formed XML");
   }
-  RefuseDocumentTypes(parsed);
-  if (parsed.xml.RootElement() == nullptr) {
-    throw ConfigError(file + ":1: found no element, expected <mujoco>, <robot> or <sdf>");
+  for (const auto* node = xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
+    if (node->ToUnknown() == nullptr) continue;
+    FailParsing(file, node->GetLineNum(), "a document type or declaration of entities",
+                "none: they are not read");
   }
-  return parsed.xml.RootElement();
+  if (xml.RootElement() == nullptr) {
+    FailParsing(file, 1, "no element", "<mujoco>, <robot> or <sdf>");
+  }
+  return xml.RootElement();
 }
 
-XmlFile::XmlFile(std::string_view text, const std::string& file,
-                 const std::optional<fs::path>& path)
-    : document_(std::make_shared<XmlDocument>()) {
-  document_->path = path;
-  xml::Parse(text, file, document_.get());
-}
-
-XmlElement XmlFile::root() const { return XmlElement(document_, document_->root()); }
-const std::string& XmlFile::name() const { return document_->files.front().name; }
-
-namespace {
-
-using Parts = std::vector<std::pair<XmlElement, std::string>>;
-
-void AddUnread(const std::shared_ptr<XmlDocument>& document, Element* element, Parts* parts) {
-  if (!document->read.contains(element)) {
-    parts->emplace_back(XmlElement(document, element), "");
-    return;
-  }
-  for (const auto* one : AttributesIn(*element)) {
-    if (document->read.contains(one)) continue;
-    parts->emplace_back(XmlElement(document, element), IsText(one->Name()) ? one->Name() : "?");
-  }
-  for (Element* child : document->ChildrenOf(element)) AddUnread(document, child, parts);
-}
-
-}  // namespace
-
-Parts XmlFile::Unread() const {
-  Parts parts;
-  AddUnread(document_, document_->root(), &parts);
+std::vector<std::pair<XmlElement, std::string>> XmlFile::Unread() const {
+  std::vector<std::pair<XmlElement, std::string>> parts;
+  const std::function<void(Element*)> add = [&](Element* element) {
+    if (!document_->read.contains(element)) {
+      parts.emplace_back(XmlElement(document_, element), "");
+      return;
+    }
+    for (const auto* one : AttributesIn(*element)) {
+      if (document_->read.contains(one)) continue;
+      parts.emplace_back(XmlElement(document_, element), IsText(one->Name()) ? one->Name() : "?");
+    }
+    for (Element* child : document_->ChildrenOf(element)) add(child);
+  };
+  add(document_->root());
   return parts;
 }
 

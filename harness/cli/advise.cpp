@@ -1,43 +1,45 @@
 // advise: the cheapest method that meets an error bound.
 #include "harness/advise/advise.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "harness/analysis/model_warnings.h"
-#include "harness/cli/command_line.h"
-#include "harness/cli/models.h"
-#include "harness/config/experiment_reader.h"
+#include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/config/mechanism_reader.h"
-#include "harness/isolation/processes.h"
 #include "harness/run/model_error.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/estimate.h"
-#include "harness/tables/fit.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {
 
 struct AdviseCommand {
-  std::filesystem::path mechanism;
-  double error = 0.0;               ///< error limit [m]; 0: not given
-  double budget = 0.0;              ///< wall seconds per simulated second; 0: not given
-  double horizon = 10.0;            ///< [s]
-  std::vector<std::string> points;  ///< BODY.POINT or BODY; empty: all
-  std::filesystem::path out;        ///< file of the experiment that reproduces the advice
-  std::string format = "text";      ///< of the table: text, csv, markdown, json, latex
-  bool simplify = false;            ///< include simpler models of the problem
-  bool generated = false;           ///< include generated code
-  bool exhaustive = false;          ///< test the whole product instead of a pilot
+  std::filesystem::path mechanism, out;
+  double error = 0.0, budget = 0.0;  ///< 0: not given
+  double horizon = 10.0;             ///< [s]
+  std::vector<std::string> points;
+  std::string format = "text";
+  bool simplify = false, generated = false, exhaustive = false;
   ProcessLimits limits = {.cpu_s = 120.0, .memory_mb = 2048.0};
+
+  std::vector<Option> Options() {
+    return {
+        MechanismArgument(&mechanism),
+        {"--max-error", "Largest error of points [m] (default: 1e-6)", &error, From(1e-13, 1e9)},
+        {"--budget", "Wall-time budget per simulated second; find the most accurate method",
+         &budget, From(1e-9, 1e6), Excludes({"--max-error"})},
+        {"--horizon", "Simulated time [s]", &horizon, From(1e-9, 1e9)},
+        {"--points", "Points that define the error: BODY.POINT or BODY (default: all)", &points},
+        {"--simplify", "Also try simpler models, with their errors and times (loopbench simplify)",
+         &simplify, Excludes({"--budget"})},
+        {"--generated", "Also time generated code of all formulations with the advice's settings",
+         &generated},
+        {"--exhaustive", "Try all combinations of formulation, level, integrator and tolerance",
+         &exhaustive},
+        {"-o,--out", "Experiment file that reproduces the recommendation", &out},
+        TableFormatOption(&format),
+        CpuOption(&limits),
+        MemoryOption(&limits),
+        WideOption()};
+  }
 };
 
 /// Shares of the total CPU time: limit of each of the reference's three witness runs.
@@ -55,10 +57,8 @@ MeasuredPoint PointNamed(const MechanismDescription& user, const std::string& na
     }
     if (name == user.bodies[i].name) return {i, user.bodies[i].com};
   }
-  throw ConfigError(
-      fmt::format("--points: found \"{}\", expected BODY (its centre of mass) or "
-                  "BODY.POINT, of: {}",
-                  name, fmt::join(known, ", ")));
+  Reject("--points: found \"{}\", expected BODY (its centre of mass) or BODY.POINT, of: {}", name,
+         fmt::join(known, ", "));
 }
 
 std::string WhatIsAsked(const AdviseCommand& command) {
@@ -68,17 +68,10 @@ std::string WhatIsAsked(const AdviseCommand& command) {
 }
 
 Table TableOf(const std::vector<Trial>& trials, const Trial& best) {
-  Table table;
-  table.columns = {{"formulation", "formulation"},
-                   {"enforcement", "enforcement"},
-                   {"coordinates", "coords"},
-                   {"integrator", "integrator"},
-                   {"rtol", "rtol", Format::kScientific},
-                   {"step", "step [s]", Format::kScientific},
-                   {"outcome", "outcome"},
-                   {"error_position_max", "error [m]", Format::kScientific},
-                   {"wall_s", "wall [s]", Format::kSeconds},
-                   {"ratio", "ratio", Format::kExponent}};
+  Table table{.columns = Columns(
+                  "formulation, enforcement, coordinates=coords, integrator, rtol:scientific, "
+                  "step=step [s]:scientific, outcome, error_position_max=error [m]:scientific, "
+                  "wall_s=wall [s]:seconds, ratio:exponent")};
   bool adaptive = false, fixed = false;
   for (const Trial& trial : trials) {
     const auto& [method, integrator, rtol, step] = trial.choice;
@@ -113,7 +106,9 @@ std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, dou
        .reference = reference});
 }
 
-Experiment SingleOf(const MechanismFile& file, double horizon) {
+/// Enters the warnings of the written experiment's run and its largest error over all points.
+void Examine(const MechanismFile& file, double horizon, const Reference& reference,
+             bool has_all_points, Trial& trial) {
   Experiment experiment;
   experiment.name = "advise";
   experiment.problems.push_back({.name = file.description.name,
@@ -121,13 +116,6 @@ Experiment SingleOf(const MechanismFile& file, double horizon) {
                                  .mechanism = file,
                                  .horizons = {horizon},
                                  .tags = {}});
-  return experiment;
-}
-
-/// Enters the warnings of the written experiment's run and its largest error over all points.
-void Examine(const MechanismFile& file, double horizon, const Reference& reference,
-             bool has_all_points, Trial& trial) {
-  const Experiment experiment = SingleOf(file, horizon);
   const Choice& choice = trial.choice;
   Case one;
   one.mechanism = file.description.name;
@@ -157,11 +145,10 @@ void RequireMotion(const std::string& name, const MechanismDescription& user,
     if (way.position > bound.position + first.position) return;
     turns = turns || way.rotation > bound.rotation + first.rotation;
   }
-  throw std::runtime_error(fmt::format(
-      "{}: {} within {:g} s, so any method is exact there, and there is no advice for a motion: "
-      "{}",
+  Reject<std::runtime_error>(
+      "{}: {} within {:g} s, so any method is exact there, and there is no advice for a motion: {}",
       name, turns ? "none of the measured points moves" : "no joint moves", certain.horizon,
-      turns ? "name others with --points" : "give the mechanism a speed or a force that moves it"));
+      turns ? "name others with --points" : "give the mechanism a speed or a force that moves it");
 }
 
 std::string WhatWasTried(const Advice& advice) {
@@ -294,8 +281,7 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
       (!command.points.empty() && caused.points < static_cast<int>(command.points.size()))) {
     return refuse("it does not have the points");
   }
-  row.Set("caused", caused.largest);
-  row.Set("point", caused.point);
+  Put(row, "caused", caused.largest, "point", caused.point);
   // half of the error is reserved for the integrator
   if (!(caused.largest <= command.error / 2)) return refuse("its error is too large");
   const Advice advice = AdviceFor(command, {model.description, model.observe, ""}, own, {},
@@ -304,12 +290,9 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
                                    .cpu_s = kPilotShare * command.limits.cpu_s / 4});
   if (!advice.reached) return refuse("no method reaches the rest of the error");
   const Trial& best = advice.finalists.front();
-  row.Set("total", caused.largest + best.error);
-  row.Set("wall_s", best.wall_s);
-  row.Set("ratio", best.wall_s / whole);
-  row.Set("verdict",
-          (best.wall_s < whole ? "saves time: " : "saves none: ") + ToString(best.choice));
-  return row;
+  return Put(row, "total", caused.largest + best.error, "wall_s", best.wall_s, "ratio",
+             best.wall_s / whole, "verdict",
+             (best.wall_s < whole ? "saves time: " : "saves none: ") + ToString(best.choice));
 }
 
 void PrintModels(const AdviseCommand& command, const MechanismFile& file,
@@ -320,14 +303,10 @@ void PrintModels(const AdviseCommand& command, const MechanismFile& file,
   const ShortRun run = MakeShortRun(file.description, std::min(kShortRun_s, certain.horizon),
                                     kWitnessShare * command.limits.cpu_s);
   const ProblemModels models = MakeModels(file, ideas, run, {});
-  Table table;
-  table.columns = {{"model", "model", Format::kText},
-                   {"caused", "error it causes [m]", Format::kScientific},
-                   {"point", "of", Format::kText},
-                   {"total", "in all [m]", Format::kScientific},
-                   {"wall_s", "wall [s]", Format::kSeconds},
-                   {"ratio", "of the whole's", Format::kExponent},
-                   {"verdict", "", Format::kText}};
+  Table table{
+      .columns = Columns(
+          "model, caused=error it causes [m]:scientific, point=of, total=in all [m]:scientific, "
+          "wall_s=wall [s]:seconds, ratio=of the whole's:exponent, verdict=")};
   for (const ProblemModel& model : models.models) {
     if (model.name == "full" || model.name.starts_with("islands")) continue;
     table.rows.push_back(RowOfModel(command, file, certain, model, whole));
@@ -348,8 +327,8 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   for (const std::string& point : command.points) points.push_back(PointNamed(user, point));
   const CertainMotion certain = CertainFor(command, user, command.horizon);
   if (!(certain.horizon > 0.0)) {
-    throw std::runtime_error(fmt::format("{}: there is no certified reference to advise by: {}",
-                                         name, certain.reference.message));
+    Reject<std::runtime_error>("{}: there is no certified reference to advise by: {}", name,
+                               certain.reference.message);
   }
   RequireMotion(name, user, certain, points);
   std::string shorter;
@@ -367,7 +346,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   request.cpu_s = kPilotShare * command.limits.cpu_s;
   const Advice advice = AdviceFor(command, file, certain, points, request);
   if (advice.finalists.empty()) {
-    throw std::runtime_error(fmt::format("{}: no way of running it finished", name));
+    Reject<std::runtime_error>("{}: no way of running it finished", name);
   }
   const Trial& best = advice.finalists.front();
   if (command.format == "text") {
@@ -389,7 +368,9 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
 
 /// Prints the cheapest way to run the mechanism within the error, or the most accurate one within
 /// the budget, and its basis. Returns 1 if no method met the requirement.
-int GiveAdvice(const AdviseCommand& command) {
+int GiveAdvice(AdviseCommand& command, const Typed&) {
+  constexpr double kUsualError = 1e-6;
+  if (command.error == 0.0 && command.budget == 0.0) command.error = kUsualError;
   const MechanismFile file = ReadMechanism(command.mechanism);
   if (!command.out.empty()) RequireOutput(command.out);
   RequireFreedom(file, command.limits);
@@ -400,33 +381,7 @@ int GiveAdvice(const AdviseCommand& command) {
 }  // namespace
 
 void AddAdvise(Commands& commands) {
-  auto& command = commands.Keep<AdviseCommand>();
-  commands.Add(
-      "advise", "Recommend the cheapest method that meets an error bound",
-      [&](const Typed&) {
-        constexpr double kUsualError = 1e-6;
-        if (command.error == 0.0 && command.budget == 0.0) command.error = kUsualError;
-        return GiveAdvice(command);
-      },
-      {MechanismArgument(&command.mechanism),
-       {"--max-error", "Largest error of points [m] (default: 1e-6)", &command.error,
-        From(1e-13, 1e9)},
-       {"--budget", "Wall-time budget per simulated second; find the most accurate method",
-        &command.budget, From(1e-9, 1e6), Excludes({"--max-error"})},
-       {"--horizon", "Simulated time [s]", &command.horizon, From(1e-9, 1e9)},
-       {"--points", "Points that define the error: BODY.POINT or BODY (default: all)",
-        &command.points},
-       {"--simplify", "Also try simpler models, with their errors and times (loopbench simplify)",
-        &command.simplify, Excludes({"--budget"})},
-       {"--generated", "Also time generated code of all formulations with the advice's settings",
-        &command.generated},
-       {"--exhaustive", "Try all combinations of formulation, level, integrator and tolerance",
-        &command.exhaustive},
-       {"-o,--out", "Experiment file that reproduces the recommendation", &command.out},
-       TableFormatOption(&command.format),
-       CpuOption(&command.limits),
-       MemoryOption(&command.limits),
-       WideOption()});
+  commands.Add("advise", "Recommend the cheapest method that meets an error bound", GiveAdvice);
 }
 
 }  // namespace loopbench::harness

@@ -1,37 +1,30 @@
 // baseline: a repository's own baseline, measured again and compared with the committed one.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <functional>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
-#include "harness/isolation/processes.h"
-#include "harness/judge/compare.h"
 #include "harness/run/peers.h"
 #include "harness/store/measurements.h"
-#include "harness/store/result_store.h"
 #include "harness/suite/reference_cases.h"
-#include "harness/suite/workload.h"
-#include "harness/text/files.h"
 #include "harness/text/run_program.h"
-#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {
 
 struct BaselineCommand {
-  std::string action;  ///< check, renew or selftest
+  std::string action;
   std::vector<std::filesystem::path> experiments;
-  std::filesystem::path dir;      ///< folder of the committed results.jsonl
-  std::filesystem::path counts;   ///< benchmarks whose instructions are counted; none if empty
-  std::filesystem::path counter;  ///< loopbench_count; empty: next to this program, else from PATH
-  std::filesystem::path keep;     ///< folder for the measurements; a temporary one if empty
+  std::filesystem::path dir, counts, counter, keep;
   int jobs = 1;
+
+  std::vector<Option> Options() {
+    return {
+        {"action", "Action", &action, kRequired, OneOf({"check", "renew", "selftest"})},
+        {"--experiments", "Experiment files (JSON)", &experiments, kRequired, kExists, kTakesAll},
+        {"--dir", "Folder of the baseline, to be committed", &dir, kRequired},
+        {"--counts", "Benchmarks (JSON) for instruction counts by valgrind", &counts, kExists},
+        {"--count-program", "Path of loopbench_count (default: beside this program, or in PATH)",
+         &counter},
+        {"-j,--jobs", "Cases to run in parallel", &jobs, From(1, 1024)},
+        {"--keep-output", "New folder for the measurements (default: none)", &keep}};
+  }
 };
 
 constexpr const char* kResults = "results.jsonl";
@@ -43,18 +36,15 @@ void RequireNewFolder(const std::filesystem::path& kept, const std::filesystem::
     return whole.has_filename() ? whole : whole.parent_path();
   };
   if (plain(kept) == plain(baseline)) {
-    throw ConfigError(
-        fmt::format("--keep-output: found {}, the folder of the baseline, expected another one",
-                    kept.string()));
+    Reject("--keep-output: found {}, the folder of the baseline, expected another one",
+           kept.string());
   }
   if (!std::filesystem::exists(kept)) return;
   if (!std::filesystem::is_directory(kept)) {
-    throw ConfigError(fmt::format("--keep-output: found {}, which is no folder, expected a new one",
-                                  kept.string()));
+    Reject("--keep-output: found {}, which is no folder, expected a new one", kept.string());
   }
   if (!std::filesystem::is_empty(kept)) {
-    throw ConfigError(fmt::format(
-        "--keep-output: found {}, which is not empty, expected a new folder", kept.string()));
+    Reject("--keep-output: found {}, which is not empty, expected a new folder", kept.string());
   }
 }
 
@@ -71,10 +61,9 @@ void RequirePrograms(const BaselineCommand& command) {
   for (const std::string& program : {std::string("valgrind"), counter}) {
     const ProgramResult tried = RunProgram({program, "--version"});
     if (tried.error == 0) continue;
-    throw ConfigError(fmt::format("--counts {}: {}{}", command.counts.string(),
-                                  tried.Failure(program),
-                                  program == "valgrind" ? "; install it: apt-get install valgrind"
-                                                        : "; --count-program says where it is"));
+    Reject("--counts {}: {}{}", command.counts.string(), tried.Failure(program),
+           program == "valgrind" ? "; install it: apt-get install valgrind"
+                                 : "; --count-program says where it is");
   }
 }
 
@@ -108,10 +97,10 @@ void CountInstructions(const BaselineCommand& command, const std::filesystem::pa
 int MeasureAll(const BaselineCommand& command, const std::filesystem::path& work) {
   Workload workload({command.experiments, {}, {}, 0}, {});
   if (workload.is_long()) {
-    throw ConfigError(
-        fmt::format("found a sweep of more than {} combinations, expected a baseline "
-                    "of cases that are worth a look each",
-                    kLongSweep));
+    Reject(
+        "found a sweep of more than {} combinations, expected a baseline "
+        "of cases that are worth a look each",
+        kLongSweep);
   }
   RequirePeers(workload.some());
   for (const Experiment& experiment : workload.some()) {
@@ -230,14 +219,14 @@ int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) 
 /// dir/results.jsonl, returns 0. selftest: returns 0 if each planted change was detected, else 1.
 /// @throws ConfigError before any measurement if valgrind or loopbench_count are required but
 /// missing
-int Baseline(const BaselineCommand& command, const std::string& typed) {
+int Baseline(const BaselineCommand& command, const Typed& typed) {
   if (!command.keep.empty()) RequireNewFolder(command.keep, command.dir);
   const auto baseline = command.dir / kResults;
   if (command.action == "check" && !std::filesystem::exists(baseline)) {
-    throw ConfigError(
-        fmt::format("{}: no such file, expected the baseline; the first one is made by loopbench "
-                    "baseline renew",
-                    baseline.string()));
+    Reject(
+        "{}: no such file, expected the baseline; the first one is made by loopbench "
+        "baseline renew",
+        baseline.string());
   }
   if (command.action == "renew") RequireOutput(baseline);
   RequirePrograms(command);
@@ -247,10 +236,7 @@ int Baseline(const BaselineCommand& command, const std::string& typed) {
   if (const int code = MeasureAll(command, work); code != 0) return code;
   if (command.action == "selftest") return SelfTest(command, work);
   if (command.action == "check") {
-    CompareCommand compare;
-    compare.base = command.dir;
-    compare.fresh = work / kResults;
-    return PrintComparison(compare, typed);
+    return PrintComparison(command.dir, work / kResults, typed);
   }
   WriteFileAtomically(baseline, ReadFile(work / kResults));
   Print("renewed {}: {} records\n", baseline.string(), Load(baseline).size());
@@ -260,20 +246,7 @@ int Baseline(const BaselineCommand& command, const std::string& typed) {
 }  // namespace
 
 void AddBaseline(Commands& commands) {
-  auto& command = commands.Keep<BaselineCommand>();
-  commands.Add(
-      "baseline", "Keep and check a baseline of drift and counts",
-      [&](const Typed& typed) { return Baseline(command, typed.line); },
-      {{"action", "Action", &command.action, kRequired, OneOf({"check", "renew", "selftest"})},
-       {"--experiments", "Experiment files (JSON)", &command.experiments, kRequired, kExists,
-        kTakesAll},
-       {"--dir", "Folder of the baseline, to be committed", &command.dir, kRequired},
-       {"--counts", "Benchmarks (JSON) for instruction counts by valgrind", &command.counts,
-        kExists},
-       {"--count-program", "Path of loopbench_count (default: beside this program, or in PATH)",
-        &command.counter},
-       {"-j,--jobs", "Cases to run in parallel", &command.jobs, From(1, 1024)},
-       {"--keep-output", "New folder for the measurements (default: none)", &command.keep}});
+  commands.Add("baseline", "Keep and check a baseline of drift and counts", Baseline);
 }
 
 }  // namespace loopbench::harness

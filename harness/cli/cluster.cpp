@@ -2,25 +2,14 @@
 #include "harness/cluster/cluster.h"
 
 #include <fmt/chrono.h>
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <chrono>
-#include <cmath>
-#include <filesystem>
-#include <map>
 #include <set>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
-#include "harness/record/provenance.h"
-#include "harness/record/record.h"
 #include "harness/run/case_identity.h"
 #include "harness/store/store_lock.h"
-#include "harness/suite/workload.h"
-#include "harness/tables/fit.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {
@@ -28,11 +17,46 @@ namespace {
 struct SubmitCommand {
   ClusterRun run;
   std::filesystem::path folder;
-  bool again = false;     ///< only parts of an existing folder that are neither done nor queued
-  bool no_queue = false;  ///< write the folder only, for another engine
-  bool dry_run = false;   ///< print the scripts, write nothing
-  bool no_timing = false;
+  bool again = false, no_queue = false, dry_run = false, no_timing = false;
   std::string time, partition;  ///< further options of sbatch
+
+  std::vector<Option> Options() {
+    return {
+        {"experiment", "Experiment files (JSON)", &run.experiments, kExists},
+        {"-o,--out", "New folder on a file system that all machines share", &folder, kRequired},
+        {"--tasks", "Number of parts, one array task each", &run.parts, From(1, kMaxParts),
+         ShowsDefault(false)},
+        {"-j,--jobs", "Cases in parallel per part, and processors of its task", &run.jobs,
+         From(1, kMaxJobs)},
+        {"--time", "Time limit of a part, in the format of sbatch", &time},
+        {"--partition", "Slurm partition", &partition},
+        {"--sbatch", "Further option of sbatch: --sbatch=--account=mine (repeatable)",
+         &run.batch_options},
+        {"--filter", "Only cases with key=value[,value] (or !=, <, <=, >, >=)", &run.conditions},
+        {"--set", "Set a field before reading: /json/pointer=value", &run.settings},
+        {"--no-timing", "Skip timings: parts on one machine disturb each other", &no_timing},
+        {"--isolate", "Run each case in its own process", &run.isolate},
+        {"--resubmit", "Submit only incomplete parts of this folder", &again},
+        {"--no-queue", "Write the folder without submitting", &no_queue},
+        {"--dry-run", "Print the scripts without writing", &dry_run}};
+  }
+};
+
+/// Options of the commands on the folder of submit.
+struct CollectCommand {
+  std::filesystem::path folder;
+
+  std::vector<Option> Options() {
+    return {{"folder", "Folder created by submit", &folder, kRequired}};
+  }
+};
+
+struct StatusCommand : CollectCommand {
+  bool json = false;
+
+  std::vector<Option> Options() {
+    return {CollectCommand::Options().front(), JsonOption(&json), WideOption()};
+  }
 };
 
 std::vector<int> PartsNotDone(const ClusterRun& run, const std::filesystem::path& folder) {
@@ -104,9 +128,9 @@ int SubmitAgain(const SubmitCommand& command) {
   }
   // the merge depends on one array: remaining parts of the last one must end first
   if (!queued->empty()) {
-    throw std::runtime_error(fmt::format(
+    Reject<std::runtime_error>(
         "{}: {} parts are still in the queue as job {}; wait for them, or scancel them first",
-        command.folder.string(), queued->size(), run.array_job));
+        command.folder.string(), queued->size(), run.array_job);
   }
   Queue(parts, command.folder, &run);
   return 0;
@@ -134,14 +158,9 @@ double Now() {
 }
 
 Table StatusTable(const ClusterRun& run, const std::vector<PartProgress>& parts) {
-  Table table;
-  table.title = fmt::format("{} in {} parts", run.name, run.parts);
-  table.columns = {{"part", "part"},
-                   {"state", "state"},
-                   {"cases", "cases", Format::kInteger},
-                   {"done", "done", Format::kInteger},
-                   {"failed", "failed", Format::kInteger},
-                   {"to_do", "to do", Format::kInteger}};
+  Table table{.title = fmt::format("{} in {} parts", run.name, run.parts),
+              .columns = Columns(
+                  "part, state, cases:integer, done:integer, failed:integer, to_do=to do:integer")};
   std::size_t done = 0, failed = 0;
   const auto add = [&table](const std::string& name, const std::string& state, double cases,
                             std::size_t finished, std::size_t other) {
@@ -170,34 +189,22 @@ JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>
   std::vector<JsonObject> rows;
   std::size_t done = 0, failed = 0, running = 0;
   for (const PartProgress& part : parts) {
-    rows.push_back(JsonObject()
-                       .Add("part", std::int64_t{part.part})
-                       .Add("state", part.state)
-                       .Add("cases", part.cases)
-                       .Add("done", Count(part.done))
-                       .Add("failed", Count(part.failed)));
+    rows.push_back(JsonOf("part", part.part, "state", part.state, "cases", part.cases, "done",
+                          part.done, "failed", part.failed));
     done += part.done;
     failed += part.failed;
     running += part.state == "running";
   }
-  return JsonObject()
-      .Add("name", run.name)
-      .Add("cases", run.all_cases)
-      .Add("done", Count(done))
-      .Add("failed", Count(failed))
-      .Add("to_do", run.all_cases - static_cast<std::int64_t>(done + failed))
-      .Add("running_parts", Count(running))
-      .Add("array_job", run.array_job)
-      .Add("collect_job", run.collect_job)
-      .Add("seconds_left", seconds_left)
-      .Add("parts", rows);
+  return JsonOf("name", run.name, "cases", run.all_cases, "done", done, "failed", failed, "to_do",
+                run.all_cases - static_cast<std::int64_t>(done + failed), "running_parts", running,
+                "array_job", run.array_job, "collect_job", run.collect_job, "seconds_left",
+                seconds_left, "parts", rows);
 }
 
 /// Rejects line ends: Slurm reads its options from comment lines of the script.
 void RequireOneLine(const std::string& option, const std::string& text) {
   if (text.find_first_of("\n\r") == std::string::npos) return;
-  throw ConfigError(
-      fmt::format("{}: found a line end in '{}', expected a text of one line", option, text));
+  Reject("{}: found a line end in '{}', expected a text of one line", option, text);
 }
 
 int Submit(SubmitCommand command) {
@@ -230,10 +237,8 @@ int Submit(SubmitCommand command) {
     return 0;
   }
   if (!MakeClusterRun(run, folder)) {
-    throw ConfigError(
-        fmt::format("{}: found the folder of a submit, expected a new one; to go on with it: "
-                    "{}",
-                    folder.string(), SubmitAgainLine(folder)));
+    Reject("{}: found the folder of a submit, expected a new one; to go on with it: {}",
+           folder.string(), SubmitAgainLine(folder));
   }
   WriteScripts(run, folder);
   Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
@@ -246,7 +251,8 @@ int Submit(SubmitCommand command) {
 }
 
 /// Returns 0, or 2 if the folder is no cluster run.
-int PrintStatus(const std::filesystem::path& folder, bool json) {
+int PrintStatus(const StatusCommand& command, const Typed&) {
+  const std::filesystem::path& folder = command.folder;
   const ClusterRun run = ReadClusterRun(folder);
   std::string problem;
   const auto queued = QueuedTasks(run.array_job, &problem);
@@ -259,27 +265,23 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
     if (const auto task = queued->find(part); task != queued->end()) progress.state = task->second;
   }
   const double left = SecondsLeft(run, parts);
-  if (json) {
-    PrintText(StatusDocument(run, parts, left).Text() + "\n");
-    return 0;
-  }
+  if (command.json) return PrintJson(StatusDocument(run, parts, left));
   Table table = StatusTable(run, parts);
   if (!problem.empty()) table.notes.push_back("states from the stores alone: " + problem);
   const auto whole = WholeFile(folder);
   const bool is_whole = HasRecords(whole);
   if (is_whole) {
-    table.notes.push_back(fmt::format("merged: {}", whole.parent_path().string()));
+    AddNote(table.notes, "merged: {}", whole.parent_path().string());
   } else if (IsLocked(UnderWay(whole))) {
     table.notes.push_back("the parts are being merged");
   } else if (left > 0.0) {
-    table.notes.push_back(fmt::format("about {:.0f} s left, until {:%H:%M}", left,
-                                      fmt::localtime(static_cast<std::time_t>(Now() + left))));
+    AddNote(table.notes, "about {:.0f} s left, until {:%H:%M}", left,
+            fmt::localtime(static_cast<std::time_t>(Now() + left)));
   }
   const bool is_stuck =
       !is_whole && queued && queued->empty() && !PartsNotDone(run, folder).empty();
   if (is_stuck && !run.array_job.empty()) {
-    table.notes.push_back(
-        fmt::format("no part is queued; the others go on with {}", SubmitAgainLine(folder)));
+    AddNote(table.notes, "no part is queued; the others go on with {}", SubmitAgainLine(folder));
   }
   PrintText(ToScreen(table) + "\n");
   return 0;
@@ -287,7 +289,8 @@ int PrintStatus(const std::filesystem::path& folder, bool json) {
 
 /// Merges all parts into folder/whole in the order of the experiments and returns 0. Returns 1 and
 /// writes nothing if a case is missing.
-int Collect(const std::filesystem::path& folder) {
+int Collect(const CollectCommand& command, const Typed&) {
+  const std::filesystem::path& folder = command.folder;
   const ClusterRun run = ReadClusterRun(folder);
   if (const std::vector<int> open = PartsNotDone(run, folder); !open.empty()) {
     PrintError("{}: {} of {} parts are not done: {}; nothing was merged\n", folder.string(),
@@ -310,12 +313,11 @@ void RequireNothingElse(const std::vector<std::string>& given) {
   const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
   for (const std::string& option : given) {
     if (may_stand.contains(option)) continue;
-    throw ConfigError(
-        fmt::format("--resubmit: found {} beside it, expected none: the folder knows", option));
+    Reject("--resubmit: found {} beside it, expected none: the folder knows", option);
   }
 }
 
-int SubmitAsTyped(SubmitCommand submit, const Typed& typed) {
+int SubmitAsTyped(SubmitCommand& submit, const Typed& typed) {
   ClusterRun& run = submit.run;
   if (submit.again != run.experiments.empty()) {
     throw ConfigError(
@@ -336,37 +338,9 @@ int SubmitAsTyped(SubmitCommand submit, const Typed& typed) {
 }  // namespace
 
 void AddCluster(Commands& commands) {
-  auto& submit = commands.Keep<SubmitCommand>();
-  ClusterRun& run = submit.run;
-  commands.Add(
-      "submit", "Run experiments in parts on a cluster (Slurm)",
-      [&](const Typed& typed) { return SubmitAsTyped(submit, typed); },
-      {{"experiment", "Experiment files (JSON)", &run.experiments, kExists},
-       {"-o,--out", "New folder on a file system that all machines share", &submit.folder,
-        kRequired},
-       {"--tasks", "Number of parts, one array task each", &run.parts, From(1, kMaxParts),
-        ShowsDefault(false)},
-       {"-j,--jobs", "Cases in parallel per part, and processors of its task", &run.jobs,
-        From(1, kMaxJobs)},
-       {"--time", "Time limit of a part, in the format of sbatch", &submit.time},
-       {"--partition", "Slurm partition", &submit.partition},
-       {"--sbatch", "Further option of sbatch: --sbatch=--account=mine (repeatable)",
-        &run.batch_options},
-       {"--filter", "Only cases with key=value[,value] (or !=, <, <=, >, >=)", &run.conditions},
-       {"--set", "Set a field before reading: /json/pointer=value", &run.settings},
-       {"--no-timing", "Skip timings: parts on one machine disturb each other", &submit.no_timing},
-       {"--isolate", "Run each case in its own process", &run.isolate},
-       {"--resubmit", "Submit only incomplete parts of this folder", &submit.again},
-       {"--no-queue", "Write the folder without submitting", &submit.no_queue},
-       {"--dry-run", "Print the scripts without writing", &submit.dry_run}});
-  auto& folder = commands.Keep<std::filesystem::path>();
-  auto& json = commands.Keep<bool>();
-  const Option argument = {"folder", "Folder created by submit", &folder, kRequired};
-  commands.Add("status", "Show the progress of a submitted run",
-               [&](const Typed&) { return PrintStatus(folder, json); },
-               {argument, JsonOption(&json), WideOption()});
-  commands.Add("collect", "Merge the parts of a submitted run",
-               [&](const Typed&) { return Collect(folder); }, {argument});
+  commands.Add("submit", "Run experiments in parts on a cluster (Slurm)", SubmitAsTyped);
+  commands.Add("status", "Show the progress of a submitted run", PrintStatus);
+  commands.Add("collect", "Merge the parts of a submitted run", Collect);
 }
 
 }  // namespace loopbench::harness

@@ -22,6 +22,25 @@ extern const std::string_view kCommandReference;  // docs/reference/commands.md
 
 namespace {
 
+/// Headings of `loopbench --help`, and their commands in order.
+constexpr std::pair<const char*, std::string_view> kGroups[] = {
+    {"Experiments", " run list integrators estimate advise merge "},
+    {"Mechanisms", " check explain assemble view simplify import export-mechanism generate count "},
+    {"Results", " table plot report trajectory work-precision robustness check-claims "},
+    {"Regressions", " compare fit-scaling export-metrics baseline history "},
+    {"Clusters", " submit status collect "},
+    {"Shell", " schema migrate completion manual "}};
+
+/// Returns the group of a command and its place there.
+std::pair<std::size_t, std::size_t> PlaceOf(const Command& row) {
+  const std::string word = " " + row.name.substr(0, row.name.find(' ')) + " ";
+  for (std::size_t group = 0; group < std::size(kGroups); ++group) {
+    const std::size_t at = kGroups[group].second.find(word);
+    if (at != std::string_view::npos) return {group, at};
+  }
+  throw std::logic_error("no group of --help has the command" + word);
+}
+
 /// Returns the options that may follow the subcommand: "--jobs", "--help".
 std::vector<std::string> OptionNames(const CLI::App& app) {
   std::vector<std::string> names;
@@ -210,13 +229,6 @@ std::string FishScript(const CLI::App& app) {
   return script;
 }
 
-/// Returns a script for bash, zsh or fish that completes subcommands, options, option values from
-/// lists, and file names.
-std::string CompletionScript(const CLI::App& app, const std::string& shell) {
-  if (shell == "zsh") return ZshScript(app);
-  return shell == "fish" ? FishScript(app) : BashScript(app);
-}
-
 /// Escapes text for roff, with any first character.
 std::string Roff(std::string_view text) {
   std::string roff;
@@ -283,14 +295,6 @@ std::string ManualPage(const CLI::App& app, const CLI::App* command) {
     page += CommandSection(*each, "loopbench " + each->get_name());
   }
   return page;
-}
-
-/// Writes the page of all commands and a page per command to a folder.
-void WriteManual(const CLI::App& app, const std::filesystem::path& folder) {
-  WriteFileAtomically(folder / "loopbench.1", ManualPage(app, nullptr));
-  for (const CLI::App* each : Subcommands(app)) {
-    WriteFileAtomically(folder / ("loopbench-" + each->get_name() + ".1"), ManualPage(app, each));
-  }
 }
 
 /// Returns the message of a failed parse: unknown words with spelling suggestions, or `error`.
@@ -371,15 +375,6 @@ CLI::Option* AddLater(CLI::App* app, const Option& row, std::vector<T>* place,
   return app->add_option(row.names, *texts, row.sentence);
 }
 
-template <class T>
-bool IsEmpty(const T& value) {
-  if constexpr (requires { value.empty(); }) {
-    return value.empty();
-  } else {
-    return value == T{};
-  }
-}
-
 /// Adds an option with its default, and with its range if its place has numbers.
 template <class T>
 CLI::Option* AddValue(CLI::App* app, const Option& row, T* place) {
@@ -395,7 +390,7 @@ CLI::Option* AddValue(CLI::App* app, const Option& row, T* place) {
   } else if (to > from) {
     option->check(NumberFrom(from, to));
   }
-  const bool shows = !option->get_positional() && !IsEmpty(*place);
+  const bool shows = !option->get_positional() && *place != T{};
   if (row.rules.shows_default.value_or(shows)) option->capture_default_str();
   return option;
 }
@@ -454,14 +449,22 @@ void Commands::AddShell(const CLI::App& app) {
     return 0;
   };
   Add("completion", "Print a completion script",
-      [&, print](const Typed&) { return print(CompletionScript(app, shell)); },
+      [&, print](const Typed&) {
+        return print(shell == "zsh"    ? ZshScript(app)
+                     : shell == "fish" ? FishScript(app)
+                                       : BashScript(app));
+      },
       {{"shell", "Shell to generate for", &shell, kRequired, OneOf({"bash", "zsh", "fish"})}});
   Add("manual", "Print manual pages",
       [&, print](const Typed&) {
         if (folder.empty()) {
           return print(ManualPage(app, subject.empty() ? nullptr : app.get_subcommand(subject)));
         }
-        WriteManual(app, folder);
+        WriteFileAtomically(folder / "loopbench.1", ManualPage(app, nullptr));
+        for (const CLI::App* each : Subcommands(app)) {
+          const std::string file = "loopbench-" + each->get_name() + ".1";
+          WriteFileAtomically(folder / file, ManualPage(app, each));
+        }
         return 0;
       },
       {{"command", "Command (default: all)", &subject, OneOf(names)},
@@ -479,6 +482,7 @@ int Commands::Run(int argc, char** argv, const std::string& footer) {
   app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
     return EscapeTerminalLines(ParseFailure(*failed, error));
   });
+  std::ranges::stable_sort(rows_, {}, &PlaceOf);
   AddShell(app);
   std::vector<Finish> later;
   std::function<int(const Typed&)> run;
@@ -490,7 +494,7 @@ int Commands::Run(int argc, char** argv, const std::string& footer) {
             ->add_subcommand(row.name.substr(space == row.name.npos ? 0 : space + 1), row.sentence);
     for (const Option& option : row.options) AddOption(command, option, &later);
     if (space == row.name.npos) {
-      command->group(row.heading)->footer(row.notes + HelpSection(row.name));
+      command->group(kGroups[PlaceOf(row).first].first)->footer(row.notes + HelpSection(row.name));
       if (!row.run) command->require_subcommand(1);
     } else {
       command->group("Subcommands");

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -92,8 +93,7 @@ struct Option {
 using CommandFunction = std::function<int(const Typed&)>;
 
 struct Command {
-  std::string heading;  ///< in `loopbench --help`
-  std::string name;     ///< "history add" is a command of "history", which has no function
+  std::string name;  ///< "history add" is a command of "history", which has no function
   std::string sentence;
   CommandFunction run;
   std::vector<Option> options;
@@ -113,15 +113,24 @@ class Commands {
 
   void Add(std::string name, std::string sentence, CommandFunction run = nullptr,
            std::vector<Option> options = {}, std::string notes = "") {
-    rows_.push_back({heading, std::move(name), std::move(sentence), std::move(run),
-                     std::move(options), std::move(notes)});
+    rows_.push_back({std::move(name), std::move(sentence), std::move(run), std::move(options),
+                     std::move(notes)});
+  }
+
+  /// Adds a command with the options of a T: `run` gets their values.
+  template <class T>
+  void Add(std::string name, std::string sentence, int (*run)(T&, const Typed&),
+           std::string notes = "") {
+    auto& values = Keep<std::remove_const_t<T>>();
+    Add(
+        std::move(name), std::move(sentence),
+        [&values, run](const Typed& typed) { return run(values, typed); }, values.Options(),
+        std::move(notes));
   }
 
   /// Parses the command line and runs its command. Prints help, or a mistake. Returns the exit
   /// code.
   int Run(int argc, char** argv, const std::string& footer);
-
-  std::string heading;  ///< of the commands that are added next, in `loopbench --help`
 
  private:
   void AddShell(const CLI::App& app);
@@ -130,27 +139,19 @@ class Commands {
   std::vector<std::shared_ptr<void>> kept_;
 };
 
-// Each function adds one subcommand or several related ones.
+// Each function adds related subcommands.
 void AddRun(Commands& commands);
-void AddMerge(Commands& commands);
-void AddList(Commands& commands);
-void AddIntegrators(Commands& commands);
-void AddCheck(Commands& commands);
-void AddPlan(Commands& commands);
+void AddExperiments(Commands& commands);
 void AddExplain(Commands& commands);
-void AddAssemble(Commands& commands);
 void AddSimplify(Commands& commands);
-void AddSchema(Commands& commands);
-void AddMigrate(Commands& commands);
+void AddFormats(Commands& commands);
 void AddAdvise(Commands& commands);
 void AddView(Commands& commands);
-void AddResults(Commands& commands);
-void AddVerdicts(Commands& commands);
-void AddWorkPrecision(Commands& commands);
-void AddTrajectory(Commands& commands);
 void AddImport(Commands& commands);
 void AddConvert(Commands& commands);
 void AddGenerate(Commands& commands);
+void AddResults(Commands& commands);
+void AddTrajectory(Commands& commands);
 void AddCount(Commands& commands);
 void AddComparison(Commands& commands);
 void AddBaseline(Commands& commands);

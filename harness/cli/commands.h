@@ -5,28 +5,95 @@
 // and 2.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "harness/cli/command_line.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/config/mechanism_reader.h"
 #include "harness/figures/figure_recipes.h"
 #include "harness/figures/free_figure.h"
 #include "harness/history/git.h"
+#include "harness/isolation/processes.h"
 #include "harness/judge/compare.h"
+#include "harness/record/provenance.h"
 #include "harness/record/record.h"
 #include "harness/record/select.h"
+#include "harness/reference/reference.h"
 #include "harness/store/record_lines.h"
+#include "harness/store/result_store.h"
 #include "harness/suite/suite.h"
+#include "harness/suite/workload.h"
+#include "harness/tables/columns.h"
+#include "harness/tables/fit.h"
 #include "harness/tables/table.h"
 #include "harness/tables/table_view.h"
+#include "harness/text/files.h"
 #include "harness/text/terminal.h"
+#include "harness/text/words.h"
+#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/structure.h"
 
 namespace loopbench::harness {
+
+/// Throws an error with a formatted message.
+template <class Error = ConfigError, class... Values>
+[[noreturn]] void Reject(fmt::format_string<Values...> format, Values&&... values) {
+  throw Error(fmt::format(format, std::forward<Values>(values)...));
+}
+
+/// Adds a formatted line.
+template <class... Values>
+void AddNote(std::vector<std::string>& notes, fmt::format_string<Values...> format,
+             Values&&... values) {
+  notes.push_back(fmt::format(format, std::forward<Values>(values)...));
+}
+
+/// True for parts of documents: objects, and lists of objects or texts.
+template <class T>
+constexpr bool kIsPart =
+    std::is_same_v<T, JsonObject> || std::is_same_v<T, std::vector<JsonObject>> ||
+    std::is_same_v<T, std::vector<std::string>>;
+
+/// Adds key, value, key, value, ... to a document or record; words of enumerations as texts.
+template <class Target, class Member, class... Rest>
+Target& Put(Target& target, std::string_view key, const Member& value, const Rest&... rest) {
+  if constexpr (std::is_same_v<Target, Record>) {
+    target.Set(key, AnyValue(value).value);
+  } else if constexpr (kIsPart<Member>) {
+    target.Add(key, value);
+  } else {
+    target.Add(key, AnyValue(value).value);
+  }
+  if constexpr (sizeof...(rest) > 0) Put(target, rest...);
+  return target;
+}
+/// Returns the document with key, value, key, value, ...
+template <class... Members>
+JsonObject JsonOf(const Members&... members) {
+  JsonObject document;
+  return Put(document, members...);
+}
+
+/// Prints one line, and returns 0.
+int PrintJson(const JsonObject& document);
+
+/// Returns columns from "key=header:format:importance, ...". Without a header, the key is the
+/// header; without a format, the column is a text. The other formats are integer, shortest,
+/// scientific, exponent, fixed and seconds.
+std::vector<TableColumn> Columns(std::string_view rows);
 
 /// Returns the last record of each case of a store in table order, with warnings from comparing
 /// records. Warnings about the store go to standard error. `watch` as for ReadRecords(). Throws
@@ -51,21 +118,43 @@ struct MergeCommand {
   std::filesystem::path out;  ///< a new store
   /// Values of "id" in the experiment's order: their records come first, others after them.
   std::vector<std::string> order = {};
+
+  std::vector<Option> Options() {
+    return {{"store", "Folders of runs, or .jsonl files", &stores, kRequired},
+            {"-o,--out", "Folder of the new store", &out, kRequired}};
+  }
 };
 /// Merges shards into one store, with every case once. Throws if two stores disagree about a case.
 /// Returns 1 and merges nothing if no store has a case of `order`.
-int Merge(const MergeCommand& command);
+int Merge(const MergeCommand& command, const Typed& typed = {});
 
 /// Limits of work on one mechanism file; experiments have their own.
 inline constexpr ProcessLimits kFileLimits = {.cpu_s = 60.0, .memory_mb = 2048.0};
 
 struct TableCommand {
-  std::filesystem::path store;
+  std::filesystem::path store, out;
   TableView view;
-  std::string format = "text";  ///< text, csv, markdown, json or latex
-  std::filesystem::path out;    ///< file; standard output if empty
-  std::string gate;             ///< "warnings" or "": checks the rows shown
+  std::string format = "text";
+  std::string gate;  ///< "warnings" or "": checks the rows shown
+
+  std::vector<Option> Options() {
+    return {StoreArgument(&store),
+            {"--kind", "Kind of table (default: drift, or the first kind in the store)", &view.kind,
+             OneOf({"drift", "precision", "timing", "factorial", "models", "references", "all"})},
+            TableFormatOption(&format),
+            WhereOption(&view.where),
+            {"--columns", "Keys of records, in this order: a,b,c", &view.columns, kSplits},
+            {"--group", "One table per value of this key", &view.group},
+            {"--sort", "Key to sort by", &view.sort},
+            {"--descending", "Sort in descending order", &view.descending, Needs("--sort")},
+            OutOption(&out),
+            GateOption(&gate),
+            WideOption()};
+  }
 };
+
+/// Reads measurements of any kind; warnings go to standard error.
+std::vector<Record> LoadMeasurements(const std::filesystem::path& path);
 
 /// Writes `text` to `out` and says so; prints it if `out` is empty.
 void Deliver(const std::string& text, const std::filesystem::path& out);
@@ -81,8 +170,10 @@ std::string RenderKept(Table table, const std::string& format);
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
             const std::string& format, FigureSize size);
 
-/// Figure sizes by name: "one-column", "two-column".
-const std::map<std::string, FigureSize>& FigureSizes();
+/// Returns the size "one-column" or "two-column".
+inline FigureSize SizeNamed(const std::string& name) {
+  return name == "one-column" ? FigureSize::kOneColumn : FigureSize::kTwoColumn;
+}
 
 /// Largest number of records held in memory: about 400 MB for runs of a few hundred steps.
 inline constexpr std::size_t kMaxHeld = 50'000;
@@ -105,19 +196,16 @@ Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 /// the process limit. `with_own` adds the memory in use. 0 if unknown.
 double FreeMemory(bool with_own = false);
 
-struct CompareCommand {
-  std::filesystem::path base, fresh;
-  std::string format = "text";  ///< text, csv or markdown
-  CompareOptions options;
-  Selection where = {};  ///< filter for the records of both sides
-  bool json = false;     ///< print one JSON document with every measure
-  /// Replaces the base by the last good state of a history.
-  std::filesystem::path history = {};
-  std::string branch = {};
-  std::filesystem::path markdown = {}, junit = {};  ///< additional output files; none if empty
+/// Runs that are no cases, whose ladders are checked. In a long sweep, each combination counts as
+/// many as the shown ones.
+struct OtherRuns {
+  OtherRuns(const Overview& overview, const Selection& filter);
+  std::size_t timings = 0, rungs = 0;
 };
+
 /// Returns 0 for equal or better, 1 if something is worse or different, 2 if it could not measure.
-int PrintComparison(const CompareCommand& command, const std::string& typed);
+int PrintComparison(const std::filesystem::path& base, const std::filesystem::path& fresh,
+                    const Typed& typed);
 
 /// Returns the last good state for new measurements of a machine, as base of a comparison, and sets
 /// `name` to its description. Throws ConfigError if there is none.
@@ -184,5 +272,100 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
 /// Prints the contents of a file: gravity, bodies, joints, their frames, forces.
 void PrintModel(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view);
+
+// Models of one problem: the full model, one per applicable rule, and all rules combined.
+
+/// A model in the form in which it is written.
+struct ProblemModel {
+  std::string name;  ///< "full", a rule's name or "combined"; with a number if it has parts
+  bool is_exact = true;
+  MechanismDescription description;
+  ObservedQuantities observe;
+  std::vector<std::string> done, dropped;
+  std::string assumption;
+  Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();
+  std::string error;  ///< largest distance from the full model [m], if requested
+  std::string worst;  ///< point with this error, or the reason why there is none
+  std::int64_t rhs_evaluations = -1;
+};
+
+/// Result of each simplification rule on the full model, applicable or not, in rule order.
+struct ProblemModels {
+  std::vector<std::pair<const SimplificationRule*, Simplified>> ideas;
+  /// Full model first, alone if no rule applies; last all rules combined, if several apply.
+  std::vector<ProblemModel> models;
+};
+
+ProblemModels MakeModels(const MechanismFile& file,
+                         const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
+                         const SimplifyOptions& options);
+
+/// Runs all models for `horizon` seconds with small steps, each with at most `cpu_s`, and sets
+/// their errors.
+void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder);
+
+/// Names of the bodies of the full model that the other lacks.
+std::vector<std::string> RemovedBodies(const MechanismDescription& whole,
+                                       const MechanismDescription& simplified);
+
+/// Name of the experiment file that runs all models: NAME-ladder.json.
+std::string LadderFileName(const ProblemModels& ladder);
+
+/// Writes NAME.json of all models, the experiment and models.md. All files are written next to the
+/// folder and read back before it is renamed. With `force` they atomically replace files of these
+/// names in an existing folder.
+///
+/// @throws ConfigError if the folder exists and is not empty, unless `force`; std::runtime_error if
+/// something cannot be written.
+void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
+                 const std::filesystem::path& folder, bool force);
+
+// Errors and costs of simpler models of one mechanism, as records of kind "model"
+// (docs/reference/records.md).
+
+struct ModelQuestion {
+  double horizon = 0.0;  ///< [s]
+  double accept = 0.0;   ///< largest acceptable error of a model [m]
+  double cpu_s = 0.0;    ///< limit of one integration [s]
+  std::string what;      ///< "my.json: --store", for messages
+};
+
+/// Returns a record for the full model and one per other model. All run alike (O-DCA, level
+/// projection, joint coordinates, ode45 at 1e-8), without observers and in turn. The error of a
+/// model is the largest distance of a named point between its certified motion and the full
+/// model's. Acceptance adds both certificates to the error. A model that cannot be judged is
+/// rejected with the reason.
+std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemModels& models,
+                                    const ModelQuestion& question);
+
+// Certified motion of a mechanism: the reference for advice and models.
+
+struct CertainMotion {
+  ReferenceOptions options = {};  ///< an experiment with them makes the same reference
+  Reference reference = {};
+  double horizon = 0.0;  ///< trust horizon [s], the end of error comparisons; 0: there is none
+};
+
+/// Computes a certified motion; each witness run may take `cpu_s`. If certification ends before
+/// `horizon`, makes the reference again up to there until it is certified to its end. Throws
+/// ConfigError in a program without wide scalars, which `what` needs.
+CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
+                                const std::string& what);
+
+// advise --simplify: simpler models of a problem within the accepted error, and their savings.
+
+/// Largest distance of a model's certified motion from the full model's.
+struct CausedError {
+  double largest = 0.0;  ///< over the compared points, at times that both certify [m]
+  std::string point;     ///< point with the largest distance
+  int points = 0;        ///< number of compared points
+  double until = 0.0;    ///< [s]
+};
+
+/// Compares points in the full model's axes. `names` are BODY.POINT; empty: all named points of the
+/// full model that the other has.
+CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& whole_reference,
+                         const ProblemModel& model, const Reference& reference,
+                         const std::vector<std::string>& names);
 
 }  // namespace loopbench::harness

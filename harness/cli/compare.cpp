@@ -1,63 +1,82 @@
 // compare, fit and export: finished measurements.
-#include "harness/judge/compare.h"
-
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <ranges>
 #include <set>
-#include <string>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/history/history_page.h"
 #include "harness/judge/statistics.h"
 #include "harness/judge/track.h"
-#include "harness/record/provenance.h"
-#include "harness/record/record.h"
-#include "harness/record/select.h"
 #include "harness/store/measurements.h"
-#include "harness/store/result_store.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/fit.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {
 
+const std::string kMeasurements = "Folder of a run, a .jsonl file, or JSON of Google Benchmark";
+
 struct FitCommand {
-  std::filesystem::path file;
+  std::filesystem::path file, out;
   std::string format = "text";
-  double from = 0.0;          ///< smaller sizes are omitted
-  std::filesystem::path out;  ///< standard output if empty
+  double from = 0.0;
+
+  std::vector<Option> Options() {
+    return {{"file", "JSON of Google Benchmark, or a result store with timings of families", &file,
+             kRequired},
+            {"--min-size", "Leave out sizes below [bodies]", &from, From(0.0, 1e9)},
+            FormatOption(&format, {"text", "csv", "markdown"}),
+            OutOption(&out),
+            WideOption()};
+  }
 };
 
 struct ExportCommand {
-  std::filesystem::path file;
-  std::string format = "customSmallerIsBetter";  ///< or bmf
-  std::filesystem::path out;                     ///< standard output if empty
+  std::filesystem::path file, out;
+  std::string format = "customSmallerIsBetter";
+
+  std::vector<Option> Options() {
+    return {{"file", kMeasurements, &file, kRequired},
+            FormatOption(&format, {"customSmallerIsBetter", "bmf"},
+                         "Output format: github-action-benchmark or Bencher"),
+            OutOption(&out)};
+  }
 };
 
-std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
-  std::vector<std::string> warnings;
-  std::vector<Record> records = ReadMeasurements(path, &warnings);
-  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
-  return records;
-}
+struct CompareCommand {
+  std::vector<std::filesystem::path> files;  ///< BASE and NEW, or NEW alone with a history
+  std::filesystem::path base = {}, fresh = {}, history = {}, markdown = {}, junit = {};
+  std::string branch = {}, format = "text";
+  CompareOptions options = {};
+  Selection where = {};
+  bool json = false;
+
+  std::vector<Option> Options() {
+    return {
+        {"base", kMeasurements + "; omit BASE with --history or --branch", &files, kRequired,
+         Most(2)},
+        {"--history", "Take the last good state of this history as BASE", &history},
+        {"--branch", "Last good state of a history on this git branch", &branch,
+         Excludes({"--history"})},
+        {"--markdown", "Write a summary for a pull request to this file too", &markdown},
+        {"--junit", "Write JUnit XML for a CI server to this file too", &junit},
+        {"--only", "Only this group (repeatable)", &options.only, OneOf(GroupNames())},
+        {"--where", "Only records of both with key=value[,value] (or !=, <, <=, >, >=)", &where},
+        {"--match",
+         "KEY[,KEY]: cases meet by these keys, whatever else they were run with (default: all "
+         "keys, and equal mechanisms and limits)",
+         &options.match, kSplits},
+        {"--allow-missing", "NEW may lack cases of BASE", &options.subset},
+        {"--added", "NEW may have cases that BASE lacks (always with a history)", &options.added},
+        {"--error-ratio", "Allowed on the same build", &options.error_ratio, From(1.0, 1e9)},
+        FormatOption(&format, {"text", "csv", "markdown"}, "Output format (csv: all measures)"),
+        WideOption(),
+        JsonOption(&json)};
+  }
+};
 
 /// One row per group of measures: number of compared values with each judgement.
 Table SummaryTable(const ComparisonReport& comparison) {
-  Table table;
-  table.title = "Compared";
-  table.columns = {{"group", "group"},
-                   {"same", "same", Format::kInteger},
-                   {"better", "better", Format::kInteger},
-                   {"worse", "worse", Format::kInteger},
-                   {"different", "different", Format::kInteger},
-                   {"not_measured", "not measured", Format::kInteger}};
+  Table table{.title = "Compared",
+              .columns = Columns("group, same:integer, better:integer, worse:integer, "
+                                 "different:integer, not_measured=not measured:integer")};
   for (const std::string& group : GroupNames()) {
     const auto is_in_group = [&group](const Finding& finding) {
       return GroupOf(finding.measure.rule) == group;
@@ -83,13 +102,7 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
   Table table;
   table.colour = &JudgementColour;
   table.title = with_same ? "All measures" : "Changes";
-  table.columns = {{"judgement", "judgement"},
-                   {"case", "case"},
-                   {"measure", "measure"},
-                   {"base", "base"},
-                   {"new", "new"},
-                   {"ratio", "ratio", Format::kSeconds},
-                   {"why", "why"}};
+  table.columns = Columns("judgement, case, measure, base, new, ratio:seconds, why");
   // regressions first: the most important result
   for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
                                     Judgement::kNotMeasured, Judgement::kSame}) {
@@ -123,7 +136,7 @@ std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
     }
   }
   std::vector<std::string> notes;
-  for (const auto& [reason, count] : reasons) notes.push_back(fmt::format("{} {}", count, reason));
+  for (const auto& [reason, count] : reasons) AddNote(notes, "{} {}", count, reason);
   return notes;
 }
 
@@ -132,15 +145,9 @@ void NoteCases(const std::string& what, const std::vector<std::string>& cases,
   if (cases.empty()) return;
   constexpr std::size_t kMaxNamed = 20;
   const bool all = cases.size() <= kMaxNamed;
-  notes.push_back(
-      fmt::format("{} {}{}", cases.size(), what,
-                  all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMaxNamed)));
+  AddNote(notes, "{} {}{}", cases.size(), what,
+          all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMaxNamed));
   for (const std::string& one : cases | std::views::take(kMaxNamed)) notes.push_back("  " + one);
-}
-
-/// Adds a row for each case without counterpart.
-void AddCases(const std::string& judgement, const std::vector<std::string>& cases, Table& table) {
-  for (const std::string& one : cases) AddRow({judgement, one}, &table);
 }
 
 /// Adds the origin of the records of one side; if one file has several origins, all are named.
@@ -170,10 +177,10 @@ void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string
   constexpr double kShift = 0.01;  // half of the smallest reported effect
   const double shift = Median(ratios);
   if (ratios.size() < kMany || !(std::abs(shift - 1.0) > kShift)) return;
-  notes.push_back(
-      fmt::format("all times: median ratio {:.3f}; unless everything changed, the machine's speed "
-                  "did: repeat the run before believing single times",
-                  shift));
+  AddNote(notes,
+          "all times: median ratio {:.3f}; unless everything changed, the machine's speed did: "
+          "repeat the run before believing single times",
+          shift);
 }
 
 std::string Conclusion(const ComparisonReport& comparison, const CompareOptions& options) {
@@ -211,8 +218,8 @@ std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Re
     };
     std::error_code none;
     if (std::filesystem::equivalent(file(command.base), file(command.fresh), none)) {
-      throw ConfigError(fmt::format("compare: found '{}' as BASE and as NEW, expected two files",
-                                    file(command.base).string()));
+      Reject("compare: found '{}' as BASE and as NEW, expected two files",
+             file(command.base).string());
     }
     return LoadMeasurements(command.base);
   }
@@ -227,32 +234,64 @@ JsonObject ComparisonDocument(const ComparisonReport& comparison, const CompareO
   for (const Record& row : SummaryTable(comparison).rows) groups.emplace_back(row);
   for (const Finding& finding : comparison.findings) {
     const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
-    findings.push_back(JsonObject()
-                           .Add("judgement", std::string(ToString(finding.judgement)))
-                           .Add("case", finding.one)
-                           .Add("measure", std::string(key))
-                           .Add("unit", std::string(unit))
-                           .Add("base", finding.base)
-                           .Add("new", finding.fresh)
-                           .Add("ratio", finding.ratio)
-                           .Add("why", finding.why));
+    findings.push_back(JsonOf("judgement", ToString(finding.judgement), "case", finding.one,
+                              "measure", key, "unit", unit, "base", finding.base, "new",
+                              finding.fresh, "ratio", finding.ratio, "why", finding.why));
   }
-  return JsonObject()
-      .Add("conclusion", Conclusion(comparison, options))
-      .Add("exit_code", std::int64_t{comparison.ExitCode(options)})
-      .Add("groups", groups)
-      .Add("findings", findings)
-      .Add("only_in_base", comparison.only_base)
-      .Add("only_in_new", comparison.only_fresh)
-      .Add("more_than_once", comparison.ambiguous)
-      .Add("other_config_hash", comparison.other_content)
-      .Add("other_settings", comparison.other_settings)
-      .Add("notes", notes);
+  return JsonOf(
+      "conclusion", Conclusion(comparison, options), "exit_code", comparison.ExitCode(options),
+      "groups", groups, "findings", findings, "only_in_base", comparison.only_base, "only_in_new",
+      comparison.only_fresh, "more_than_once", comparison.ambiguous, "other_config_hash",
+      comparison.other_content, "other_settings", comparison.other_settings, "notes", notes);
 }
 
-}  // namespace
+/// Prints exponents of time over size, one row per benchmark family. Returns 2 if there is none.
+int PrintFits(const FitCommand& command, const Typed& typed) {
+  const std::vector<Record> benchmarks = LoadMeasurements(command.file);
+  Table table{
+      .title = "Time over size: ns = c bodies^exponent",
+      .columns = Columns("family, sizes:integer, bodies_min=bodies from:integer, "
+                         "bodies_max=to:integer, exponent:exponent, standard_error=std. "
+                         "error:exponent, slope_min=local min:exponent, slope_max=local "
+                         "max:exponent, ns_per_body=ns per body at largest:fixed, failed:integer")};
+  table.rows = FitFamilies(benchmarks, command.from);
+  if (table.rows.empty()) {
+    Reject("{}: no family of right-hand sides with two sizes or more", command.file.string());
+  }
+  if (command.format != "text" || !command.out.empty()) {
+    NoteOrigins("measured", benchmarks, table.notes);
+    if (const double load = benchmarks.front().Number("load_average"); std::isfinite(load)) {
+      AddNote(table.notes, "load average of the minute before: {:.1f}", load);
+    }
+    AddNote(table.notes, "command: {}", typed.line);
+  }
+  const bool on_screen = command.format == "text" && command.out.empty();
+  Deliver(on_screen ? ToScreen(table) : Render(table, command.format), command.out);
+  const bool fitted = std::ranges::any_of(
+      table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
+  return fitted ? 0 : 2;
+}
 
-int PrintComparison(const CompareCommand& command, const std::string& typed) {
+/// Writes measurements as JSON for trackers of continuous benchmarking. Returns 0; 1 if values were
+/// omitted, each named on standard error; 2 if nothing is left.
+int ExportMeasurements(const ExportCommand& command, const Typed&) {
+  std::vector<std::string> torn;
+  auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
+  left_out.insert(left_out.end(), torn.begin(), torn.end());
+  for (const std::string& line : left_out) {
+    PrintError("{}: not exported: {}\n", command.file.string(), line);
+  }
+  if (values.empty()) {
+    PrintError("{}: nothing to export: no record that finished has a measure\n",
+               command.file.string());
+    return 2;
+  }
+  Deliver(command.format == "bmf" ? ToBencherMetricFormat(values) : ToCustomSmallerIsBetter(values),
+          command.out);
+  return left_out.empty() ? 0 : 1;
+}
+
+int ShowComparison(const CompareCommand& command, const Typed& typed) {
   std::vector<Record> fresh = LoadMeasurements(command.fresh);
   std::string base_name;
   std::vector<Record> base = LoadBase(command, fresh, &base_name);
@@ -271,8 +310,8 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   if (!base_name.empty()) notes.push_back(base_name);
   notes.insert(notes.end(), origins.begin(), origins.end());
   if (!command.markdown.empty() && command.markdown == command.junit) {
-    throw ConfigError(fmt::format("--markdown and --junit: found \"{}\" twice, expected two files",
-                                  command.junit.string()));
+    Reject("--markdown and --junit: found \"{}\" twice, expected two files",
+           command.junit.string());
   }
   if (!command.markdown.empty()) {
     WriteFileAtomically(command.markdown,
@@ -282,7 +321,7 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
     WriteFileAtomically(command.junit, ComparisonJunit(comparison, options));
   }
   if (command.json) {
-    PrintText(ComparisonDocument(comparison, options, notes).Text() + "\n");
+    PrintJson(ComparisonDocument(comparison, options, notes));
     return code;
   }
   notes = ReasonNotes(comparison);
@@ -297,15 +336,17 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   notes.insert(notes.end(), origins.begin(), origins.end());
   Table findings = FindingTable(comparison, command.format == "csv");
   if (command.format == "csv") {
-    AddCases("only in BASE", comparison.only_base, findings);
-    AddCases("only in NEW", comparison.only_fresh, findings);
-    AddCases("more than once", comparison.ambiguous, findings);
-    AddCases("other content", comparison.other_content, findings);
+    for (const auto& [judgement, cases] : {std::pair{"only in BASE", comparison.only_base},
+                                           {"only in NEW", comparison.only_fresh},
+                                           {"more than once", comparison.ambiguous},
+                                           {"other content", comparison.other_content}}) {
+      for (const std::string& one : cases) AddRow({judgement, one}, &findings);
+    }
     PrintText(ToCsv(findings));
     PrintError("{}\n", Conclusion(comparison, options));
     return code;
   }
-  if (command.format == "markdown") notes.push_back(fmt::format("command: {}", typed));
+  if (command.format == "markdown") AddNote(notes, "command: {}", typed.line);
   const auto print = [&](const Table& table) {
     PrintText((command.format == "text" ? ToScreen(table) : ToMarkdown(table)) + "\n");
   };
@@ -317,136 +358,39 @@ int PrintComparison(const CompareCommand& command, const std::string& typed) {
   return code;
 }
 
-namespace {
-
-/// Prints exponents of time over size, one row per benchmark family. Returns 2 if there is none.
-int PrintFits(const FitCommand& command, const std::string& typed) {
-  const std::vector<Record> benchmarks = LoadMeasurements(command.file);
-  Table table;
-  table.title = "Time over size: ns = c bodies^exponent";
-  table.columns = {{"family", "family"},
-                   {"sizes", "sizes", Format::kInteger},
-                   {"bodies_min", "bodies from", Format::kInteger},
-                   {"bodies_max", "to", Format::kInteger},
-                   {"exponent", "exponent", Format::kExponent},
-                   {"standard_error", "std. error", Format::kExponent},
-                   {"slope_min", "local min", Format::kExponent},
-                   {"slope_max", "local max", Format::kExponent},
-                   {"ns_per_body", "ns per body at largest", Format::kFixed},
-                   {"failed", "failed", Format::kInteger}};
-  table.rows = FitFamilies(benchmarks, command.from);
-  if (table.rows.empty()) {
-    throw ConfigError(fmt::format("{}: no family of right-hand sides with two sizes or more",
-                                  command.file.string()));
-  }
-  if (command.format != "text" || !command.out.empty()) {
-    NoteOrigins("measured", benchmarks, table.notes);
-    if (const double load = benchmarks.front().Number("load_average"); std::isfinite(load)) {
-      table.notes.push_back(fmt::format("load average of the minute before: {:.1f}", load));
-    }
-    table.notes.push_back(fmt::format("command: {}", typed));
-  }
-  const bool on_screen = command.format == "text" && command.out.empty();
-  Deliver(on_screen ? ToScreen(table) : Render(table, command.format), command.out);
-  const bool fitted = std::ranges::any_of(
-      table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
-  return fitted ? 0 : 2;
-}
-
-/// Writes measurements as JSON for trackers of continuous benchmarking. Returns 0; 1 if values were
-/// omitted, each named on standard error; 2 if nothing is left.
-int ExportMeasurements(const ExportCommand& command) {
-  std::vector<std::string> torn;
-  auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
-  left_out.insert(left_out.end(), torn.begin(), torn.end());
-  for (const std::string& line : left_out) {
-    PrintError("{}: not exported: {}\n", command.file.string(), line);
-  }
-  if (values.empty()) {
-    PrintError("{}: nothing to export: no record that finished has a measure\n",
-               command.file.string());
-    return 2;
-  }
-  Deliver(command.format == "bmf" ? ToBencherMetricFormat(values) : ToCustomSmallerIsBetter(values),
-          command.out);
-  return left_out.empty() ? 0 : 1;
-}
-
-const std::string kMeasurements = "Folder of a run, a .jsonl file, or JSON of Google Benchmark";
-
-/// Takes BASE and NEW of compare.
-void TakeFiles(const std::vector<std::filesystem::path>& files, CompareCommand* command) {
-  const bool has_history = !command->history.empty() || !command->branch.empty();
-  if (files.size() != (has_history ? 1u : 2u)) {
+/// Takes BASE and NEW of the command line.
+int PrintTypedComparison(CompareCommand& command, const Typed& typed) {
+  const bool has_history = !command.history.empty() || !command.branch.empty();
+  if (command.files.size() != (has_history ? 1u : 2u)) {
     throw ConfigError(has_history
                           ? "compare: found BASE beside a history, expected NEW alone"
                           : "compare: found NEW missing, expected BASE NEW, or NEW and --history");
   }
-  command->fresh = files.back();
-  if (!has_history) command->base = files.front();
-}
-
-void AddCompare(Commands& commands) {
-  auto& command = commands.Keep<CompareCommand>();
-  auto& files = commands.Keep<std::vector<std::filesystem::path>>();
-  CompareOptions& options = command.options;
-  commands.Add(
-      "compare", "Compare results with a baseline and report regressions",
-      [&](const Typed& typed) {
-        TakeFiles(files, &command);
-        return PrintComparison(command, typed.line);
-      },
-      {{"base", kMeasurements + "; omit BASE with --history or --branch", &files, kRequired,
-        Most(2)},
-       {"--history", "Take the last good state of this history as BASE", &command.history},
-       {"--branch", "Last good state of a history on this git branch", &command.branch,
-        Excludes({"--history"})},
-       {"--markdown", "Write a summary for a pull request to this file too", &command.markdown},
-       {"--junit", "Write JUnit XML for a CI server to this file too", &command.junit},
-       {"--only", "Only this group (repeatable)", &options.only, OneOf(GroupNames())},
-       {"--where", "Only records of both with key=value[,value] (or !=, <, <=, >, >=)",
-        &command.where},
-       {"--match",
-        "KEY[,KEY]: cases meet by these keys, whatever else they were run with (default: all "
-        "keys, and equal mechanisms and limits)",
-        &options.match, kSplits},
-       {"--allow-missing", "NEW may lack cases of BASE", &options.subset},
-       {"--added", "NEW may have cases that BASE lacks (always with a history)", &options.added},
-       {"--error-ratio", "Allowed on the same build", &options.error_ratio, From(1.0, 1e9)},
-       FormatOption(&command.format, {"text", "csv", "markdown"},
-                    "Output format (csv: all measures)"),
-       WideOption(),
-       JsonOption(&command.json)});
-}
-
-void AddFit(Commands& commands) {
-  auto& command = commands.Keep<FitCommand>();
-  commands.Add("fit-scaling", "Fit scaling exponents of right-hand sides against mechanism size",
-               [&](const Typed& typed) { return PrintFits(command, typed.line); },
-               {{"file", "JSON of Google Benchmark, or a result store with timings of families",
-                 &command.file, kRequired},
-                {"--min-size", "Leave out sizes below [bodies]", &command.from, From(0.0, 1e9)},
-                FormatOption(&command.format, {"text", "csv", "markdown"}),
-                OutOption(&command.out),
-                WideOption()});
-}
-
-void AddExport(Commands& commands) {
-  auto& command = commands.Keep<ExportCommand>();
-  commands.Add("export-metrics", "Write measurements for a benchmark tracker",
-               [&](const Typed&) { return ExportMeasurements(command); },
-               {{"file", kMeasurements, &command.file, kRequired},
-                FormatOption(&command.format, {"customSmallerIsBetter", "bmf"},
-                             "Output format: github-action-benchmark or Bencher"),
-                OutOption(&command.out)});
+  command.fresh = command.files.back();
+  if (!has_history) command.base = command.files.front();
+  return ShowComparison(command, typed);
 }
 
 }  // namespace
 
+std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
+  std::vector<std::string> warnings;
+  std::vector<Record> records = ReadMeasurements(path, &warnings);
+  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  return records;
+}
+
+int PrintComparison(const std::filesystem::path& base, const std::filesystem::path& fresh,
+                    const Typed& typed) {
+  return ShowComparison({.files = {}, .base = base, .fresh = fresh}, typed);
+}
+
 void AddComparison(Commands& commands) {
-  AddCompare(commands);
-  AddFit(commands);
-  AddExport(commands);
+  commands.Add("compare", "Compare results with a baseline and report regressions",
+               PrintTypedComparison);
+  commands.Add("fit-scaling", "Fit scaling exponents of right-hand sides against mechanism size",
+               PrintFits);
+  commands.Add("export-metrics", "Write measurements for a benchmark tracker", ExportMeasurements);
 }
 
 }  // namespace loopbench::harness

@@ -1,28 +1,13 @@
 // count: exact operation counts of right-hand sides.
-#include <fmt/format.h>
-
-#include <cmath>
-#include <filesystem>
-#include <functional>
-#include <map>
 #include <span>
 #include <sstream>
-#include <string>
-#include <vector>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/formulations.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/generate/record.h"
-#include "harness/isolation/processes.h"
-#include "harness/record/record.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/run_case.h"
-#include "harness/tables/fit.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 #include "harness/timing/subject.h"
 
 namespace loopbench::harness {
@@ -30,14 +15,35 @@ namespace {
 
 struct CountCommand {
   std::vector<std::filesystem::path> mechanisms;
-  std::string family;  ///< family of mechanisms of any size (benchmarks.h), in addition to files
-  std::vector<int> sizes;  ///< sizes of the family
+  std::string family;
+  std::vector<int> sizes;
   /// Names to count; empty: every formulation, every recorded level, both coordinate sets.
   std::vector<std::string> formulations, levels, coordinates;
   std::vector<std::string> solvers = {"rank-revealing"};
-  std::string format = "text";  ///< text, csv, markdown, json or latex
-  std::filesystem::path out;    ///< standard output if empty
+  std::string format = "text";
+  std::filesystem::path out;
   ProcessLimits limits = kFileLimits;
+
+  std::vector<Option> Options() {
+    return {{"mechanisms", "Mechanism files (JSON)", &mechanisms},
+            {"--family",
+             "Family of mechanisms of any size; also prints how counts grow with size, and which "
+             "method is cheapest at which size",
+             &family, OneOf(NamesOfSizedFamilies())},
+            {"--sizes", "Sizes of the family's members: a,b", &sizes, kSplits, Needs("--family")},
+            {"--formulation", "Formulations (default: all): a,b", &formulations,
+             OneOf(FormulationNamesWithoutPeers()), kSplits},
+            {"--enforcement", "Levels (default: all that are recorded): a,b", &levels,
+             OneOf(LevelNames()), kSplits},
+            {"--coordinates", "Coordinate sets (default: both): a,b", &coordinates,
+             OneOf({"joint", "absolute"}), kSplits},
+            {"--solver", "Solvers: a,b", &solvers, OneOf({"plain", "rank-revealing"}), kSplits},
+            FormatOption(&format, {"text", "csv", "markdown", "json", "latex", "jsonl"}),
+            OutOption(&out),
+            WideOption(),
+            CpuOption(&limits),
+            MemoryOption(&limits)};
+  }
 };
 
 // baumgarte gains: other values give the same counts, only zero gains would omit the feedback
@@ -62,20 +68,16 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
   const auto counts = generate::CountsOf(generate::RecordFunction(subject, start));
   const auto other = generate::CountsOf(generate::RecordFunction(subject, rounded));
   SetOperations(counts, row);
-  row.Set("kinematics", counts.kinematics.flops());
-  row.Set("forces", counts.forces.flops());
-  row.Set("solve", counts.solve.flops());
-  row.Set("solve_depth", std::int64_t{counts.solve_depth});
-  row.Set("comparisons", counts.comparisons);
-  row.Set("flops_compared", counts.compared.flops());
-  row.Set("flops_as_run", counts.as_run.flops());
+  Put(row, "kinematics", counts.kinematics.flops(), "forces", counts.forces.flops(), "solve",
+      counts.solve.flops(), "solve_depth", counts.solve_depth, "comparisons", counts.comparisons,
+      "flops_compared", counts.compared.flops(), "flops_as_run", counts.as_run.flops());
   if (subject.options.enforcement == Enforcement::kPosition) {
     generate::RecordingSubject newton = subject;
     newton.quantity = generate::Quantity::kCorrection;
     row.Set("correction",
             generate::CountsOf(generate::RecordFunction(newton, start)).result.flops());
   }
-  row.Set("exact", std::string(counts == other ? "yes" : "no"));
+  Put(row, "exact", counts == other ? "yes" : "no");
 }
 
 /// Counts one part of a mechanism in one coordinate set: a row per formulation, level and solver.
@@ -90,12 +92,8 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
              {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kBaumgarte})) {
       for (const SolverKind solver : ParseAll<SolverKind>(command.solvers, {})) {
         Record& row = rows.emplace_back();
-        row.Set("mechanism", part.name);
-        row.Set("formulation", formulation);
-        row.Set("enforcement", std::string(ToString(level)));
-        row.Set("coordinates", std::string(ToString(set)));
-        row.Set("solver", std::string(ToString(solver)));
-        row.Set("bodies", static_cast<std::int64_t>(part.bodies.size() - 1));
+        Put(row, "mechanism", part.name, "formulation", formulation, "enforcement", level,
+            "coordinates", set, "solver", solver, "bodies", part.bodies.size() - 1);
         try {
           if (state.outcome != Outcome::kFinished) {
             throw generate::NotCovered(std::string(ToString(state.outcome)) + ": " + state.message);
@@ -107,7 +105,7 @@ void CountPart(const CountCommand& command, const MechanismDescription& part, Co
                      .most_nodes = most_nodes},
                     {.q = state.q, .u = state.u}, row);
         } catch (const std::exception& why) {
-          row.Set("not_recorded", std::string(why.what()));
+          Put(row, "not_recorded", why.what());
         }
       }
     }
@@ -129,28 +127,15 @@ int CountHere(const CountCommand& command, const MechanismDescription& descripti
   return 0;
 }
 
-/// Returns rows counted in a child process; nothing if it fails, with its exit code in `code`.
-std::vector<Record> RowsOf(const std::string& name, const ProcessLimits& limits,
-                           const std::function<int()>& count, int* code) {
-  std::string text;
-  *code = TextFromChild(name, limits, count, &text);
-  std::vector<Record> rows;
-  std::istringstream lines(text);
-  for (std::string line; *code == 0 && std::getline(lines, line);) {
-    rows.push_back(FromJsonLine(line));
-  }
-  return rows;
-}
-
 void RequireSizes(const SizedFamily& family, const std::vector<int>& sizes) {
   if (sizes.empty()) {
-    throw ConfigError(fmt::format("--family {}: found no --sizes, expected numbers from {} to {}",
-                                  family.name, family.smallest, family.largest));
+    Reject("--family {}: found no --sizes, expected numbers from {} to {}", family.name,
+           family.smallest, family.largest);
   }
   for (const int size : sizes) {
     if (size >= family.smallest && size <= family.largest) continue;
-    throw ConfigError(fmt::format("--sizes: found {}, expected {} to {} of family {} ({})", size,
-                                  family.smallest, family.largest, family.name, family.of_what));
+    Reject("--sizes: found {}, expected {} to {} of family {} ({})", size, family.smallest,
+           family.largest, family.name, family.of_what);
   }
 }
 
@@ -204,32 +189,14 @@ std::vector<std::string> Crossovers(std::span<const Record> rows) {
 
 Table CountTable(std::vector<Record> rows) {
   Table table{.rows = std::move(rows)};
-  table.columns = {{"mechanism", "mechanism"},
-                   {"formulation", "formulation"},
-                   {"enforcement", "enforcement"},
-                   {"coordinates", "coord."},
-                   {"solver", "solver"},
-                   {"bodies", "bodies", Format::kInteger},
-                   {"flops", "flops", Format::kInteger, {}, 2},
-                   {"flops_per_body", "per body", Format::kFixed},
-                   {"exponent", "exponent", Format::kExponent, {}, 2},
-                   {"kinematics", "kinematics", Format::kInteger},
-                   {"forces", "forces", Format::kInteger},
-                   {"solve", "solve", Format::kInteger},
-                   {"additions", "+ -", Format::kInteger},
-                   {"multiplications", "*", Format::kInteger},
-                   {"divisions", "/", Format::kInteger},
-                   {"roots", "sqrt", Format::kInteger},
-                   {"sines", "sin cos", Format::kInteger},
-                   {"other", "other", Format::kInteger, {}, -1},
-                   {"depth", "depth", Format::kInteger, {}, 1},
-                   {"solve_depth", "depth of solve", Format::kInteger, {}, 1},
-                   {"correction", "Newton step", Format::kInteger},
-                   {"comparisons", "compared", Format::kInteger},
-                   {"flops_compared", "flops with comparisons", Format::kInteger, {}, -2},
-                   {"flops_as_run", "flops as run", Format::kInteger, {}, 1},
-                   {"exact", "exact", Format::kText, {}, -1},
-                   {"not_recorded", "not recorded", Format::kText, {}, 2}};
+  table.columns = Columns(
+      "mechanism, formulation, enforcement, coordinates=coord., solver, bodies:integer, "
+      "flops:integer:2, flops_per_body=per body:fixed, exponent:exponent:2, kinematics:integer, "
+      "forces:integer, solve:integer, additions=+ -:integer, multiplications=*:integer, "
+      "divisions=/:integer, roots=sqrt:integer, sines=sin cos:integer, other:integer:-1, "
+      "depth:integer:1, solve_depth=depth of solve:integer:1, correction=Newton step:integer, "
+      "comparisons=compared:integer, flops_compared=flops with comparisons:integer:-2, "
+      "flops_as_run=flops as run:integer:1, exact::-1, not_recorded=not recorded::2");
   table.notes = {
       "flops: + - * count 1, / and sqrt 4, other functions 8 (McMahon 1986); depth: operations on "
       "the longest path; zeros and ones of the geometry exploited, as run: not exploited"};
@@ -237,7 +204,7 @@ Table CountTable(std::vector<Record> rows) {
 }
 
 /// Prints one row per right-hand side. Returns 2 if none was recorded.
-int CountOperations(const CountCommand& command, const std::string& typed) {
+int CountOperations(const CountCommand& command, const Typed& typed) {
   constexpr std::size_t kMaxOfFiles = 100'000, kMaxOfFamilies = 1'000'000;
   if (command.mechanisms.empty() && command.family.empty()) {
     throw ConfigError("count: found neither mechanisms nor --family, expected one of them");
@@ -246,10 +213,14 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
   for (const std::filesystem::path& path : command.mechanisms) NoteInput(path);
   if (!command.out.empty()) RequireOutput(command.out);
   std::vector<Record> rows;
+  // counts in a child process; returns its exit code
   const auto add = [&](const std::string& name, const std::function<int()>& count) {
-    int code = 0;
-    const std::vector<Record> more = RowsOf(name, command.limits, count, &code);
-    rows.insert(rows.end(), more.begin(), more.end());
+    std::string text;
+    const int code = TextFromChild(name, command.limits, count, &text);
+    std::istringstream lines(text);
+    for (std::string line; code == 0 && std::getline(lines, line);) {
+      rows.push_back(FromJsonLine(line));
+    }
     return code;
   };
   for (const std::filesystem::path& path : command.mechanisms) {
@@ -296,7 +267,7 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
     PrintText(ToScreen(table));
     return code;
   }
-  AppendProvenance(table, typed);
+  AppendProvenance(table, typed.line);
   Deliver(text.empty() ? RenderKept(table, command.format) : text, command.out);
   if (command.out.empty()) return code;
   for (const std::string& sentence : crossovers) Print("{}\n", sentence);
@@ -306,29 +277,7 @@ int CountOperations(const CountCommand& command, const std::string& typed) {
 }  // namespace
 
 void AddCount(Commands& commands) {
-  auto& command = commands.Keep<CountCommand>();
-  commands.Add(
-      "count", "Count the operations of right-hand sides exactly",
-      [&](const Typed& typed) { return CountOperations(command, typed.line); },
-      {{"mechanisms", "Mechanism files (JSON)", &command.mechanisms},
-       {"--family",
-        "Family of mechanisms of any size; also prints how counts grow with size, and which "
-        "method is cheapest at which size",
-        &command.family, OneOf(NamesOfSizedFamilies())},
-       {"--sizes", "Sizes of the family's members: a,b", &command.sizes, kSplits,
-        Needs("--family")},
-       {"--formulation", "Formulations (default: all): a,b", &command.formulations,
-        OneOf(FormulationNamesWithoutPeers()), kSplits},
-       {"--enforcement", "Levels (default: all that are recorded): a,b", &command.levels,
-        OneOf(LevelNames()), kSplits},
-       {"--coordinates", "Coordinate sets (default: both): a,b", &command.coordinates,
-        OneOf({"joint", "absolute"}), kSplits},
-       {"--solver", "Solvers: a,b", &command.solvers, OneOf({"plain", "rank-revealing"}), kSplits},
-       FormatOption(&command.format, {"text", "csv", "markdown", "json", "latex", "jsonl"}),
-       OutOption(&command.out),
-       WideOption(),
-       CpuOption(&command.limits),
-       MemoryOption(&command.limits)});
+  commands.Add("count", "Count the operations of right-hand sides exactly", CountOperations);
 }
 
 }  // namespace loopbench::harness

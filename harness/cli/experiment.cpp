@@ -1,37 +1,55 @@
-// list and check: files before a run.
-#include <fmt/format.h>
-
-#include <algorithm>
+// list, check and assemble: files before a run.
 #include <tuple>
 
 #include "harness/analysis/model_warnings.h"
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/benchmarks.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/json/file_kind.h"
 #include "harness/judge/claims.h"
 #include "harness/judge/robustness_map.h"
 #include "harness/record/measures.h"
-#include "harness/record/record.h"
 #include "harness/run/run_case.h"
 #include "harness/suite/estimate.h"
 #include "harness/suite/reference_cases.h"
-#include "harness/suite/workload.h"
-#include "harness/tables/fit.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 #include "harness/timing/time_cases.h"
+#include "mechanism/start/branches.h"
 
 namespace loopbench::harness {
 namespace {
 
+struct ListCommand {
+  ExperimentFiles files;
+  bool json = false;
+
+  std::vector<Option> Options() {
+    return {{"experiment", "Experiment files (JSON)", &files.paths, kRequired},
+            FilterOption(&files.filter),
+            SetOption(&files.settings),
+            WideOption(),
+            JsonOption(&json)};
+  }
+};
+
+struct IntegratorsCommand {
+  bool json = false;
+
+  std::vector<Option> Options() { return {WideOption(), JsonOption(&json)}; }
+};
+
 struct CheckCommand {
   ExperimentFiles files;
-  bool no_assembly = false;  ///< do not assemble the starts of mechanisms and problems
+  bool no_assembly = false, json = false;
   ProcessLimits limits = kFileLimits;
-  bool json = false;
+
+  std::vector<Option> Options() {
+    return {{"file", "Files (JSON)", &files.paths, kRequired},
+            {"--no-assembly", "Read files without assembling mechanisms", &no_assembly},
+            CpuOption(&limits),
+            MemoryOption(&limits),
+            JsonOption(&json),
+            SetOption(&files.settings)};
+  }
 };
 
 /// Returns the cases that match, each with "runs".
@@ -47,30 +65,14 @@ std::vector<Record> CaseRows(const std::vector<Experiment>& experiments, const S
   return rows;
 }
 
-/// Runs that are no cases. In a long sweep, each combination counts as many as the shown ones.
-struct OtherRuns {
-  OtherRuns(const Overview& overview, const Selection& filter) {
-    for (const Experiment& experiment : overview.experiments) {
-      timings += CountTimings(experiment, filter);
-      rungs += CountRungs(experiment);
-    }
-    timings = timings * overview.combinations / overview.experiments.size();
-    rungs = rungs * overview.combinations / overview.experiments.size();
-  }
-  std::size_t timings = 0, rungs = 0;
-};
-
 /// Prints all cases, one per line and group by group: a long sweep is never completely in memory.
-void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
-  const OtherRuns others(overview, files.filter);
-  std::string head = JsonObject()
-                         .Add("file", files.paths.front().string())
-                         .Add("name", overview.experiments.front().name)
-                         .Add("comment", overview.experiments.front().comment)
-                         .Add("combinations", Count(overview.combinations))
-                         .Add("timings", Count(others.timings))
-                         .Add("precision_runs", Count(others.rungs))
-                         .Text();
+void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files,
+                       const OtherRuns& others) {
+  std::string head =
+      JsonOf("file", files.paths.front().string(), "name", overview.experiments.front().name,
+             "comment", overview.experiments.front().comment, "combinations", overview.combinations,
+             "timings", others.timings, "precision_runs", others.rungs)
+          .Text();
   head.pop_back();
   PrintText(head + ",\"cases\":[");
   Workload workload(files);
@@ -89,7 +91,7 @@ void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files) {
 /// Number of combinations of a long sweep in a table.
 constexpr std::size_t kShown = 16;
 
-Table CaseTable(const Overview& overview, const Selection& filter) {
+Table CaseTable(const Overview& overview, const Selection& filter, const OtherRuns& others) {
   const std::size_t step =
       overview.is_sample ? std::max<std::size_t>(1, overview.experiments.size() / kShown) : 1;
   std::vector<Experiment> experiments;
@@ -99,38 +101,33 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
   Table table;
   table.title = experiments.front().name;
   if (!experiments.front().comment.empty()) table.title += ": " + experiments.front().comment;
-  for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver"}) {
-    table.columns.push_back({key, key});
-  }
+  table.columns = Columns("mechanism, formulation, enforcement, coordinates, solver");
   for (const auto& [name, value] : experiments.front().parameters.items()) {
     Format format = Format::kText;
     if (std::holds_alternative<double>(value)) format = Format::kShortest;
     if (std::holds_alternative<std::int64_t>(value)) format = Format::kInteger;
     table.columns.push_back({name, name, format, {}});
   }
-  const bool has_threads = std::ranges::any_of(experiments, [](const Experiment& experiment) {
-    return std::ranges::any_of(experiment.methods,
-                               [](const Method& method) { return method.threads > 1; });
-  });
-  if (has_threads) table.columns.push_back({"threads", "threads", Format::kInteger});
-  const bool has_executions = std::ranges::any_of(experiments, [](const Experiment& experiment) {
-    return std::ranges::any_of(experiment.methods, [](const Method& method) {
-      return method.execution != Execution::kLibrary;
-    });
-  });
-  if (has_executions) table.columns.push_back({"execution", "execution"});
   const auto any = [&experiments](auto has) { return std::ranges::any_of(experiments, has); };
-  const bool has_integrators =
-      any([](const Experiment& experiment) { return experiment.integrators.size() > 1; });
-  const bool has_steps =
-      any([](const Experiment& experiment) { return !experiment.fixed_steps.empty(); });
-  if (has_integrators) table.columns.push_back({"integrator", "integrator"});
+  const auto any_method = [&any](auto has) {
+    return any([&has](const Experiment& one) { return std::ranges::any_of(one.methods, has); });
+  };
+  if (any_method([](const Method& method) { return method.threads > 1; })) {
+    table.columns.push_back({"threads", "threads", Format::kInteger});
+  }
+  if (any_method([](const Method& method) { return method.execution != Execution::kLibrary; })) {
+    table.columns.push_back({"execution", "execution"});
+  }
+  if (any([](const Experiment& one) { return one.integrators.size() > 1; })) {
+    table.columns.push_back({"integrator", "integrator"});
+  }
   table.columns.push_back({"rtol", "rtol", Format::kShortest});
-  if (has_steps) table.columns.push_back({"step", "step [s]", Format::kShortest});
+  if (any([](const Experiment& one) { return !one.fixed_steps.empty(); })) {
+    table.columns.push_back({"step", "step [s]", Format::kShortest});
+  }
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest});
   table.columns.push_back({"runs", "runs", Format::kInteger});
   table.rows = CaseRows(experiments, filter);
-  const OtherRuns others(overview, filter);
   table.notes = {fmt::format("{} cases and {} timings", overview.cases(), others.timings)};
   if (others.rungs > 0) {
     table.notes.front() += fmt::format(", {} runs in several scalars", others.rungs);
@@ -139,10 +136,10 @@ Table CaseTable(const Overview& overview, const Selection& filter) {
     table.notes.front() += fmt::format(" in {} combinations", overview.combinations);
   }
   if (overview.is_sample) {
-    table.notes.push_back(fmt::format(
-        "Shown are the cases of {} combinations spread over all; --filter chooses others, --json "
-        "lists every case",
-        experiments.size()));
+    AddNote(table.notes,
+            "Shown are the cases of {} combinations spread over all; --filter chooses others, "
+            "--json lists every case",
+            experiments.size());
   }
   return table;
 }
@@ -200,16 +197,14 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
         "; each value of each axis was read, and the starts of {} combinations assembled",
         command.no_assembly ? 0 : experiments.size());
   }
-  checked.document.Add("kind", std::string("experiment"))
-      .Add("name", name)
-      .Add("cases", Count(overview.cases()))
-      .Add("combinations", Count(overview.combinations));
+  Put(checked.document, "kind", "experiment", "name", name, "cases", overview.cases(),
+      "combinations", overview.combinations);
   return checked;
 }
 
 Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& command) {
   if (!command.files.settings.empty()) {
-    throw ConfigError(fmt::format("{}: --set is for experiments, and this is none", path.string()));
+    Reject("{}: --set is for experiments, and this is none", path.string());
   }
   const MechanismFile file = ReadMechanism(path);
   Checked checked;
@@ -224,19 +219,17 @@ Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& co
       std::tie(file.description.name, file.description.bodies, file.description.joints);
   checked.sentence =
       fmt::format("mechanism \"{}\", {} bodies, {} joints", name, bodies.size() - 1, joints.size());
-  checked.document.Add("kind", std::string("mechanism"))
-      .Add("name", name)
-      .Add("bodies", Count(bodies.size() - 1))
-      .Add("joints", Count(joints.size()));
+  Put(checked.document, "kind", "mechanism", "name", name, "bodies", bodies.size() - 1, "joints",
+      joints.size());
   return checked;
 }
 
 /// Checks a file. Throws ConfigError with all mistakes.
 Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command) {
   Checked checked;
-  const auto of = [&checked](const char* kind, std::string sentence) -> JsonObject& {
-    checked.sentence = std::move(sentence);
-    return checked.document.Add("kind", std::string(kind));
+  const auto set = [&checked](const std::string& sentence, const auto&... members) {
+    checked.sentence = sentence;
+    Put(checked.document, "kind", members...);
   };
   switch (KindOfFile(path)) {
     case FileKind::kExperiment:
@@ -245,46 +238,45 @@ Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command
       return CheckMechanism(path, command);
     case FileKind::kClaims: {
       const std::size_t claims = ReadClaims(path).size();
-      of("claims", fmt::format("{} claims", claims)).Add("claims", Count(claims));
+      set(fmt::format("{} claims", claims), "claims", "claims", claims);
       break;
     }
     case FileKind::kMap: {
       const MapRules map = ReadMapRules(path);
       std::size_t rows = 0;
       for (const MapGroup& group : map.groups) rows += group.rows.size();
-      of("map", fmt::format("robustness map of {} rows and {} methods", rows, map.columns.size()))
-          .Add("rows", Count(rows))
-          .Add("methods", Count(map.columns.size()));
+      set(fmt::format("robustness map of {} rows and {} methods", rows, map.columns.size()), "map",
+          "rows", rows, "methods", map.columns.size());
       break;
     }
     case FileKind::kBenchmarks: {
       const std::size_t groups = ReadBenchmarks(path).groups.size();
-      of("benchmarks", fmt::format("{} groups of benchmarks", groups)).Add("groups", Count(groups));
+      set(fmt::format("{} groups of benchmarks", groups), "benchmarks", "groups", groups);
       break;
     }
     case FileKind::kSeries: {
       const PublishedSeries series = ReadPublishedSeries(path);
-      of("series", fmt::format("published series \"{}\", {} quantities at {} times", series.name,
-                               series.quantities.size(), series.times.size()))
-          .Add("quantities", Count(series.quantities.size()))
-          .Add("times", Count(series.times.size()));
+      set(fmt::format("published series \"{}\", {} quantities at {} times", series.name,
+                      series.quantities.size(), series.times.size()),
+          "series", "quantities", series.quantities.size(), "times", series.times.size());
     }
   }
   return checked;
 }
 
-int List(const ExperimentFiles& files, bool json) {
+int List(const ListCommand& command, const Typed&) {
+  const auto& [files, json] = command;
   if (json) PrintText("{\"experiments\":[");
   bool is_first = true;
   for (const auto& path : files.paths) {
     const ExperimentFiles one = {{path}, files.settings, files.filter, files.threads};
     const Overview overview = MakeOverview(path, one);
-    for (const Experiment& experiment : overview.experiments) CheckLadders(experiment);
+    const OtherRuns others(overview, files.filter);
     if (json) {
       PrintText(is_first ? "" : ",\n");
-      PrintCaseDocument(overview, one);
+      PrintCaseDocument(overview, one, others);
     } else {
-      PrintText(ToScreen(CaseTable(overview, files.filter)) + "\n");
+      PrintText(ToScreen(CaseTable(overview, files.filter, others)) + "\n");
     }
     is_first = false;
   }
@@ -292,14 +284,9 @@ int List(const ExperimentFiles& files, bool json) {
   return 0;
 }
 
-int ListIntegrators(bool json) {
-  Table table;
-  table.columns = {{"integrator", "integrator"},
-                   {"order", "order", Format::kInteger},
-                   {"embedded_order", "embedded", Format::kInteger},
-                   {"stages", "stages", Format::kInteger},
-                   {"kind", "kind"},
-                   {"table", "table of ARKODE"}};
+int ListIntegrators(const IntegratorsCommand& command, const Typed&) {
+  Table table{.columns = Columns("integrator, order:integer, embedded_order=embedded:integer, "
+                                 "stages:integer, kind, table=table of ARKODE")};
   for (const Profile& profile : Profiles()) {
     const ButcherTable& pair = profile.table;
     const std::string other = pair.name == profile.name ? "" : pair.name;
@@ -308,66 +295,130 @@ int ListIntegrators(bool json) {
             pair.stages(), profile.is_implicit ? "implicit" : "explicit", other},
            &table);
   }
-  if (!json) PrintText(ToScreen(table));
   std::vector<JsonObject> rows(table.rows.begin(), table.rows.end());
-  if (json) PrintText(JsonObject().Add("integrators", rows).Text() + "\n");
+  if (command.json) return PrintJson(JsonOf("integrators", rows));
+  PrintText(ToScreen(table));
   return 0;
 }
 
-int CheckFiles(const CheckCommand& command) {
+int CheckFiles(const CheckCommand& command, const Typed&) {
   std::vector<JsonObject> documents;
   int exit_code = 0;
   for (const auto& path : command.files.paths) {
-    JsonObject document;
-    document.Add("file", path.string());
+    JsonObject document = JsonOf("file", path);
     try {
       const Checked checked = CheckFile(path, command);
       if (!command.json) Print("{}: {}\n", path.string(), checked.sentence);
-      document.Add("ok", true).Add("found", checked.document).Add("warnings", checked.warnings);
+      Put(document, "ok", true, "found", checked.document, "warnings", checked.warnings);
     } catch (const ConfigError& error) {
       PrintError("{}\n", Lines{WithMigrationHint(error.what())});
-      document.Add("ok", false).Add("error", std::string(error.what()));
+      Put(document, "ok", false, "error", error.what());
       exit_code = 2;
     }
     documents.push_back(std::move(document));
   }
-  if (command.json) {
-    PrintText(JsonObject().Add("ok", exit_code == 0).Add("files", documents).Text() + "\n");
-  }
+  if (command.json) PrintJson(JsonOf("ok", exit_code == 0, "files", documents));
   return exit_code;
+}
+
+struct AssembleCommand {
+  std::filesystem::path mechanism, out;
+  int starts = 200;
+  bool all = false;
+  ProcessLimits limits = kFileLimits;
+
+  std::vector<Option> Options() {
+    return {MechanismArgument(&mechanism),
+            {"-o,--out", "Folder for a mechanism file per branch", &out},
+            {"--starts", "Scattered starts", &starts, From(1, 1e6)},
+            WideOption(),
+            CpuOption(&limits),
+            MemoryOption(&limits),
+            {"--all", "Print all rows of long tables", &all}};
+  }
+};
+
+/// Prints the branches: coordinates of joints in the tree, a row per branch.
+void PrintBranches(const MechanismDescription& description, const Branches& branches,
+                   const ExplainView& view) {
+  Table table{.columns = Columns("branch:integer, times=starts:integer, distance:shortest")};
+  for (std::size_t k = 0; k < branches.found.size(); ++k) {
+    const Branch& branch = branches.found[k];
+    Record& row = AddRow({k + 1, branch.times, branch.distance}, &table);
+    for (const JointValues& values : branch.description.initial.coordinates) {
+      const JointDescription& joint = description.joints[values.joint];
+      const std::vector<ValueWord> words = ValueWords(joint.type, description.space, false);
+      for (std::size_t i = 0; i < values.values.size() && i < words.size(); ++i) {
+        const std::string key = fmt::format("{}.{} [{}]", joint.name, words[i].name, words[i].unit);
+        if (k == 0) table.columns.push_back({key, key, Format::kShortest});
+        row.Set(key, values.values[i]);
+      }
+    }
+  }
+  PrintSection("Branches", table, view, "branches");
+}
+
+int AssembleFile(const AssembleCommand& command, const ExplainView& view) {
+  const MechanismFile file = ReadMechanism(command.mechanism);
+  Branches branches;
+  try {
+    branches = FindBranches(file.description, command.starts);
+  } catch (const std::invalid_argument& error) {
+    Reject("{}: {}", command.mechanism.string(), error.what());
+  }
+  if (branches.freedom > 0) {
+    Reject(
+        "{}: found {} free motions, expected none: list as many coordinates under \"fixed\", so "
+        "that positions are isolated",
+        command.mechanism.string(), branches.freedom);
+  }
+  Print("{} ({})\n", file.description.name, command.mechanism.string());
+  PrintBranches(file.description, branches, view);
+  Print(
+      "  {} of {} scattered starts closed. Branch 1 is the start of the file; distance: largest\n"
+      "  difference of a body's pose from it [rad, or mean links].\n",
+      branches.closed, branches.starts);
+  if (branches.movable > 0) {
+    Print("  {} of them led to positions that still move, which are not listed.\n",
+          branches.movable);
+  }
+  for (std::size_t k = 0; k < branches.found.size() && !command.out.empty(); ++k) {
+    MechanismDescription description = branches.found[k].description;
+    description.name = fmt::format("{}-branch-{}", file.description.name, k + 1);
+    ObservedQuantities known;
+    known.expected = file.observe.expected;
+    WriteFileAtomically(command.out / (FileName(description.name) + ".json"),
+                        MechanismText(description, known));
+  }
+  if (!command.out.empty()) {
+    Print("\nwrote {} files to {}; loopbench view shows them\n", branches.found.size(),
+          command.out.string());
+  }
+  return 0;
+}
+
+int AssembleInChild(const AssembleCommand& command, const Typed&) {
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return AssembleFile(command, ViewOfOutput(command.all)); });
 }
 
 }  // namespace
 
-void AddList(Commands& commands) {
-  auto& files = commands.Keep<ExperimentFiles>();
-  auto& json = commands.Keep<bool>();
-  commands.Add("list", "Show the cases of experiments",
-               [&](const Typed&) { return List(files, json); },
-               {{"experiment", "Experiment files (JSON)", &files.paths, kRequired},
-                FilterOption(&files.filter),
-                SetOption(&files.settings),
-                WideOption(),
-                JsonOption(&json)});
+OtherRuns::OtherRuns(const Overview& overview, const Selection& filter) {
+  for (const Experiment& experiment : overview.experiments) {
+    CheckLadders(experiment);
+    timings += CountTimings(experiment, filter);
+    rungs += CountRungs(experiment);
+  }
+  timings = timings * overview.combinations / overview.experiments.size();
+  rungs = rungs * overview.combinations / overview.experiments.size();
 }
 
-void AddIntegrators(Commands& commands) {
-  auto& json = commands.Keep<bool>();
-  commands.Add("integrators", "List the integrators with their orders and stages",
-               [&](const Typed&) { return ListIntegrators(json); },
-               {WideOption(), JsonOption(&json)});
-}
-
-void AddCheck(Commands& commands) {
-  auto& command = commands.Keep<CheckCommand>();
-  commands.Add("check", "Validate files and solve for consistent initial conditions",
-               [&](const Typed&) { return CheckFiles(command); },
-               {{"file", "Files (JSON)", &command.files.paths, kRequired},
-                {"--no-assembly", "Read files without assembling mechanisms", &command.no_assembly},
-                CpuOption(&command.limits),
-                MemoryOption(&command.limits),
-                JsonOption(&command.json),
-                SetOption(&command.files.settings)});
+void AddExperiments(Commands& commands) {
+  commands.Add("list", "Show the cases of experiments", List);
+  commands.Add("integrators", "List the integrators with their orders and stages", ListIntegrators);
+  commands.Add("assemble", "Find all positions that close a mechanism's loops", AssembleInChild);
+  commands.Add("check", "Validate files and solve for consistent initial conditions", CheckFiles);
 }
 
 }  // namespace loopbench::harness

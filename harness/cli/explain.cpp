@@ -1,23 +1,12 @@
 // explain: problems, methods, runs and measures of an experiment.
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <set>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/isolation/processes.h"
 #include "harness/json/file_kind.h"
 #include "harness/observers/registry.h"
 #include "harness/suite/reference_cases.h"
-#include "harness/suite/workload.h"
-#include "harness/tables/fit.h"
-#include "harness/tables/table.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/text/words.h"
 #include "harness/timing/time_cases.h"
 
 namespace loopbench::harness {
@@ -31,13 +20,9 @@ std::string Numbers(const std::vector<double>& numbers) {
 
 /// Prints the problems as a table.
 void ExplainProblems(const Experiment& experiment) {
-  Table table;
-  table.columns = {{"name", "problem"},
-                   {"space", "space"},
-                   {"bodies", "bodies", Format::kInteger},
-                   {"joints", "joints", Format::kInteger},
-                   {"horizons", "horizon [s]"},
-                   {"file", "file"}};
+  Table table{
+      .columns = Columns(
+          "name=problem, space, bodies:integer, joints:integer, horizons=horizon [s], file")};
   for (const ExperimentProblem& problem : experiment.problems) {
     const MechanismDescription& description = problem.mechanism.description;
     AddRow({problem.name, description.space, description.bodies.size() - 1,
@@ -49,11 +34,7 @@ void ExplainProblems(const Experiment& experiment) {
 
 /// Prints the methods as a table, and the meaning of their words.
 void ExplainMethods(const Experiment& experiment) {
-  Table table;
-  table.columns = {{"formulation", "formulation"},
-                   {"enforcement", "enforcement"},
-                   {"coordinates", "coordinates"},
-                   {"solver", "solver"}};
+  Table table{.columns = Columns("formulation, enforcement, coordinates, solver")};
   for (const Method& method : experiment.methods) {
     // a peer's name contains a slash; the solver is followed by threads and execution
     const std::string rest = ToString(method).substr(method.formulation.size() + 1);
@@ -215,54 +196,28 @@ void ExplainExperiment(const std::filesystem::path& path, const ExperimentFiles&
 JsonObject ExperimentDocument(const std::filesystem::path& path, const ExperimentFiles& files) {
   const Overview overview = MakeOverview(path, {{path}, files.settings, files.filter});
   const Experiment& first = overview.experiments.front();
-  std::size_t timings = 0, rungs = 0;
-  for (const Experiment& one : overview.experiments) {
-    timings += CountTimings(one, files.filter);
-    CheckLadders(one);
-    rungs += CountRungs(one);
-  }
-  timings = timings * overview.combinations / overview.experiments.size();
-  rungs = rungs * overview.combinations / overview.experiments.size();
+  const OtherRuns others(overview, files.filter);
   std::vector<JsonObject> problems, sweep;
   for (const ExperimentProblem& problem : first.problems) {
     const MechanismDescription& description = problem.mechanism.description;
-    const bool planar = description.space == SpaceKind::kPlanar;
-    problems.push_back(JsonObject()
-                           .Add("name", problem.name)
-                           .Add("file", problem.path.string())
-                           .Add("space", std::string(planar ? "planar" : "spatial"))
-                           .Add("bodies", Count(description.bodies.size() - 1))
-                           .Add("joints", Count(description.joints.size()))
-                           .Add("horizons", problem.horizons));
+    problems.push_back(JsonOf("name", problem.name, "file", problem.path, "space",
+                              description.space, "bodies", description.bodies.size() - 1, "joints",
+                              description.joints.size(), "horizons", problem.horizons));
   }
   for (const auto& [name, number] : overview.axes) {
-    sweep.push_back(JsonObject()
-                        .Add("name", name)
-                        .Add("count", Count(number))
-                        .Add("values", ValuesOf(name, overview.experiments)));
+    sweep.push_back(
+        JsonOf("name", name, "count", number, "values", ValuesOf(name, overview.experiments)));
   }
   std::vector<std::string> methods;
   for (const Method& method : first.methods) methods.push_back(ToString(method));
-  return JsonObject()
-      .Add("file", path.string())
-      .Add("kind", std::string("experiment"))
-      .Add("name", first.name)
-      .Add("comment", first.comment)
-      .Add("cases", Count(overview.cases()))
-      .Add("combinations", Count(overview.combinations))
-      .Add("timings", Count(timings))
-      .Add("precision_runs", Count(rungs))
-      .Add("references", first.reference.has_value())
-      .Add("sweep", sweep)
-      .Add("problems", problems)
-      .Add("methods", methods)
-      .Add("integrators", first.integrators)
-      .Add("tolerances", first.tolerances)
-      .Add("fixed_steps", first.fixed_steps)
-      .Add("limits", JsonObject()
-                         .Add("cpu_s", first.limits.cpu_s)
-                         .Add("steps", first.limits.steps)
-                         .Add("memory_mb", first.limits.memory_mb));
+  return JsonOf("file", path, "kind", "experiment", "name", first.name, "comment", first.comment,
+                "cases", overview.cases(), "combinations", overview.combinations, "timings",
+                others.timings, "precision_runs", others.rungs, "references",
+                first.reference.has_value(), "sweep", sweep, "problems", problems, "methods",
+                methods, "integrators", first.integrators, "tolerances", first.tolerances,
+                "fixed_steps", first.fixed_steps, "limits",
+                JsonOf("cpu_s", first.limits.cpu_s, "steps", first.limits.steps, "memory_mb",
+                       first.limits.memory_mb));
 }
 
 /// Returns the document of a mechanism, as printed by its child process.
@@ -270,8 +225,7 @@ std::string MechanismText(const std::filesystem::path& path, ExplainView view,
                           const ProcessLimits& limits, int* code) {
   std::string text;
   const auto work = [&] {
-    JsonObject document;
-    document.Add("file", path.string()).Add("kind", std::string("mechanism"));
+    JsonObject document = JsonOf("file", path, "kind", "mechanism");
     view.document = &document;
     const int ended = ExplainMechanism(path, view);
     PrintText(document.Text());
@@ -279,64 +233,10 @@ std::string MechanismText(const std::filesystem::path& path, ExplainView view,
   };
   *code = std::max(*code, TextFromChild(path.string(), limits, work, &text));
   if (!text.empty()) return text;
-  return JsonObject()
-      .Add("file", path.string())
-      .Add("kind", std::string("mechanism"))
-      .Add("error", std::string("cut off"))
-      .Text();
+  return JsonOf("file", path, "kind", "mechanism", "error", "cut off").Text();
 }
-
-/// Prints runs and measures of experiments, and models of mechanisms, by the kind of each file.
-/// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it. `all`:
-/// every row of long tables.
-int Explain(const ExperimentFiles& files, const ExplainView& asked, bool json,
-            const ProcessLimits& limits) {
-  // the child process prints into memory, without a terminal
-  ExplainView view = asked;
-  view.width = ViewOfOutput(asked.all).width;
-  int exit_code = 0;
-  std::string documents;
-  for (const auto& path : files.paths) {
-    const bool is_mechanism = KindOfFile(path) == FileKind::kMechanism;
-    if (is_mechanism && !(files.settings.empty() && files.filter.empty())) {
-      throw ConfigError(fmt::format(
-          "{}: --set and --filter are for experiments, and this is a mechanism", path.string()));
-    }
-    if ((view.statics || !view.range.empty()) && !is_mechanism) {
-      throw ConfigError(
-          fmt::format("{}: --statics and --range are for mechanisms, and this is an experiment",
-                      path.string()));
-    }
-    if (json) {
-      documents += (documents.empty() ? "" : ",\n") +
-                   (is_mechanism ? MechanismText(path, view, limits, &exit_code)
-                                 : ExperimentDocument(path, files).Text());
-    } else if (is_mechanism) {
-      const int code =
-          PrintFromChild(path.string(), limits, [&] { return ExplainMechanism(path, view); });
-      exit_code = std::max(exit_code, code);
-    } else {
-      ExplainExperiment(path, files);
-    }
-  }
-  if (json) PrintText("{\"files\":[" + documents + "]}\n");
-  return exit_code;
-}
-
-}  // namespace
-
-namespace {
 
 constexpr std::size_t kMaxRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
-
-/// Removes columns without content.
-Table WithoutEmpty(Table table) {
-  std::erase_if(table.columns, [&table](const TableColumn& column) {
-    return std::ranges::all_of(table.rows,
-                               [&column](const Record& row) { return Cell(row, column).empty(); });
-  });
-  return table;
-}
 
 std::size_t LongestWord(std::string_view text) {
   std::size_t longest = 0;
@@ -364,10 +264,57 @@ Table LastColumnBroken(Table table) {
   return table;
 }
 
-Table Fitted(Table table, const ExplainView& view) {
-  if (!view.width) return LastColumnBroken(std::move(table));
-  return FitWidth(std::move(table),
-                  *view.width == 0 ? 0 : *view.width - std::min(*view.width, kIndent));
+struct ExplainCommand {
+  ExperimentFiles files;
+  ProcessLimits limits = kFileLimits;
+  ExplainView view;
+  bool json = false;
+
+  std::vector<Option> Options() {
+    return {{"file", "Experiment or mechanism files (JSON)", &files.paths, kRequired},
+            FilterOption(&files.filter),
+            CpuOption(&limits),
+            MemoryOption(&limits),
+            SetOption(&files.settings),
+            WideOption(),
+            JsonOption(&json),
+            {"--all", "Print all rows of long tables", &view.all},
+            {"--statics", "Print the forces that hold a mechanism at its start", &view.statics},
+            {"--range", "Joint whose coordinate is moved to its limits", &view.range}};
+  }
+};
+
+/// Prints runs and measures of experiments, and models of mechanisms, by the kind of each file.
+/// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it.
+int Explain(ExplainCommand& command, const Typed&) {
+  auto& [files, limits, view, json] = command;
+  // the child process prints into memory, without a terminal
+  view.width = ViewOfOutput(view.all).width;
+  int exit_code = 0;
+  std::string documents;
+  for (const auto& path : files.paths) {
+    const bool is_mechanism = KindOfFile(path) == FileKind::kMechanism;
+    if (is_mechanism && !(files.settings.empty() && files.filter.empty())) {
+      Reject("{}: --set and --filter are for experiments, and this is a mechanism", path.string());
+    }
+    if ((view.statics || !view.range.empty()) && !is_mechanism) {
+      Reject("{}: --statics and --range are for mechanisms, and this is an experiment",
+             path.string());
+    }
+    if (json) {
+      documents += (documents.empty() ? "" : ",\n") +
+                   (is_mechanism ? MechanismText(path, view, limits, &exit_code)
+                                 : ExperimentDocument(path, files).Text());
+    } else if (is_mechanism) {
+      const int code =
+          PrintFromChild(path.string(), limits, [&] { return ExplainMechanism(path, view); });
+      exit_code = std::max(exit_code, code);
+    } else {
+      ExplainExperiment(path, files);
+    }
+  }
+  if (json) PrintText("{\"files\":[" + documents + "]}\n");
+  return exit_code;
 }
 
 }  // namespace
@@ -394,7 +341,13 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
   }
   Table shown = table;
   if (!view.all && table.rows.size() > kMaxRows) shown.rows.resize(kFirstRows);
-  const std::string text = ToText(Fitted(WithoutEmpty(shown), view));
+  std::erase_if(shown.columns, [&shown](const TableColumn& column) {
+    return std::ranges::all_of(shown.rows,
+                               [&column](const Record& row) { return Cell(row, column).empty(); });
+  });
+  const std::size_t width = view.width.value_or(0);
+  const std::string text = ToText(view.width ? FitWidth(shown, width - std::min(width, kIndent))
+                                             : LastColumnBroken(shown));
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     if (end > begin) Print("  {}\n", text.substr(begin, end - begin));
@@ -406,23 +359,9 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
 }
 
 void AddExplain(Commands& commands) {
-  auto& files = commands.Keep<ExperimentFiles>();
-  auto& limits = commands.Keep(kFileLimits);
-  auto& view = commands.Keep<ExplainView>();
-  auto& json = commands.Keep<bool>();
   commands.Add("explain",
                "Describe an experiment or a mechanism (joints, loops, freedom, redundancy)",
-               [&](const Typed&) { return Explain(files, view, json, limits); },
-               {{"file", "Experiment or mechanism files (JSON)", &files.paths, kRequired},
-                FilterOption(&files.filter),
-                CpuOption(&limits),
-                MemoryOption(&limits),
-                SetOption(&files.settings),
-                WideOption(),
-                JsonOption(&json),
-                {"--all", "Print all rows of long tables", &view.all},
-                {"--statics", "Print the forces that hold a mechanism at its start", &view.statics},
-                {"--range", "Joint whose coordinate is moved to its limits", &view.range}});
+               Explain);
 }
 
 }  // namespace loopbench::harness

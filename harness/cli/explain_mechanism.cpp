@@ -1,19 +1,11 @@
 // explain: model, start and structure of a mechanism.
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <map>
 #include <numbers>
 
 #include "harness/analysis/model_warnings.h"
 #include "harness/analysis/structure_hints.h"
 #include "harness/cli/commands.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/run/case_identity.h"
-#include "harness/text/terminal.h"
-#include "harness/text/words.h"
 #include "harness/trajectory/statics.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
@@ -42,12 +34,9 @@ std::pair<std::vector<std::string>, std::vector<std::string>> NamesIn(
 
 Table LoopTable(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
-  Table table;
-  table.columns = {{"cut", "cut joint"},
-                   {"shift", "gap [m]", Format::kScientific},
-                   {"turn", "gap [rad]", Format::kScientific},
-                   {"what", "of"},
-                   {"through", "through"}};
+  Table table{
+      .columns = Columns(
+          "cut=cut joint, shift=gap [m]:scientific, turn=gap [rad]:scientific, what=of, through")};
   for (const LoopPath& loop : structure.loops) {
     const auto [joints, bodies] = NamesIn(loop, description);
     AddRow({description.joints[loop.cut_joint].name, loop.open_shift, loop.open_rotation, "joints",
@@ -121,11 +110,8 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
 
 void PrintIslands(const MechanismDescription& description, const Structure& structure,
                   const ExplainView& view) {
-  Table table;
-  table.columns = {{"subsystem", "subsystem", Format::kInteger},
-                   {"bodies", "bodies", Format::kInteger},
-                   {"first", "first body"},
-                   {"held", "connected to"}};
+  Table table{
+      .columns = Columns("subsystem:integer, bodies:integer, first=first body, held=connected to")};
   for (std::size_t i = 0; i < structure.islands.size(); ++i) {
     const Island& island = structure.islands[i];
     AddRow({i + 1, island.bodies.size(), description.bodies[island.bodies.front()].name,
@@ -136,13 +122,9 @@ void PrintIslands(const MechanismDescription& description, const Structure& stru
 }
 
 void PrintCoordinates(const Structure& structure, const ExplainView& view) {
-  Table table;
-  table.columns = {{"set", "coordinates"},
-                   {"q", "positions", Format::kInteger},
-                   {"u", "speeds", Format::kInteger},
-                   {"rows", "constraints", Format::kInteger},
-                   {"rank", "rank", Format::kInteger},
-                   {"free", "independent speeds", Format::kInteger}};
+  Table table{.columns = Columns(
+                  "set=coordinates, q=positions:integer, u=speeds:integer, "
+                  "rows=constraints:integer, rank:integer, free=independent speeds:integer")};
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     const bool joint = set == Coordinates::kJoint;
     const int speeds = joint ? structure.joint_u : structure.absolute_u;
@@ -163,12 +145,9 @@ odca::Plan PlanFor(const MechanismDescription& description, SolverKind solver) {
 }
 
 void PrintPlanOfJoins(const MechanismDescription& description, const ExplainView& view) {
-  Table table;
-  table.columns = {{"solver", "solver"},
-                   {"depth", "depth", Format::kInteger},
-                   {"handles", "most handles", Format::kInteger},
-                   {"largest", "largest join", Format::kInteger},
-                   {"loops", "joins that close loops", Format::kInteger}};
+  Table table{.columns =
+                  Columns("solver, depth:integer, handles=most handles:integer, largest=largest "
+                          "join:integer, loops=joins that close loops:integer")};
   for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
     const odca::Plan plan = description.space == SpaceKind::kPlanar
                                 ? PlanFor<Planar>(description, solver)
@@ -199,12 +178,8 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
     return Value(ShortNumber(std::abs(value) > kRoundOff * largest ? value : 0.0));
   };
   Table efforts, reactions;
-  efforts.columns = {{"joint", "joint"},
-                     {"coordinate", "coordinate"},
-                     {"effort", "effort"},
-                     {"unit", "unit"},
-                     {"held", "held by"}};
-  reactions.columns = {{"joint", "joint"}, {"on", "on"}};
+  efforts.columns = Columns("joint, coordinate, effort, unit, held=held by");
+  reactions.columns = Columns("joint, on");
   std::map<std::string, const JointDescription*> joints;
   std::map<std::string, std::string> holder_of;  // of columns
   for (const JointDescription& joint : description.joints) joints[LabelName(joint.name)] = &joint;
@@ -262,8 +237,8 @@ int PrintRange(const MechanismDescription& description, const ExplainView& view)
   const auto found = std::ranges::find(names, view.range);
   if (found == names.end()) {
     const std::string nearest = NearestSpelling(view.range, names);
-    throw ConfigError(fmt::format("--range: found \"{}\", expected a joint{}", view.range,
-                                  nearest.empty() ? "" : " (did you mean \"" + nearest + "\"?)"));
+    Reject("--range: found \"{}\", expected a joint{}", view.range,
+           nearest.empty() ? "" : " (did you mean \"" + nearest + "\"?)");
   }
   const auto joint = static_cast<int>(found - names.begin());
   const CoordinateRange range = FindRange(description, joint);
@@ -308,12 +283,9 @@ std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
   std::vector<JsonObject> loops;
   for (const LoopPath& loop : structure.loops) {
     const auto [joints, bodies] = NamesIn(loop, description);
-    loops.push_back(JsonObject()
-                        .Add("cut", description.joints[loop.cut_joint].name)
-                        .Add("open_shift", loop.open_shift)
-                        .Add("open_rotation", loop.open_rotation)
-                        .Add("joints", joints)
-                        .Add("bodies", bodies));
+    loops.push_back(JsonOf("cut", description.joints[loop.cut_joint].name, "open_shift",
+                           loop.open_shift, "open_rotation", loop.open_rotation, "joints", joints,
+                           "bodies", bodies));
   }
   return loops;
 }
@@ -323,167 +295,121 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
                        const std::vector<std::string>& idle, JsonObject* document) {
   std::vector<JsonObject> redundant;
   for (const RedundantDirection& one : s.redundant) {
-    redundant.push_back(JsonObject()
-                            .Add("joint", description.joints[one.joint].name)
-                            .Add("direction", one.name)
-                            .Add("at_every_position", one.released));
+    redundant.push_back(JsonOf("joint", description.joints[one.joint].name, "direction", one.name,
+                               "at_every_position", one.released));
   }
   const auto known = [&s](int number) {
     return s.analysed ? Value(std::int64_t{number}) : Value();
   };
-  document->Add("start_outcome", std::string(ToString(s.start.outcome)))
-      .Add("start_message", s.start.message)
-      .Add("degrees_of_freedom", JsonObject()
-                                     .Add("by_counting", std::int64_t{s.counted_freedom})
-                                     .Add("by_rank", known(s.freedom()))
-                                     .Add("at_start", known(s.freedom_at_start()))
-                                     .Add("constraints_of_loops", std::int64_t{s.loop_rows})
-                                     .Add("rank", known(s.rank_nearby))
-                                     .Add("rank_at_start", known(s.rank))
-                                     .Add("idle", idle))
-      .Add("loops", LoopDocuments(description, s))
-      .Add("redundant", redundant);
+  const JsonObject freedom =
+      JsonOf("by_counting", s.counted_freedom, "by_rank", known(s.freedom()), "at_start",
+             known(s.freedom_at_start()), "constraints_of_loops", s.loop_rows, "rank",
+             known(s.rank_nearby), "rank_at_start", known(s.rank), "idle", idle);
+  Put(*document, "start_outcome", s.start.outcome, "start_message", s.start.message,
+      "degrees_of_freedom", freedom, "loops", LoopDocuments(description, s), "redundant",
+      redundant);
 }
 
 // The assembled start of a mechanism, joint by joint, and its energy.
 
+using Values = std::array<double, 7>;
+
+/// Coordinates as integrated (tree joints), or as measured between the bodies (other joints).
 template <class Space>
-class StartText {
- public:
-  StartText(const MechanismDescription& description, const Start<double>& start)
-      : description_(description),
-        start_(start),
-        mechanism_(description, Coordinates::kJoint),
-        kinematics_(mechanism_) {
-    kinematics_.UpdatePosition(start.q);
-    kinematics_.UpdateVelocity(start.u);
-  }
-
-  Table JointValuesTable() const {
-    Table table;
-    table.columns = {{"name", "joint"}, {"coordinate", "coordinate"},
-                     {"q", "value"},    {"speed", "speed"},
-                     {"u", "value"},    {"given", "given"}};
-    for (std::size_t j = 0; j < description_.joints.size(); ++j) AddJoint(j, &table);
-    return table;
-  }
-
-  Energy<double> EnergyAtStart() const { return ComputeEnergy(kinematics_); }
-
- private:
-  using Values = std::array<double, 7>;
-
-  /// Coordinates as integrated (tree joints), or as measured between the bodies (other joints).
-  Values CoordinatesOf(const Joint<Space, double>& joint) const {
-    const int index = static_cast<int>(&joint - mechanism_.joints().data());
-    Values q{};
-    if (joint.kind->coordinates == nullptr) return q;
-    const Pose<Space, double> X_WF = Compose(kinematics_.poses()[joint.from], joint.X_PF),
-                              X_WM = Compose(kinematics_.poses()[joint.to], joint.X_QM);
-    joint.kind->coordinates(Compose(Inverse(X_WF), X_WM), q.data(), joint.kind->parameter);
-    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
-      const int drive = mechanism_.DriveOf(joint, i);
-      if (drive >= 0) {
-        q[i] = kinematics_.drives()[drive].value;
-      } else if (joint.in_tree()) {
-        q[i] = start_.q[next++];
-      } else if (joint.kind->num_u == 1) {
-        q[i] = kinematics_.JointCoordinate(index);
-      } else if (!joint.kind->has_quaternion() && joint.kind->axes[i] < Space::kRot) {
-        const double guess = description_.initial.GuessOf(index, static_cast<std::size_t>(i));
-        q[i] = guess + std::remainder(q[i] - guess, 2.0 * std::numbers::pi);
-      }
+Values CoordinatesOf(int index, const InitialDescription& initial, const VectorX<double>& start,
+                     const Kinematics<Space, double>& kinematics) {
+  const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+  const Joint<Space, double>& joint = mechanism.joints()[index];
+  Values q{};
+  if (joint.kind->coordinates == nullptr) return q;
+  const Pose<Space, double> X_WF = Compose(kinematics.poses()[joint.from], joint.X_PF),
+                            X_WM = Compose(kinematics.poses()[joint.to], joint.X_QM);
+  joint.kind->coordinates(Compose(Inverse(X_WF), X_WM), q.data(), joint.kind->parameter);
+  for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
+    const int drive = mechanism.DriveOf(joint, i);
+    if (drive >= 0) {
+      q[i] = kinematics.drives()[drive].value;
+    } else if (joint.in_tree()) {
+      q[i] = start[next++];
+    } else if (joint.kind->num_u == 1) {
+      q[i] = kinematics.JointCoordinate(index);
+    } else if (!joint.kind->has_quaternion() && joint.kind->axes[i] < Space::kRot) {
+      const double guess = initial.GuessOf(index, static_cast<std::size_t>(i));
+      q[i] = guess + std::remainder(q[i] - guess, 2.0 * std::numbers::pi);
     }
-    return q;
   }
+  return q;
+}
 
-  Values SpeedsOf(std::size_t index) const {
-    Values u{};
-    const Joint<Space, double>& joint = mechanism_.joints()[index];
-    const JointState<Space, double>& state = kinematics_.joints()[index];
-    for (int i = 0, next = 0; i < joint.kind->num_u; ++i) {
-      const int drive = mechanism_.DriveOf(joint, i);
-      u[i] = drive >= 0 ? kinematics_.drives()[drive].rate
-                        : joint.kind->inverse_H_squared * state.H(next++).dot(state.V_rel);
-    }
-    return u;
+template <class Space>
+Values SpeedsOf(int index, const Kinematics<Space, double>& kinematics) {
+  Values u{};
+  const Joint<Space, double>& joint = kinematics.mechanism().joints()[index];
+  const JointState<Space, double>& state = kinematics.joints()[index];
+  for (int i = 0, next = 0; i < joint.kind->num_u; ++i) {
+    const int drive = kinematics.mechanism().DriveOf(joint, i);
+    u[i] = drive >= 0 ? kinematics.drives()[drive].rate
+                      : joint.kind->inverse_H_squared * state.H(next++).dot(state.V_rel);
   }
+  return u;
+}
 
-  std::string GivenBy(int joint) const {
-    const InitialDescription& initial = description_.initial;
-    if (!description_.joints[joint].motions.empty()) return "prescribed";
-    std::string text;
-    const auto has = [joint](const std::vector<JointValues>& list) {
-      return std::ranges::find(list, joint, &JointValues::joint) != list.end();
-    };
-    if (std::ranges::find(initial.held, joint) != initial.held.end()) {
-      text = "fixed";
-    } else if (has(initial.coordinates)) {
-      text = "guessed";
-    }
-    if (has(initial.speeds)) text += text.empty() ? "speed" : ", speed";
-    return text;
+std::string GivenBy(const MechanismDescription& description, int joint) {
+  const InitialDescription& initial = description.initial;
+  if (!description.joints[joint].motions.empty()) return "prescribed";
+  std::string text;
+  const auto has = [joint](const std::vector<JointValues>& list) {
+    return std::ranges::find(list, joint, &JointValues::joint) != list.end();
+  };
+  if (std::ranges::find(initial.held, joint) != initial.held.end()) {
+    text = "fixed";
+  } else if (has(initial.coordinates)) {
+    text = "guessed";
   }
+  if (has(initial.speeds)) text += text.empty() ? "speed" : ", speed";
+  return text;
+}
 
-  void AddJoint(std::size_t index, Table* table) const {
-    const JointType type = description_.joints[index].type;
-    const std::vector<ValueWord> positions = ValueWords(type, description_.space, false),
-                                 speeds = ValueWords(type, description_.space, true);
-    const Values q = CoordinatesOf(mechanism_.joints()[index]), u = SpeedsOf(index);
-    const auto with_unit = [](double value, std::string_view unit) {
-      return fmt::format("{}{}{}", ShortNumber(value), unit.empty() ? "" : " ", unit);
-    };
+/// Prints the assembled start: coordinates and speeds of all joints, energy.
+template <class Space>
+void PrintStart(const MechanismDescription& description, const Start<double>& start,
+                const ExplainView& view) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  Kinematics<Space, double> kinematics(mechanism);
+  kinematics.UpdatePosition(start.q);
+  kinematics.UpdateVelocity(start.u);
+  Table table{.columns = Columns("name=joint, coordinate, q=value, speed, u=value, given")};
+  const auto with_unit = [](double value, std::string_view unit) {
+    return fmt::format("{}{}{}", ShortNumber(value), unit.empty() ? "" : " ", unit);
+  };
+  for (int j = 0; j < static_cast<int>(description.joints.size()); ++j) {
+    const JointDescription& joint = description.joints[j];
+    const std::vector<ValueWord> positions = ValueWords(joint.type, description.space, false),
+                                 speeds = ValueWords(joint.type, description.space, true);
+    const Values q = CoordinatesOf(j, description.initial, start.q, kinematics),
+                 u = SpeedsOf(j, kinematics);
     for (std::size_t i = 0; i < positions.size(); ++i) {
-      Record& row = table->rows.emplace_back();
-      row.Set("joint", description_.joints[index].name);  // for programs, in every row
-      if (i == 0) {
-        row.Set("name", description_.joints[index].name);
-        row.Set("given", GivenBy(static_cast<int>(index)));
-      }
-      row.Set("coordinate", std::string(positions[i].name));
-      row.Set("q", with_unit(q[i], positions[i].unit));
+      Record& row = table.rows.emplace_back();
+      Put(row, "joint", joint.name);  // for programs, in every row
+      if (i == 0) Put(row, "name", joint.name, "given", GivenBy(description, j));
+      Put(row, "coordinate", positions[i].name, "q", with_unit(q[i], positions[i].unit));
       if (i >= speeds.size()) continue;
-      row.Set("speed", std::string(speeds[i].name));
-      row.Set("u", with_unit(u[i], speeds[i].unit));
+      Put(row, "speed", speeds[i].name, "u", with_unit(u[i], speeds[i].unit));
     }
   }
-
-  const MechanismDescription& description_;
-  const Start<double>& start_;
-  Mechanism<Space, double> mechanism_;
-  Kinematics<Space, double> kinematics_;
-};
-
-template <class Space>
-void PrintOf(const MechanismDescription& description, const Start<double>& start,
-             const ExplainView& view) {
-  const StartText<Space> text(description, start);
   const bool closed = start.outcome != Outcome::kInconsistentStart;
-  PrintSection(closed ? "Start as assembled, t = 0" : "Start, not assembled",
-               text.JointValuesTable(), view, "start");
+  PrintSection(closed ? "Start as assembled, t = 0" : "Start, not assembled", table, view, "start");
   if (!closed) return;
-  const Energy<double> energy = text.EnergyAtStart();
+  const Energy<double> energy = ComputeEnergy(kinematics);
   if (view.document != nullptr) {
-    view.document->Add("energy", JsonObject()
-                                     .Add("kinetic", energy.kinetic)
-                                     .Add("potential", energy.potential)
-                                     .Add("total", energy.total()));
+    view.document->Add("energy", JsonOf("kinetic", energy.kinetic, "potential", energy.potential,
+                                        "total", energy.total()));
   }
   Say(view, "  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
       ShortNumber(energy.potential), ShortNumber(energy.total()));
   Say(view,
       "  Zero potential: centres of mass and constant forces at the ground's origin, springs at "
       "rest,\n  joint torques at coordinate 0.\n");
-}
-
-/// Prints the assembled start: coordinates and speeds of all joints, energy.
-void PrintStart(const MechanismDescription& description, const Structure& structure,
-                const ExplainView& view) {
-  if (description.space == SpaceKind::kPlanar) {
-    PrintOf<Planar>(description, structure.start, view);
-  } else {
-    PrintOf<Spatial>(description, structure.start, view);
-  }
 }
 
 }  // namespace
@@ -497,17 +423,18 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
                                      NamesOf(description, FindIdleFreedoms(description, structure)),
                                  hints = FindHints(description, structure);
   if (view.document != nullptr) {
-    const bool planar = description.space == SpaceKind::kPlanar;
-    view.document->Add("name", description.name)
-        .Add("space", std::string(planar ? "planar" : "spatial"))
-        .Add("gravity",
-             std::vector<double>(description.gravity.begin(), description.gravity.end()));
+    Put(*view.document, "name", description.name, "space", description.space, "gravity",
+        std::vector<double>(description.gravity.begin(), description.gravity.end()));
     DescribeStructure(description, structure, idle, view.document);
   }
   Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
-      path.string(), description.space == SpaceKind::kPlanar ? "planar" : "spatial");
+      path.string(), ToString(description.space));
   PrintModel(description, structure, view);
-  PrintStart(description, structure, view);
+  if (description.space == SpaceKind::kPlanar) {
+    PrintStart<Planar>(description, structure.start, view);
+  } else {
+    PrintStart<Spatial>(description, structure.start, view);
+  }
   PrintFreedom(structure, idle, view);
   PrintSection("Loops", LoopTable(description, structure, view), view);
   PrintRedundant(description, structure, view);
@@ -525,9 +452,7 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   if (view.document != nullptr) {
     std::vector<std::string> texts;
     for (const Warning& warning : warnings) texts.push_back(warning.text);
-    view.document->Add("simplifications", compiled.report)
-        .Add("warnings", texts)
-        .Add("hints", hints);
+    Put(*view.document, "simplifications", compiled.report, "warnings", texts, "hints", hints);
   }
   Say(view, "\nWarnings\n");
   if (warnings.empty()) Say(view, "  none\n");

@@ -1,10 +1,5 @@
 // explain: the contents of a mechanism file, with its own numbers.
-#include <fmt/format.h>
-
-#include <cmath>
-
 #include "harness/cli/commands.h"
-#include "harness/text/terminal.h"
 #include "mechanism/model/mechanism.h"
 
 namespace loopbench::harness {
@@ -34,13 +29,8 @@ std::string InertiaText(const Eigen::Matrix3d& I, SpaceKind space) {
 }
 
 Table BodyTable(const MechanismDescription& description, const Structure& structure) {
-  Table table;
-  table.columns = {{"name", "body"},
-                   {"part", "subsystem", Format::kInteger},
-                   {"mass", "mass [kg]", Format::kShortest},
-                   {"inertia", "inertia [kg m^2]"},
-                   {"com", "com [m]"},
-                   {"points", "points [m]"}};
+  Table table{.columns = Columns("name=body, part=subsystem:integer, mass=mass [kg]:shortest, "
+                                 "inertia=inertia [kg m^2], com=com [m], points=points [m]")};
   const auto add = [&](const BodyDescription& body) -> Record& {
     Record& row = table.rows.emplace_back();
     row.Set("name", body.name);
@@ -57,10 +47,9 @@ Table BodyTable(const MechanismDescription& description, const Structure& struct
     for (const int index : structure.islands[i].bodies) {
       const BodyDescription& body = description.bodies[index];
       Record& row = add(body);
-      row.Set("part", static_cast<std::int64_t>(i + 1));
-      row.Set("mass", body.mass);
-      row.Set("inertia", InertiaText(body.inertia, description.space));
-      row.Set("com", VectorText(body.com, description.space));
+      Put(row, "part", i + 1, "mass", body.mass, "inertia",
+          InertiaText(body.inertia, description.space), "com",
+          VectorText(body.com, description.space));
     }
   }
   return table;
@@ -115,15 +104,9 @@ std::string Given(SpaceKind space, const JointDescription& joint) {
 }
 
 Table JointTable(const MechanismDescription& description, const Structure& structure) {
-  Table table;
-  table.columns = {{"name", "joint"},
-                   {"type", "type"},
-                   {"from", "from"},
-                   {"to", "to"},
-                   {"free", "free", Format::kInteger},
-                   {"rows", "constrains", Format::kInteger},
-                   {"place", "place"},
-                   {"given", "given"}};
+  Table table{
+      .columns = Columns(
+          "name=joint, type, from, to, free:integer, rows=constrains:integer, place, given")};
   const int dim = description.space == SpaceKind::kPlanar ? 3 : 6;
   std::vector<bool> cut(description.joints.size());
   for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
@@ -157,9 +140,8 @@ std::string AxesText(const Rotation<Space, double>& R, std::string_view axes) {
 
 template <class Space>
 Table FrameTable(const MechanismDescription& description) {
-  Table table;
-  table.columns = {{"name", "joint"},    {"side", "frame"}, {"body", "on body"},
-                   {"at", "origin [m]"}, {"axes", "axis"},  {"turn", "rotation vector [rad]"}};
+  Table table{.columns = Columns("name=joint, side=frame, body=on body, at=origin [m], axes=axis, "
+                                 "turn=rotation vector [rad]")};
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
@@ -172,11 +154,10 @@ Table FrameTable(const MechanismDescription& description) {
       const BodyDescription& body = description.bodies[side.body];
       Record& row = table.rows.emplace_back();
       if (from) row.Set("name", joint.name);
-      row.Set("joint", joint.name);  // for programs, in every row
-      row.Set("side", std::string(from ? "F, from" : "M, to"));
-      row.Set("body", body.name);
-      row.Set("at", Place(body, side.position, description.space));
-      row.Set("axes", AxesText<Space>(X.R, from ? axes.from : axes.to));
+      // for programs, the joint in every row
+      Put(row, "joint", joint.name, "side", from ? "F, from" : "M, to", "body", body.name, "at",
+          Place(body, side.position, description.space), "axes",
+          AxesText<Space>(X.R, from ? axes.from : axes.to));
       const auto turn = RotationVector(X).eigen();
       if (joint.type != JointType::kRod && !turn.isZero(0.0)) row.Set("turn", Spaced(turn));
     }
@@ -217,15 +198,13 @@ void AddForce(const MechanismDescription& description, ForceDescription force, T
 }
 
 Table ForceTable(const MechanismDescription& description) {
-  Table table;
-  table.columns = {{"type", "force"}, {"on", "acts on"}, {"with", "with"}};
+  Table table{.columns = Columns("type=force, on=acts on, with")};
   for (const ForceDescription& force : description.forces) AddForce(description, force, &table);
   return table;
 }
 
 Table CouplingTable(const MechanismDescription& description) {
-  Table table;
-  table.columns = {{"name", "coupling"}, {"relation", "relation"}};
+  Table table{.columns = Columns("name=coupling, relation")};
   for (const CouplingDescription& coupling : description.couplings) {
     std::string text;
     for (const auto& [joint, ratio] : coupling.parts) {

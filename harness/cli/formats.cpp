@@ -1,28 +1,17 @@
 // schema and migrate: keys of files of each kind, and of earlier versions.
-#include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <cstddef>
 #include <exception>
 #include <fstream>
-#include <functional>
 #include <ranges>
 #include <stdexcept>
-#include <string_view>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
 #include "harness/json/json_document.h"
 #include "harness/judge/rule_schemas.h"
-#include "harness/record/record.h"
-#include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
-#include "harness/suite/suite.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {
@@ -65,19 +54,22 @@ std::string TablesOfKinds(const std::vector<std::string>& kinds) {
   return SchemaTables(schemas);
 }
 
-void AddSchema(Commands& commands) {
-  auto& kind = commands.Keep<std::string>();
-  auto& tables = commands.Keep<bool>();
-  commands.Add("schema", "Print the JSON Schema (draft 07) of a file type",
-               [&](const Typed&) {
-                 PrintText(tables ? TablesOfKinds({kind}) : SchemaOfKind(kind));
-                 return 0;
-               },
-               {{"kind", "File type", &kind, kRequired, OneOf(SchemaKinds())},
-                {"--tables", "Tables of keys in Markdown instead", &tables}});
-}
-
 namespace {
+
+struct SchemaCommand {
+  std::string kind;
+  bool tables = false;
+
+  std::vector<Option> Options() {
+    return {{"kind", "File type", &kind, kRequired, OneOf(SchemaKinds())},
+            {"--tables", "Tables of keys in Markdown instead", &tables}};
+  }
+};
+
+int PrintSchema(const SchemaCommand& command, const Typed&) {
+  PrintText(command.tables ? TablesOfKinds({command.kind}) : SchemaOfKind(command.kind));
+  return 0;
+}
 
 using std::string_view;
 
@@ -383,12 +375,20 @@ std::vector<std::filesystem::path> FilesOf(const std::filesystem::path& path) {
   return files;
 }
 
+struct MigrateCommand {
+  std::vector<std::filesystem::path> files;
+
+  std::vector<Option> Options() {
+    return {{"file", "Configuration files (JSON), stores and files of records", &files, kRequired}};
+  }
+};
+
 /// Rewrites configuration files, stores and other record files (.jsonl) in place, each atomically.
 /// All other bytes stay, and record checksums are renewed. Prints the number of replaced names per
 /// file. Returns 2 if a file cannot be rewritten; it then stays unchanged.
-int Migrate(const std::vector<std::filesystem::path>& files) {
+int Migrate(const MigrateCommand& command, const Typed&) {
   int code = 0;
-  for (const std::filesystem::path& path : files) {
+  for (const std::filesystem::path& path : command.files) {
     for (const std::filesystem::path& file : FilesOf(path)) {
       try {
         const std::size_t count = MigrateFile(file);
@@ -405,12 +405,9 @@ int Migrate(const std::vector<std::filesystem::path>& files) {
 
 }  // namespace
 
-void AddMigrate(Commands& commands) {
-  auto& files = commands.Keep<std::vector<std::filesystem::path>>();
-  commands.Add(
-      "migrate", "Replace names of earlier versions in files",
-      [&](const Typed&) { return Migrate(files); },
-      {{"file", "Configuration files (JSON), stores and files of records", &files, kRequired}});
+void AddFormats(Commands& commands) {
+  commands.Add("schema", "Print the JSON Schema (draft 07) of a file type", PrintSchema);
+  commands.Add("migrate", "Replace names of earlier versions in files", Migrate);
 }
 
 std::string WithMigrationHint(std::string message) {

@@ -1,40 +1,74 @@
 // history: measurements of successive commits.
-#include <fmt/format.h>
-
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "harness/cli/command_line.h"
-#include "harness/history/git.h"
+#include "harness/cli/commands.h"
 #include "harness/history/history_page.h"
 #include "harness/history/history_series.h"
-#include "harness/record/provenance.h"
-#include "harness/record/record.h"
 #include "harness/store/measurements.h"
-#include "harness/tables/fit.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 namespace {
 
-struct HistoryAddCommand {
-  std::filesystem::path results;
-  std::string commit, date;  ///< "": from the checked-out commit
-  bool replaces = false;
+/// Options of all subcommands.
+struct PlaceOptions {
+  HistoryPlace place;
+
+  std::vector<Option> With(std::vector<Option> options) {
+    options.push_back({"--store", "Folder of the history", &place.store});
+    options.push_back({"--branch", "Git branch that contains the history, instead of a folder",
+                       &place.branch, Excludes({"--store"})});
+    return options;
+  }
 };
 
-struct HistoryShowCommand {
-  std::string one, measure;  ///< filters: parts of case and measure names; "": all
+struct HistoryAddCommand : PlaceOptions {
+  std::filesystem::path results;
+  std::string commit, date;
+  bool replaces = false;
+
+  std::vector<Option> Options() {
+    return With(
+        {{"results", "Folder of a run, .jsonl, or JSON of Google Benchmark", &results, kRequired},
+         {"--commit", "Commit of the results (default: the one checked out)", &commit},
+         {"--date", "ISO 8601 date that orders commits (default: the commit's)", &date},
+         {"--replace", "Replace an earlier measurement of this commit", &replaces}});
+  }
+};
+
+struct HistoryShowCommand : PlaceOptions {
+  std::string one, measure;
   std::string format = "text";
   bool json = false;
+
+  std::vector<Option> Options() {
+    std::vector<Option> options =
+        With({{"--case", "Only cases whose name contains this text", &one},
+              {"--measure", "Only measures whose name contains this text", &measure},
+              FormatOption(&format, {"text", "csv", "markdown", "json"})});
+    options.insert(options.end(), {JsonOption(&json), WideOption()});
+    return options;
+  }
 };
 
-struct HistoryReportCommand {
+struct HistoryReportCommand : PlaceOptions {
   std::filesystem::path out;
   std::string title = "Measurements over commits";
+
+  std::vector<Option> Options() {
+    return With({{"-o,--out", "Output file (default: history.html in the folder)", &out},
+                 {"--title", "Page title", &title}});
+  }
+};
+
+struct HistoryMarkCommand : PlaceOptions {
+  Mark mark;
+
+  std::vector<Option> Options() {
+    return With({{"commit", "Commit hash or prefix", &mark.commit, kRequired},
+                 {"mark", "good and accepted: valid base of comparisons; bad: never a base",
+                  &mark.mark, kRequired, OneOf({"good", "accepted", "bad"})},
+                 {"--note", "Reason, stored with the mark", &mark.note},
+                 {"--keep-accepted", "Keep an existing mark 'accepted' (for automatic jobs)",
+                  &mark.keeps_accepted}});
+  }
 };
 
 void PrintWarnings(const std::vector<std::string>& warnings, const OpenHistory& open) {
@@ -64,41 +98,30 @@ HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command)
   std::erase_if(found.series, is_other);
   std::erase_if(found.endings, is_other);
   if (has_any && found.series.empty() && found.endings.empty()) {
-    throw ConfigError(
-        fmt::format("found no series with \"{}\" in its case and \"{}\" in its measure",
-                    command.one, command.measure));
+    Reject("found no series with \"{}\" in its case and \"{}\" in its measure", command.one,
+           command.measure);
   }
   return found;
 }
 
 Table CommitTable(const History& history) {
-  Table table;
-  table.title = "Last commits";
-  table.columns = {{"commit", "commit"},
-                   {"date", "date"},
-                   {"machine", "machine"},
-                   {"mark", "mark"},
-                   {"note", "note"}};
+  Table table{.title = "Last commits", .columns = Columns("commit, date, machine, mark, note")};
   constexpr std::size_t kLastShown = 10;
   const std::size_t n = history.entries.size();
   for (std::size_t i = n > kLastShown ? n - kLastShown : 0; i < n; ++i) {
     const HistoryEntry& entry = history.entries[i];
     AddRow({ShortCommit(entry.commit), entry.date, entry.machine, entry.mark, entry.note}, &table);
   }
-  if (n > kLastShown) table.notes.push_back(fmt::format("{} earlier ones", n - kLastShown));
+  if (n > kLastShown) AddNote(table.notes, "{} earlier ones", n - kLastShown);
   return table;
 }
 
 JsonObject FindingsDocument(const History& history, const HistoryFindings& found) {
   std::vector<JsonObject> all, endings;
   for (const EndingChange& change : found.endings) {
-    endings.push_back(JsonObject()
-                          .Add("machine", change.machine)
-                          .Add("case", change.one)
-                          .Add("measure", change.measure)
-                          .Add("commit", history.entries[change.entry].commit)
-                          .Add("before", change.before)
-                          .Add("after", change.after));
+    endings.push_back(JsonOf("machine", change.machine, "case", change.one, "measure",
+                             change.measure, "commit", history.entries[change.entry].commit,
+                             "before", change.before, "after", change.after));
   }
   for (const HistorySeries& one : found.series) {
     std::vector<std::string> commits, unsteady;
@@ -110,29 +133,18 @@ JsonObject FindingsDocument(const History& history, const HistoryFindings& found
     }
     std::vector<JsonObject> steps;
     for (const LevelChange& change : one.changes) {
-      steps.push_back(JsonObject()
-                          .Add("commit", commits[change.at])
-                          .Add("before", change.before)
-                          .Add("after", change.after)
-                          .Add("confidence", change.Confidence()));
+      steps.push_back(JsonOf("commit", commits[change.at], "before", change.before, "after",
+                             change.after, "confidence", change.Confidence()));
     }
-    all.push_back(JsonObject()
-                      .Add("machine", one.machine)
-                      .Add("case", one.one)
-                      .Add("measure", one.measure)
-                      .Add("unit", one.unit)
-                      .Add("commits", commits)
-                      .Add("values", values)
-                      .Add("at_another_speed", unsteady)
-                      .Add("change_points", steps));
+    all.push_back(JsonOf("machine", one.machine, "case", one.one, "measure", one.measure, "unit",
+                         one.unit, "commits", commits, "values", values, "at_another_speed",
+                         unsteady, "change_points", steps));
   }
-  return JsonObject().Add("series", all).Add("endings", endings);
+  return JsonOf("series", all, "endings", endings);
 }
 
-int HistoryAdd(const HistoryPlace& place, const HistoryAddCommand& command) {
-  std::vector<std::string> warnings;
-  const std::vector<Record> records = ReadMeasurements(command.results, &warnings);
-  for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+int HistoryAdd(const HistoryAddCommand& command, const Typed&) {
+  const std::vector<Record> records = LoadMeasurements(command.results);
   HistoryEntry entry;
   entry.commit = command.commit;
   entry.date = command.date;
@@ -140,14 +152,14 @@ int HistoryAdd(const HistoryPlace& place, const HistoryAddCommand& command) {
     const CheckedOut found = FindCommit(entry.commit.empty() ? "HEAD" : entry.commit);
     if (found.commit.empty()) {
       throw ConfigError(
-          "history add: found no such commit in a git repository here, expected --commit "
-          "and --date");
+          "history add: found no such commit in a git repository here, expected --commit and "
+          "--date");
     }
     entry.commit = found.commit;
     if (entry.date.empty()) entry.date = found.date;
   }
   HistoryEntry added;
-  ChangePlace(place, /*may_begin=*/true, [&](const OpenHistory& open) {
+  ChangePlace(command.place, /*may_begin=*/true, [&](const OpenHistory& open) {
     std::vector<std::string> torn;
     added = AddToHistory(open.folder, entry, records, command.replaces, &torn);
     PrintWarnings(torn, open);
@@ -159,17 +171,13 @@ int HistoryAdd(const HistoryPlace& place, const HistoryAddCommand& command) {
 }
 
 /// Prints steps, newest first, and the commits. Returns 0.
-int HistoryShow(const HistoryPlace& place, const HistoryShowCommand& command,
-                const std::string& typed) {
-  const auto [history, all] = ReadFindings(place);
+int HistoryShow(const HistoryShowCommand& command, const Typed& typed) {
+  const auto [history, all] = ReadFindings(command.place);
   const HistoryFindings found = Chosen(all, command);
-  if (command.json) {
-    PrintText(FindingsDocument(history, found).Text() + "\n");
-    return 0;
-  }
+  if (command.json) return PrintJson(FindingsDocument(history, found));
   Table steps = StepTable(history, found);
   if (command.format != "text") {
-    for (const std::string& line : Provenance(typed)) steps.notes.push_back(line);
+    AppendProvenance(steps, typed.line);
     PrintText(Render(steps, command.format));
     return 0;
   }
@@ -184,24 +192,21 @@ int HistoryShow(const HistoryPlace& place, const HistoryShowCommand& command,
   return 0;
 }
 
-int HistoryReport(const HistoryPlace& place, const HistoryReportCommand& command,
-                  const std::string& typed) {
-  const auto [history, found] = ReadFindings(place);
-  const std::string page = HistoryPage(history, found, command.title, Provenance(typed));
-  const auto out = !command.out.empty()  ? command.out
-                   : place.store.empty() ? std::filesystem::path("history.html")
-                                         : place.store / "history.html";
+int HistoryReport(const HistoryReportCommand& command, const Typed& typed) {
+  const auto [history, found] = ReadFindings(command.place);
+  const std::string page = HistoryPage(history, found, command.title, Provenance(typed.line));
+  const auto out = command.out.empty() ? command.place.store / "history.html" : command.out;
   WriteFileAtomically(out, page);
   Print("wrote {}: {} series over {} entries, {} steps, {} kB\n", out.string(), found.series.size(),
         history.entries.size(), found.Steps(), (page.size() + 999) / 1000);
   return 0;
 }
 
-int HistoryMark(const HistoryPlace& place, const Mark& wanted) {
+int HistoryMark(const HistoryMarkCommand& command, const Typed&) {
   Mark mark;
-  ChangePlace(place, /*may_begin=*/false, [&](const OpenHistory& open) {
+  ChangePlace(command.place, /*may_begin=*/false, [&](const OpenHistory& open) {
     std::vector<std::string> torn;
-    mark = MarkInHistory(open.folder, wanted, &torn);
+    mark = MarkInHistory(open.folder, command.mark, &torn);
     PrintWarnings(torn, open);
     return fmt::format("{} is {}", ShortCommit(mark.commit), mark.mark);
   });
@@ -219,9 +224,8 @@ std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string
     const std::optional<HistoryEntry> good =
         only_times ? LastGoodOfMachine(history, machine) : LastGood(history, machine);
     if (!good) {
-      throw ConfigError(
-          fmt::format("{}: found {}, expected a good one", open.folder.string(),
-                      history.entries.empty() ? "no commit" : "every commit marked bad"));
+      Reject("{}: found {}, expected a good one", open.folder.string(),
+             history.entries.empty() ? "no commit" : "every commit marked bad");
     }
     *name = fmt::format("BASE: the history's last good state, commit {} of {}{}",
                         ShortCommit(good->commit), good->date,
@@ -234,49 +238,12 @@ std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string
 }
 
 void AddHistory(Commands& commands) {
-  auto& place = commands.Keep<HistoryPlace>();
-  auto& add = commands.Keep<HistoryAddCommand>();
-  auto& show = commands.Keep<HistoryShowCommand>();
-  auto& report = commands.Keep<HistoryReportCommand>();
-  auto& mark = commands.Keep<Mark>();
-  const Option store = {"--store", "Folder of the history", &place.store};
-  const Option branch = {"--branch", "Git branch that contains the history, instead of a folder",
-                         &place.branch, Excludes({"--store"})};
   commands.Add("history", "Follow measurements over commits and find change points");
-  commands.Add(
-      "history add", "Add the results of a commit",
-      [&](const Typed&) { return HistoryAdd(place, add); },
-      {{"results", "Folder of a run, .jsonl, or JSON of Google Benchmark", &add.results, kRequired},
-       {"--commit", "Commit of the results (default: the one checked out)", &add.commit},
-       {"--date", "ISO 8601 date that orders commits (default: the commit's)", &add.date},
-       {"--replace", "Replace an earlier measurement of this commit", &add.replaces},
-       store,
-       branch});
-  commands.Add("history show", "List change points and recent commits",
-               [&](const Typed& typed) { return HistoryShow(place, show, typed.line); },
-               {{"--case", "Only cases whose name contains this text", &show.one},
-                {"--measure", "Only measures whose name contains this text", &show.measure},
-                FormatOption(&show.format, {"text", "csv", "markdown", "json"}),
-                store,
-                branch,
-                JsonOption(&show.json),
-                WideOption()});
+  commands.Add("history add", "Add the results of a commit", HistoryAdd);
+  commands.Add("history show", "List change points and recent commits", HistoryShow);
   commands.Add("history report", "Write an HTML page with all change points and charts",
-               [&](const Typed& typed) { return HistoryReport(place, report, typed.line); },
-               {{"-o,--out", "Output file (default: history.html in the folder)", &report.out},
-                {"--title", "Page title", &report.title},
-                store,
-                branch});
-  commands.Add("history mark", "Mark a commit as good, bad or accepted",
-               [&](const Typed&) { return HistoryMark(place, mark); },
-               {{"commit", "Commit hash or prefix", &mark.commit, kRequired},
-                {"mark", "good and accepted: valid base of comparisons; bad: never a base",
-                 &mark.mark, kRequired, OneOf({"good", "accepted", "bad"})},
-                {"--note", "Reason, stored with the mark", &mark.note},
-                {"--keep-accepted", "Keep an existing mark 'accepted' (for automatic jobs)",
-                 &mark.keeps_accepted},
-                store,
-                branch});
+               HistoryReport);
+  commands.Add("history mark", "Mark a commit as good, bad or accepted", HistoryMark);
 }
 
 }  // namespace loopbench::harness

@@ -1,25 +1,17 @@
-#include "harness/cli/models.h"
-
-#include <fmt/format.h>
+// Models of one problem: the full model and simpler ones, their certified motions, errors and
+// records.
 #include <unistd.h>
 
-#include <algorithm>
-#include <cmath>
-#include <map>
 #include <memory>
 #include <stdexcept>
 #include <system_error>
 
 #include "harness/advise/advise.h"
 #include "harness/analysis/model_warnings.h"
-#include "harness/config/experiment_reader.h"
-#include "harness/config/mechanism_reader.h"
+#include "harness/cli/commands.h"
 #include "harness/record/noise.h"
-#include "harness/record/provenance.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/model_error.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
 #include "harness/text/hash.h"
 
 #ifdef LOOPBENCH_PRECISIONS
@@ -98,19 +90,16 @@ std::string LadderName(const ProblemModels& ladder) {
   return ladder.models.front().description.name + "-models";
 }
 
-/// Returns the bodies and named points of the full model that the other lacks. Each line has one
-/// body, the new places of its points, and the points that no longer exist.
+/// Returns a line per removed body: the new places of its points, and the points that no longer
+/// exist.
 std::vector<std::string> RemovedParts(const MechanismDescription& whole,
                                       const MechanismDescription& simplified) {
   std::vector<std::string> lines;
-  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
-    const BodyDescription& body = whole.bodies[b];
-    const auto same = std::ranges::find(simplified.bodies.begin() + 1, simplified.bodies.end(),
-                                        body.name, &BodyDescription::name);
-    if (same != simplified.bodies.end()) continue;
+  for (const std::string& body : RemovedBodies(whole, simplified)) {
     std::vector<std::string> found, lost;
-    for (const auto& [point, at] : body.points) {
-      const FoundPoint now = FindPoint(simplified, body.name, point);
+    for (const auto& [point, at] :
+         std::ranges::find(whole.bodies, body, &BodyDescription::name)->points) {
+      const FoundPoint now = FindPoint(simplified, body, point);
       if (now.body < 0) {
         lost.push_back(point);
       } else {
@@ -118,7 +107,7 @@ std::vector<std::string> RemovedParts(const MechanismDescription& whole,
             "{} on {}", point, now.body == kGround ? "ground" : simplified.bodies[now.body].name));
       }
     }
-    std::string line = fmt::format("body {} is removed", body.name);
+    std::string line = fmt::format("body {} is removed", body);
     if (!found.empty()) line += fmt::format("; its points: {}", fmt::join(found, ", "));
     if (!lost.empty()) line += fmt::format("; removed points: {}", fmt::join(lost, ", "));
     lines.push_back(line);
@@ -144,8 +133,7 @@ std::string PageOf(const ProblemModels& ladder, double horizon, const std::strin
     page +=
         "\n*model error*: the largest distance of a named point from its place in the full model, "
         "at 50 times of an accurate run (multipliers at level projection, dormand-prince at "
-        "1e-10); "
-        "*evaluations*: right-hand sides of that run.\n";
+        "1e-10); *evaluations*: right-hand sides of that run.\n";
   }
   for (std::size_t i = 1; i < ladder.models.size(); ++i) {
     const ProblemModel& model = ladder.models[i];
@@ -173,99 +161,6 @@ bool IsThere(const fs::path& folder) {
   const bool there = fs::exists(fs::symlink_status(folder, error));
   return there && !(fs::is_directory(folder, error) && fs::is_empty(folder, error));
 }
-
-}  // namespace
-
-ProblemModels MakeModels(const MechanismFile& file,
-                         const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
-                         const SimplifyOptions& options) {
-  ProblemModels ladder;
-  ProblemModel& whole = ladder.models.emplace_back();
-  whole.name = "full";
-  whole.description = file.description;
-  whole.observe = file.observe;
-  for (const SimplificationRule* idea : ideas) {
-    ladder.ideas.emplace_back(idea, idea->apply(file.description, run, options));
-    const Simplified& simplified = ladder.ideas.back().second;
-    if (!simplified.applies()) continue;
-    AddModels(file, std::string(idea->name), idea->is_exact, std::string(idea->assumption),
-              simplified, &ladder);
-  }
-  const Simplified all = Combine(file.description, ideas, run, options);
-  if (all.ideas.size() < 2) return ladder;  // it would equal that rule's model
-  std::vector<std::string_view> assumptions;
-  for (const SimplificationRule* idea : all.ideas) {
-    if (!idea->assumption.empty()) assumptions.push_back(idea->assumption);
-  }
-  AddModels(file, "combined", std::ranges::all_of(all.ideas, &SimplificationRule::is_exact),
-            fmt::format("{}", fmt::join(assumptions, "; ")), all, &ladder);
-  return ladder;
-}
-
-void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder) {
-  const MechanismDescription& whole = ladder->models.front().description;
-  Track truth;
-  for (ProblemModel& model : ladder->models) {
-    const bool is_whole = &model == &ladder->models.front();
-    Track track = TrackOf(model.description, model.R_WC, whole, horizon, cpu_s);
-    model.rhs_evaluations = track.rhs_evaluations;
-    model.worst = track.failure;
-    if (is_whole) truth = std::move(track);
-    if (is_whole || !model.worst.empty()) continue;
-    if (!truth.failure.empty()) {
-      model.worst = "the full model: " + truth.failure;
-      continue;
-    }
-    const ModelError error = Compare(truth, track);
-    model.error = error.points > 0 ? fmt::format("{:.1e}", error.distance) : "";
-    model.worst = error.points > 0 ? error.point : "no point in common";
-  }
-}
-
-std::string LadderFileName(const ProblemModels& ladder) {
-  return FileName(LadderName(ladder)) + ".json";
-}
-
-void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
-                 const std::filesystem::path& folder, bool force) {
-  const bool is_there = IsThere(folder);
-  if (is_there && !force) {
-    throw ConfigError(fmt::format(
-        "{}: found a folder with files, expected a new one; --force puts the models among them",
-        folder.string()));
-  }
-  const std::string& whole = ladder.models.front().description.name;
-  std::map<std::string, std::string> files;
-  LadderFile experiment{LadderName(ladder),
-                        fmt::format("Models of {}, the full model first (models.md).", whole),
-                        {},
-                        horizon};
-  for (const ProblemModel& model : ladder.models) {
-    const std::string file = model.name + ".json";
-    const std::string comment =
-        &model == &ladder.models.front() ? "The full model." : CommentOf(model, whole);
-    files[file] = MechanismText(model.description, model.observe, comment);
-    experiment.mechanisms.push_back(file);
-  }
-  const std::string run = LadderFileName(ladder);
-  files[run] = LadderText(experiment);
-  files["models.md"] = PageOf(ladder, horizon, typed);
-  fs::path target = folder;
-  if (!target.has_filename()) target = target.parent_path();  // "out/"
-  const Unfinished fresh{fs::path(target).concat(fmt::format(".new-{}", ::getpid()))};
-  for (const auto& [name, text] : files) WriteFileAtomically(fresh.path() / name, text);
-  ReadExperiments(fresh.path() / run);
-  if (is_there) {
-    for (const auto& [name, text] : files) WriteFileAtomically(folder / name, text);
-    return;
-  }
-  std::error_code error;
-  fs::rename(fresh.path(), target, error);
-  if (error) {
-    throw std::runtime_error(fmt::format("cannot make '{}': {}", target.string(), error.message()));
-  }
-}
-namespace {
 
 constexpr int kRepeats = 20;  ///< timed runs of each model; the fastest counts
 
@@ -311,15 +206,10 @@ std::unique_ptr<JudgedModel> Examined(const ProblemModel& model, double horizon,
 Record KeysOf(const MechanismFile& file, const ProblemModel& model, const ModelQuestion& question) {
   const Choice alike = Alike();
   Record keys;
-  keys.Set("kind", std::string("model"));
-  keys.Set("mechanism", file.description.name);
-  keys.Set("model", model.name);
-  keys.Set("formulation", alike.method.formulation);
-  keys.Set("enforcement", std::string(ToString(alike.method.enforcement)));
-  keys.Set("coordinates", std::string(ToString(alike.method.coordinates)));
-  keys.Set("integrator", alike.integrator);
-  keys.Set("rtol", alike.rtol);
-  keys.Set("horizon", question.horizon);
+  Put(keys, "kind", "model", "mechanism", file.description.name, "model", model.name, "formulation",
+      alike.method.formulation, "enforcement", alike.method.enforcement, "coordinates",
+      alike.method.coordinates, "integrator", alike.integrator, "rtol", alike.rtol, "horizon",
+      question.horizon);
   SetCaseId(&keys, Fnv1a(fmt::format("{}|{}|{}", file.canonical,
                                      MechanismText(model.description, model.observe, ""),
                                      question.accept)));
@@ -328,17 +218,14 @@ Record KeysOf(const MechanismFile& file, const ProblemModel& model, const ModelQ
 
 void WriteRun(const JudgedModel& judged, Record& record) {
   const Trial& trial = judged.trial;
-  record.Set("outcome",
-             std::string(judged.bench == nullptr ? "unsupported" : ToString(trial.outcome)));
-  record.Set("message", judged.fault);
-  record.Set("model_motion", std::string(judged.model.is_exact ? "the same" : "changed"));
-  record.Set("bodies", static_cast<std::int64_t>(judged.model.description.bodies.size() - 1));
-  record.Set("joints", static_cast<std::int64_t>(judged.model.description.joints.size()));
-  if (judged.bench == nullptr) return;
-  record.Set("error_position_max", trial.error);
-  record.Set("steps", trial.steps);
-  record.Set("rhs_evaluations", trial.rhs_evaluations);
-  record.Set("wall_s", trial.wall_s);
+  const MechanismDescription& description = judged.model.description;
+  const bool has_run = judged.bench != nullptr;
+  Put(record, "outcome", has_run ? ToString(trial.outcome) : "unsupported", "message", judged.fault,
+      "model_motion", judged.model.is_exact ? "the same" : "changed", "bodies",
+      description.bodies.size() - 1, "joints", description.joints.size());
+  if (!has_run) return;
+  Put(record, "error_position_max", trial.error, "steps", trial.steps, "rhs_evaluations",
+      trial.rhs_evaluations, "wall_s", trial.wall_s);
 }
 
 /// Writes the error of the model relative to the full model, and whether it is accepted.
@@ -354,23 +241,114 @@ void WriteVerdict(const MechanismFile& file, const JudgedModel& whole, const Jud
   if (caused.points == 0) return conclude("refused: it has no point of the full model");
   const double certified =
       whole.certain.reference.Certified().position + judged.certain.reference.Certified().position;
-  record.Set("model_error", caused.largest);
-  record.Set("model_error_at", caused.point);
-  record.Set("reference_error", certified);
-  record.Set("reference_valid_until", caused.until);
+  Put(record, "model_error", caused.largest, "model_error_at", caused.point, "reference_error",
+      certified, "reference_valid_until", caused.until);
   const bool accepted = caused.largest + certified <= question.accept;
   conclude(fmt::format("{} at {} m", accepted ? "accepted" : "refused", question.accept));
 }
 
-/// Writes ratios for a model of the whole problem, not of one of its parts.
-void WriteRatios(const Trial& whole, const Trial& trial, Record& record) {
-  if (whole.outcome != Outcome::kFinished || trial.outcome != Outcome::kFinished) return;
-  record.Set("model_rhs_ratio", static_cast<double>(trial.rhs_evaluations) /
-                                    static_cast<double>(whole.rhs_evaluations));
-  record.Set("model_wall_ratio", trial.wall_s / whole.wall_s);
+}  // namespace
+
+ProblemModels MakeModels(const MechanismFile& file,
+                         const std::vector<const SimplificationRule*>& ideas, const ShortRun& run,
+                         const SimplifyOptions& options) {
+  ProblemModels ladder;
+  ProblemModel& whole = ladder.models.emplace_back();
+  whole.name = "full";
+  whole.description = file.description;
+  whole.observe = file.observe;
+  for (const SimplificationRule* idea : ideas) {
+    ladder.ideas.emplace_back(idea, idea->apply(file.description, run, options));
+    const Simplified& simplified = ladder.ideas.back().second;
+    if (!simplified.applies()) continue;
+    AddModels(file, std::string(idea->name), idea->is_exact, std::string(idea->assumption),
+              simplified, &ladder);
+  }
+  const Simplified all = Combine(file.description, ideas, run, options);
+  if (all.ideas.size() < 2) return ladder;  // it would equal that rule's model
+  std::vector<std::string_view> assumptions;
+  for (const SimplificationRule* idea : all.ideas) {
+    if (!idea->assumption.empty()) assumptions.push_back(idea->assumption);
+  }
+  AddModels(file, "combined", std::ranges::all_of(all.ideas, &SimplificationRule::is_exact),
+            fmt::format("{}", fmt::join(assumptions, "; ")), all, &ladder);
+  return ladder;
 }
 
-}  // namespace
+std::vector<std::string> RemovedBodies(const MechanismDescription& whole,
+                                       const MechanismDescription& simplified) {
+  std::vector<std::string> names;
+  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
+    const std::string& name = whole.bodies[b].name;
+    const bool stays = std::ranges::find(simplified.bodies.begin() + 1, simplified.bodies.end(),
+                                         name, &BodyDescription::name) != simplified.bodies.end();
+    if (!stays) names.push_back(name);
+  }
+  return names;
+}
+
+void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder) {
+  const MechanismDescription& whole = ladder->models.front().description;
+  Track truth;
+  for (ProblemModel& model : ladder->models) {
+    const bool is_whole = &model == &ladder->models.front();
+    Track track = TrackOf(model.description, model.R_WC, whole, horizon, cpu_s);
+    model.rhs_evaluations = track.rhs_evaluations;
+    model.worst = track.failure;
+    if (is_whole) truth = std::move(track);
+    if (is_whole || !model.worst.empty()) continue;
+    if (!truth.failure.empty()) {
+      model.worst = "the full model: " + truth.failure;
+      continue;
+    }
+    const ModelError error = Compare(truth, track);
+    model.error = error.points > 0 ? fmt::format("{:.1e}", error.distance) : "";
+    model.worst = error.points > 0 ? error.point : "no point in common";
+  }
+}
+
+std::string LadderFileName(const ProblemModels& ladder) {
+  return FileName(LadderName(ladder)) + ".json";
+}
+
+void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
+                 const std::filesystem::path& folder, bool force) {
+  const bool is_there = IsThere(folder);
+  if (is_there && !force) {
+    Reject("{}: found a folder with files, expected a new one; --force puts the models among them",
+           folder.string());
+  }
+  const std::string& whole = ladder.models.front().description.name;
+  std::map<std::string, std::string> files;
+  LadderFile experiment{LadderName(ladder),
+                        fmt::format("Models of {}, the full model first (models.md).", whole),
+                        {},
+                        horizon};
+  for (const ProblemModel& model : ladder.models) {
+    const std::string file = model.name + ".json";
+    const std::string comment =
+        &model == &ladder.models.front() ? "The full model." : CommentOf(model, whole);
+    files[file] = MechanismText(model.description, model.observe, comment);
+    experiment.mechanisms.push_back(file);
+  }
+  const std::string run = LadderFileName(ladder);
+  files[run] = LadderText(experiment);
+  files["models.md"] = PageOf(ladder, horizon, typed);
+  fs::path target = folder;
+  if (!target.has_filename()) target = target.parent_path();  // "out/"
+  const Unfinished fresh{fs::path(target).concat(fmt::format(".new-{}", ::getpid()))};
+  for (const auto& [name, text] : files) WriteFileAtomically(fresh.path() / name, text);
+  ReadExperiments(fresh.path() / run);
+  if (is_there) {
+    for (const auto& [name, text] : files) WriteFileAtomically(folder / name, text);
+    return;
+  }
+  std::error_code error;
+  fs::rename(fresh.path(), target, error);
+  if (error) {
+    Reject<std::runtime_error>("cannot make '{}': {}", target.string(), error.message());
+  }
+}
 
 std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemModels& models,
                                     const ModelQuestion& question) {
@@ -403,14 +381,17 @@ std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemMode
     WriteRun(judged, record);
     WriteVerdict(file, *all.front(), judged, question, record);
     const bool is_part = judged.model.name.starts_with("islands");
-    if (judged.bench != nullptr && !is_part) WriteRatios(whole, judged.trial, record);
-    record.Set("aa_spread_wall", spread);
-    record.Set("load1", machine.load1);
-    record.Set("processors", std::int64_t{machine.processors});
-    record.Set("governor", machine.governor);
-    record.Set("noise", NoiseReasons(machine, std::nan(""), spread));
-    record.Set("id", RunId(record));
-    record.Set("version", CodeVersion());
+    const Trial& trial = judged.trial;
+    const bool both_finished =
+        whole.outcome == Outcome::kFinished && trial.outcome == Outcome::kFinished;
+    if (judged.bench != nullptr && !is_part && both_finished) {
+      Put(record, "model_rhs_ratio",
+          static_cast<double>(trial.rhs_evaluations) / static_cast<double>(whole.rhs_evaluations),
+          "model_wall_ratio", trial.wall_s / whole.wall_s);
+    }
+    Put(record, "aa_spread_wall", spread, "load1", machine.load1, "processors", machine.processors,
+        "governor", machine.governor, "noise", NoiseReasons(machine, std::nan(""), spread));
+    Put(record, "id", RunId(record), "version", CodeVersion());
     Stamp(record);
     records.push_back(std::move(record));
   }
@@ -439,10 +420,10 @@ CertainMotion MakeCertainMotion([[maybe_unused]] const MechanismDescription& use
   certain.horizon = end;
   return certain;
 #else
-  throw ConfigError(
-      fmt::format("{} needs certified references: this program was built without wide scalars "
-                  "(cmake -DLOOPBENCH_PRECISIONS=ON)",
-                  what));
+  Reject(
+      "{} needs certified references: this program was built without wide scalars (cmake "
+      "-DLOOPBENCH_PRECISIONS=ON)",
+      what);
 #endif
 }
 

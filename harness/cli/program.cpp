@@ -60,22 +60,12 @@ std::string OutOfMemory(const std::bad_alloc& error, const std::vector<std::stri
   return message + fmt::format(", and this process may use {:.0f} MB", 1e-6 * FreeMemory(true));
 }
 
-/// Commands under the headings of `loopbench --help`.
-const std::pair<const char*, std::vector<void (*)(Commands&)>> kGroups[] = {
-    {"Experiments", {AddRun, AddList, AddIntegrators, AddPlan, AddAdvise, AddMerge}},
-    {"Mechanisms",
-     {AddCheck, AddExplain, AddAssemble, AddView, AddSimplify, AddImport, AddConvert, AddGenerate,
-      AddCount}},
-    {"Results", {AddResults, AddTrajectory, AddWorkPrecision, AddVerdicts}},
-    {"Regressions", {AddComparison, AddBaseline, AddHistory}},
-    {"Clusters", {AddCluster}},
-    {"Shell", {AddSchema, AddMigrate}}};
-
 int RunCommandLine(int argc, char** argv) {
   Commands commands;
-  for (const auto& [heading, adders] : kGroups) {
-    commands.heading = heading;
-    for (const auto add : adders) add(commands);
+  for (const auto add : {AddRun, AddExperiments, AddExplain, AddSimplify, AddFormats, AddAdvise,
+                         AddView, AddImport, AddConvert, AddGenerate, AddResults, AddTrajectory,
+                         AddCount, AddComparison, AddBaseline, AddCluster, AddHistory}) {
+    add(commands);
   }
   const CommandInputs inputs;
   try {

@@ -1,34 +1,15 @@
 // Records of stores for the commands that show them, in memory or problem by problem, and files of
 // tables and figures.
-#include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <fstream>
-#include <functional>
-#include <map>
-#include <utility>
-#include <vector>
 
 #include "harness/analysis/warnings.h"
 #include "harness/cli/commands.h"
-#include "harness/figures/figure_recipes.h"
-#include "harness/figures/free_figure.h"
 #include "harness/figures/judge_figures.h"
-#include "harness/isolation/processes.h"
-#include "harness/record/provenance.h"
 #include "harness/run/run_case.h"
-#include "harness/store/record_lines.h"
-#include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
-#include "harness/suite/suite.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/fit.h"
-#include "harness/tables/table_view.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/text/words.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
@@ -43,10 +24,10 @@ void RefuseWhatNeedsAllRows(const TableCommand& command, const ProblemReader& re
                   1e-9 * static_cast<double>(reader.bytes()));
   const bool is_flat = command.format == "csv" || command.format == "json";
   if (!is_flat) {
-    throw ConfigError(fmt::format(
+    Reject(
         "{}, expected at most {} that fit into memory for a table that people read: choose some "
         "with --where PARAMETER=..., or write all with --format csv",
-        found, kMaxHeld));
+        found, kMaxHeld);
   }
   const std::string needs_all = !view.sort.empty()         ? "--sort"
                                 : !view.group.empty()      ? "--group"
@@ -54,9 +35,8 @@ void RefuseWhatNeedsAllRows(const TableCommand& command, const ProblemReader& re
                                 : view.kind == "factorial" ? "--kind factorial"
                                                            : "";
   if (needs_all.empty()) return;
-  throw ConfigError(
-      fmt::format("{}, expected at most {} that fit into memory with {}: choose some with --where",
-                  found, kMaxHeld, needs_all));
+  Reject("{}, expected at most {} that fit into memory with {}: choose some with --where", found,
+         kMaxHeld, needs_all);
 }
 
 /// Writer of the rows of one table, one by one.
@@ -117,10 +97,10 @@ class MemoryBudget {
   /// Throws ConfigError if they do not fit; `found` describes the records.
   void Require(const std::string& found, std::uint64_t bytes) const {
     if (Has(bytes)) return;
-    throw ConfigError(fmt::format(
+    Reject(
         "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
         "fewer: choose some with --where PARAMETER=..., or write all with table --format csv",
-        store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9));
+        store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9);
   }
 
  private:
@@ -198,6 +178,36 @@ double FreeMemory(bool with_own) {
   return free == 0.0 ? left : std::min(free, left);
 }
 
+int PrintJson(const JsonObject& document) {
+  PrintText(document.Text() + "\n");
+  return 0;
+}
+
+std::vector<TableColumn> Columns(std::string_view rows) {
+  constexpr std::string_view kFormats[] = {"",         "integer", "shortest", "scientific",
+                                           "exponent", "fixed",   "seconds"};
+  std::vector<TableColumn> columns;
+  while (!rows.empty()) {
+    std::string_view row = rows.substr(0, rows.find(", "));
+    rows.remove_prefix(std::min(row.size() + 2, rows.size()));
+    const auto next = [&row](char end) {
+      const std::string part(row.substr(0, row.find(end)));
+      row.remove_prefix(std::min(part.size() + 1, row.size()));
+      return part;
+    };
+    const std::string heading = next(':'), format = next(':');
+    const std::size_t equals = heading.find('=');
+    TableColumn& column = columns.emplace_back();
+    column.key = heading.substr(0, equals);
+    column.header = heading.substr(equals == heading.npos ? 0 : equals + 1);
+    const auto* known = std::ranges::find(kFormats, format);
+    if (known == std::end(kFormats)) throw std::logic_error("no format of columns: " + format);
+    column.format = static_cast<Format>(known - kFormats);
+    if (!row.empty()) column.importance = std::stoi(std::string(row));
+  }
+  return columns;
+}
+
 std::vector<Record> LatestWithWarnings(std::vector<Record> records) {
   records = LatestRecords(records, CodeVersion());
   SortRows(&records);  // the store has the order in which runs ended
@@ -237,12 +247,6 @@ std::string RenderKept(Table table, const std::string& format) {
     std::erase_if(table.notes, [](const std::string& note) { return note.starts_with("date: "); });
   }
   return Render(table, format);
-}
-
-const std::map<std::string, FigureSize>& FigureSizes() {
-  static const std::map<std::string, FigureSize> sizes = {{"one-column", FigureSize::kOneColumn},
-                                                          {"two-column", FigureSize::kTwoColumn}};
-  return sizes;
 }
 
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,

@@ -1,38 +1,19 @@
 // run, merge and estimate: experiments into a store, stores into one, and the time before.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
 #include <fstream>
-#include <functional>
 #include <iterator>
-#include <map>
 #include <set>
-#include <utility>
 
 #include "harness/analysis/warnings.h"
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
-#include "harness/isolation/processes.h"
 #include "harness/judge/claims.h"
-#include "harness/record/record.h"
-#include "harness/reference/reference.h"
 #include "harness/run/case_identity.h"
 #include "harness/run/peers.h"
 #include "harness/run/run_case.h"
-#include "harness/store/record_lines.h"
-#include "harness/store/result_store.h"
 #include "harness/store/store_lock.h"
 #include "harness/suite/estimate.h"
 #include "harness/suite/reference_cases.h"
 #include "harness/suite/runner.h"
-#include "harness/suite/suite.h"
-#include "harness/suite/workload.h"
-#include "harness/tables/fit.h"
 #include "harness/text/cpu_time.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/text/words.h"
 #include "harness/timing/time_cases.h"
 #include "harness/trajectory/trajectory.h"
 
@@ -41,20 +22,39 @@ namespace {
 
 struct RunCommand {
   std::vector<std::filesystem::path> experiments;
-  std::filesystem::path out;  ///< folder; default results/runs/<name of the first experiment>
-  std::vector<Setting> settings;
+  std::filesystem::path out;
   SuiteOptions suite;
-  int threads = 0;    ///< as in ExperimentFiles
-  std::string gate;   ///< "warnings" or ""
-  bool wait = false;  ///< wait while another process writes to the store
-  std::string again;  ///< the command in shell syntax, printed as the command to resume
-};
+  std::vector<std::string> settings;  ///< --set, as typed
+  std::string shard = "1/1", rerun = "none", gate;
+  int threads = 0;
+  bool wait = false, no_timing = false, timing_only = false, precision_only = false;
 
-std::size_t CountLines(const std::filesystem::path& file) {
-  std::ifstream lines(file, std::ios::binary);
-  return static_cast<std::size_t>(
-      std::count(std::istreambuf_iterator<char>(lines), std::istreambuf_iterator<char>(), '\n'));
-}
+  std::vector<Option> Options() {
+    return {
+        {"experiment", "Experiment files (JSON)", &experiments, kRequired},
+        {"-o,--out",
+         "Folder for results.jsonl, drift.csv and timing.csv (default: results/runs/NAME)", &out},
+        {"-j,--jobs", "Accuracy cases to run in parallel; timings run alone", &suite.jobs,
+         From(1, 1024)},
+        {"--threads", "Threads per right-hand side (O-DCA on long chains); same results", &threads,
+         From(1, kMaxThreads)},
+        FilterOption(&suite.filter),
+        {"--set", "Change a field of the file: /json/pointer=value", &settings},
+        WideOption(),
+        {"--shard", "Run part K of N; merge joins the parts", &shard},
+        {"--isolate", "Run each case in its own process; otherwise short cases share processes",
+         &suite.isolate},
+        {"--wait", "Wait while another process writes to the store, then continue", &wait},
+        {"--rerun", "Stored cases to run again", &rerun, OneOf({"none", "failed", "all"})},
+        GateOption(&gate),
+        {"--no-timing", "Skip timings", &no_timing},
+        // the gate judges accuracy runs
+
+        {"--timing-only", "Run timings only", &timing_only, Excludes({"--no-timing", "--fail-on"})},
+        {"--precision-only", "Run only precision studies (several floating-point types)",
+         &precision_only, Excludes({"--no-timing", "--timing-only", "--fail-on"})}};
+  }
+};
 
 /// Returns the records of `ids`, in order; other records of the store are ignored.
 std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
@@ -66,30 +66,42 @@ std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
   return WithContents(std::move(asked));
 }
 
-void PrintInterrupted(const RunCommand& command, const ResultStore& store) {
+void PrintInterrupted(const RunCommand& command, const ResultStore& store, const Typed& typed) {
+  std::ifstream file(store.file(), std::ios::binary);
+  const auto records =
+      std::count(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>(), '\n');
   PrintError(
       "interrupted: {} records are kept in {}, {} of them of this run; cases under way were "
-      "stopped "
-      "and left nothing, tables were not written\n",
-      CountLines(store.file()), store.file().string(), store.appended());
+      "stopped and left nothing, tables were not written\n",
+      records, store.file().string(), store.appended());
   if (command.suite.rerun == Rerun::kAll) {
     PrintError("to go on, without those that were run again: the same command with --rerun none\n");
   } else {
-    PrintError("to go on: {}\n", command.again);
+    PrintError("to go on: {}\n", typed.again);
   }
 }
 
 /// Runs the cases that the store lacks, then writes its tables. If interrupted, prints the number
 /// of kept results and returns 128 + the signal number: 130 for Ctrl-C.
-int RunExperiments(const RunCommand& command, const std::string& typed) {
+int RunExperiments(RunCommand& command, const Typed& typed) {
+  std::vector<Setting> settings;
+  for (const std::string& text : command.settings) settings.push_back(ParseSetting(text));
+  command.suite.timing = !command.no_timing && !command.precision_only;
+  command.suite.accuracy = !command.timing_only && !command.precision_only;
+  command.suite.precision = !command.timing_only;
+  command.suite.set = fmt::format("{}", fmt::join(command.settings, " "));
+  command.suite.shard = ParseShard(command.shard);
+  command.suite.rerun = command.rerun == "all"      ? Rerun::kAll
+                        : command.rerun == "failed" ? Rerun::kFailed
+                                                    : Rerun::kNone;
   // read everything first: a mistake in the last file must not cost the runs of the first
-  Workload workload({command.experiments, command.settings, command.suite.filter, command.threads},
+  Workload workload({command.experiments, settings, command.suite.filter, command.threads},
                     command.suite.shard);
   if (workload.is_long() && !command.gate.empty()) {
-    throw ConfigError(fmt::format(
+    Reject(
         "--fail-on {}: found a sweep of more than {} combinations, whose records are not held at "
         "once; judge parts of it: loopbench table STORE --where ... --fail-on {}",
-        command.gate, kLongSweep, command.gate));
+        command.gate, kLongSweep, command.gate);
   }
   RequirePeers(workload.some());
   RequireFreedom(workload.some());
@@ -109,7 +121,7 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
     try {
       count = RunSuite(workload, command.suite, finished, store);
     } catch (const Interrupted& interrupted) {
-      PrintInterrupted(command, store);
+      PrintInterrupted(command, store, typed);
       return interrupted.exit_code();
     }
     PrintError(
@@ -127,129 +139,25 @@ int RunExperiments(const RunCommand& command, const std::string& typed) {
   }
   std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
   SetWarnings(&records);
-  WriteTables(records, out, typed);
+  WriteTables(records, out, typed.line);
   Print("results in {}\n", out.string());
   return command.gate.empty() ? 0 : WarningGate(records);
 }
 
-}  // namespace
-
-int Merge(const MergeCommand& command) {
-  NewStore target(command.out);
-  const MergedStores merged(command.stores, command.order);
-  if (!merged.missing().empty()) {
-    PrintError(
-        "{}: {} of {} cases are in no part, {} among them; nothing was merged. The experiment, its "
-        "mechanisms or the program are not what they were when the parts ran\n",
-        target.file().string(), merged.missing().size(), command.order.size(),
-        merged.missing().front());
-    return 1;
-  }
-  std::vector<std::filesystem::path> files;
-  for (const auto& store : command.stores) files.push_back(StoreFile(store));
-  // partial references next to the future store are one more part
-  std::vector<std::filesystem::path> with_target = files;
-  with_target.push_back(target.file());
-  const MergedReferences references = MergeReferences(with_target);
-  std::set<std::string> problems;
-  for (std::size_t i = 0; i < merged.size(); ++i) {
-    const Record record = merged[i];
-    std::vector<std::filesystem::path> owners;
-    for (const auto& store : merged.StoresOf(i)) owners.push_back(StoreFile(store));
-    for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
-      PrintError("warning: no store has trajectories/{} as the run that is kept wrote it\n", name);
-    }
-    if (problems.insert(record.Text("problem_id")).second) {
-      CopyMechanisms({record}, files, target.file());
-    }
-    target.Append(record);
-  }
-  WriteReferences(references, target.file());
-  target.Commit();
-  for (const std::string& note : references.notes) PrintError("{}\n", note);
-  Print("{} records of {} stores are {} cases in {}\n", merged.read(), command.stores.size(),
-        merged.size(), target.file().string());
-  if (!references.texts.empty()) {
-    Print("{} references beside it\n", references.texts.size());
-  }
-  return 0;
-}
-
-namespace {
-
-struct RunOptions {
-  RunCommand command;
-  std::vector<std::string> settings;  ///< --set, as typed
-  std::string shard = "1/1", rerun = "none";
-  bool no_timing = false, timing_only = false, precision_only = false;
-};
-
-int RunAsTyped(RunOptions& options, const Typed& typed) {
-  RunCommand& command = options.command;
-  for (const std::string& text : options.settings) {
-    command.settings.push_back(ParseSetting(text));
-  }
-  command.again = typed.again;
-  command.suite.timing = !options.no_timing && !options.precision_only;
-  command.suite.accuracy = !options.timing_only && !options.precision_only;
-  command.suite.precision = !options.timing_only;
-  command.suite.set = fmt::format("{}", fmt::join(options.settings, " "));
-  command.suite.shard = ParseShard(options.shard);
-  command.suite.rerun = options.rerun == "all"      ? Rerun::kAll
-                        : options.rerun == "failed" ? Rerun::kFailed
-                                                    : Rerun::kNone;
-  return RunExperiments(command, typed.line);
-}
-
-}  // namespace
-
-void AddRun(Commands& commands) {
-  auto& options = commands.Keep<RunOptions>();
-  RunCommand& command = options.command;
-  SuiteOptions& suite = command.suite;
-  commands.Add(
-      "run", "Run experiments (resumes an interrupted run) and write results",
-      [&](const Typed& typed) { return RunAsTyped(options, typed); },
-      {{"experiment", "Experiment files (JSON)", &command.experiments, kRequired},
-       {"-o,--out",
-        "Folder for results.jsonl, drift.csv and timing.csv (default: results/runs/NAME)",
-        &command.out},
-       {"-j,--jobs", "Accuracy cases to run in parallel; timings run alone", &suite.jobs,
-        From(1, 1024)},
-       {"--threads", "Threads per right-hand side (O-DCA on long chains); same results",
-        &command.threads, From(1, kMaxThreads)},
-       FilterOption(&suite.filter),
-       {"--set", "Change a field of the file: /json/pointer=value", &options.settings},
-       WideOption(),
-       {"--shard", "Run part K of N; merge joins the parts", &options.shard},
-       {"--isolate", "Run each case in its own process; otherwise short cases share processes",
-        &suite.isolate},
-       {"--wait", "Wait while another process writes to the store, then continue", &command.wait},
-       {"--rerun", "Stored cases to run again", &options.rerun, OneOf({"none", "failed", "all"})},
-       GateOption(&command.gate),
-       {"--no-timing", "Skip timings", &options.no_timing},
-       // the gate judges accuracy runs
-
-       {"--timing-only", "Run timings only", &options.timing_only,
-        Excludes({"--no-timing", "--fail-on"})},
-       {"--precision-only", "Run only precision studies (several floating-point types)",
-        &options.precision_only, Excludes({"--no-timing", "--timing-only", "--fail-on"})}});
-}
-
-void AddMerge(Commands& commands) {
-  auto& command = commands.Keep<MergeCommand>();
-  commands.Add("merge", "Join the stores of shards", [&](const Typed&) { return Merge(command); },
-               {{"store", "Folders of runs, or .jsonl files", &command.stores, kRequired},
-                {"-o,--out", "Folder of the new store", &command.out, kRequired}});
-}
-
-namespace {
-
 struct PlanCommand {
   ExperimentFiles files;
-  std::filesystem::path from;  ///< store of earlier results, used for times of the cases in it
-  bool no_timing = false;      ///< skip timings
-  bool json = false;
+  std::filesystem::path from;
+  bool no_timing = false, json = false;
+
+  std::vector<Option> Options() {
+    return {{"experiment", "Experiment files (JSON)", &files.paths, kRequired},
+            {"--timings-from", "Earlier results whose times are used, not a pilot's", &from},
+            FilterOption(&files.filter),
+            {"--no-timing", "Skip timings", &no_timing},
+            SetOption(&files.settings),
+            WideOption(),
+            JsonOption(&json)};
+  }
 };
 
 /// Key of all that decides a run except the experiment's name: results of another file with the
@@ -294,35 +202,11 @@ struct Plan {
   double seconds = 0.0, reference_seconds = 0.0, ladder_seconds = 0.0, timing_seconds = 0.0;
 };
 
-/// Times of the examined cases by line: all cases, or some of a long sweep.
-class Times {
- public:
-  void Add(const Case& one, double seconds) {
-    Sum& sum = sums_[one.mechanism + "\n" + ToString(one.method)];
-    sum.seconds += seconds;
-    ++sum.cases;
-  }
-
-  /// Returns the time of the whole line [s].
-  double Of(const CaseLine& line) const {
-    const auto sum = sums_.find(line.mechanism + "\n" + line.method);
-    if (sum == sums_.end()) return 0.0;
-    return sum->second.seconds * static_cast<double>(line.cases) /
-           static_cast<double>(sum->second.cases);
-  }
-
- private:
-  struct Sum {
-    double seconds = 0.0;
-    std::size_t cases = 0;
-  };
-  std::map<std::string, Sum> sums_;
-};
-
 /// Makes a plan; in a long sweep some combinations represent all.
 Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* estimate) {
   Plan plan;
-  Times times;
+  // seconds and number of the examined cases of each line: all cases, or some of a long sweep
+  std::map<std::string, std::pair<double, std::size_t>> times;
   const std::vector<Experiment>& experiments = overview.experiments;
   std::set<std::string> references;
   std::size_t asked_references = 0;
@@ -340,7 +224,9 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
         const auto known = earlier.find(SameRun(Identified(experiments[i], one).keys));
         plan.known += known != earlier.end() ? 1 : 0;
         const auto runs = static_cast<double>(RunsOf(one));
-        times.Add(one, known != earlier.end() ? runs * known->second : estimate->OfCase(i, one));
+        auto& [seconds, cases] = times[one.mechanism + "\n" + ToString(one.method)];
+        seconds += known != earlier.end() ? runs * known->second : estimate->OfCase(i, one);
+        ++cases;
         if (!experiments[i].reference) return;
         ++asked_references;
         const ReferenceCase reference = ReferenceOf(experiments[i], one, "results.jsonl");
@@ -370,7 +256,10 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
   }
   plan.references = references.size();
   for (const CaseLine& line : overview.lines) {
-    plan.lines.push_back({line, times.Of(line)});
+    const auto& [seconds, cases] = times[line.mechanism + "\n" + line.method];
+    plan.lines.push_back({line, cases == 0 ? 0.0
+                                           : seconds * static_cast<double>(line.cases) /
+                                                 static_cast<double>(cases)});
     plan.cases += line.cases;
     plan.runs += line.runs;
     plan.seconds += plan.lines.back().seconds;
@@ -391,28 +280,19 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
   return plan;
 }
 
-void PrintAxes(const Overview& overview) {
-  if (overview.axes.empty()) return;
-  for (const auto& [name, values] : overview.axes) Print("  axis {}: {} values\n", name, values);
-  Print("  {} combinations\n", overview.combinations);
-}
-
 void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& command,
                const Estimate& estimate) {
   const Experiment& first = overview.experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
-  PrintAxes(overview);
+  for (const auto& [name, values] : overview.axes) Print("  axis {}: {} values\n", name, values);
+  if (!overview.axes.empty()) Print("  {} combinations\n", overview.combinations);
   Print("  {} problems, {} methods, {} tolerances", first.problems.size(), first.methods.size(),
         first.tolerances.size());
   if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
   if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
   Print("\n\n");
-  Table table;
-  table.columns = {{"mechanism", "mechanism"},
-                   {"method", "method"},
-                   {"cases", "cases", Format::kInteger},
-                   {"runs", "runs", Format::kInteger},
-                   {"seconds", "estimate [s]", Format::kShortest}};
+  Table table{.columns = Columns(
+                  "mechanism, method, cases:integer, runs:integer, seconds=estimate [s]:shortest")};
   for (const Line& line : plan.lines) {
     AddRow({line.mechanism, line.method, line.cases, line.runs,
             std::round(line.seconds * 100.0) / 100.0},
@@ -456,33 +336,19 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
                         const Plan& plan, const Estimate& estimate) {
   std::vector<JsonObject> lines;
   for (const Line& line : plan.lines) {
-    lines.push_back(JsonObject()
-                        .Add("mechanism", line.mechanism)
-                        .Add("method", line.method)
-                        .Add("cases", Count(line.cases))
-                        .Add("runs", Count(line.runs))
-                        .Add("seconds", line.seconds));
+    lines.push_back(JsonOf("mechanism", line.mechanism, "method", line.method, "cases", line.cases,
+                           "runs", line.runs, "seconds", line.seconds));
   }
-  return JsonObject()
-      .Add("file", path.string())
-      .Add("name", overview.experiments.front().name)
-      .Add("combinations", Count(overview.combinations))
-      .Add("cases", Count(plan.cases))
-      .Add("runs", Count(plan.runs))
-      .Add("accuracy_seconds", plan.seconds)
-      .Add("references", Count(plan.references))
-      .Add("reference_seconds", plan.reference_seconds)
-      .Add("precision_runs", Count(plan.rungs))
-      .Add("precision_seconds", plan.ladder_seconds)
-      .Add("timings", Count(plan.timings))
-      .Add("timing_seconds", plan.timing_seconds)
-      .Add("cases_known", Count(plan.known))
-      .Add("pilots", Count(estimate.pilots()))
-      .Add("pilots_cut_off", estimate.cut_off())
-      .Add("lines", lines);
+  return JsonOf("file", path, "name", overview.experiments.front().name, "combinations",
+                overview.combinations, "cases", plan.cases, "runs", plan.runs, "accuracy_seconds",
+                plan.seconds, "references", plan.references, "reference_seconds",
+                plan.reference_seconds, "precision_runs", plan.rungs, "precision_seconds",
+                plan.ladder_seconds, "timings", plan.timings, "timing_seconds", plan.timing_seconds,
+                "cases_known", plan.known, "pilots", estimate.pilots(), "pilots_cut_off",
+                estimate.cut_off(), "lines", lines);
 }
 
-int PrintPlans(const PlanCommand& command) try {
+int PrintPlans(const PlanCommand& command, const Typed&) try {
   const Interruption interruption;  // pilots leave no files
   std::vector<JsonObject> documents;
   for (const auto& path : command.files.paths) {
@@ -499,27 +365,59 @@ int PrintPlans(const PlanCommand& command) try {
       PrintPlan(overview, plan, command, estimate);
     }
   }
-  if (command.json) PrintText(JsonObject().Add("experiments", documents).Text() + "\n");
-  return 0;
+  return command.json ? PrintJson(JsonOf("experiments", documents)) : 0;
 } catch (const Interrupted& interrupted) {
   return interrupted.exit_code();
 }
 
 }  // namespace
 
-void AddPlan(Commands& commands) {
-  auto& command = commands.Keep<PlanCommand>();
-  ExperimentFiles& files = command.files;
-  commands.Add(
-      "estimate", "Count cases and runs, and estimate their time",
-      [&](const Typed&) { return PrintPlans(command); },
-      {{"experiment", "Experiment files (JSON)", &files.paths, kRequired},
-       {"--timings-from", "Earlier results whose times are used, not a pilot's", &command.from},
-       FilterOption(&files.filter),
-       {"--no-timing", "Skip timings", &command.no_timing},
-       SetOption(&files.settings),
-       WideOption(),
-       JsonOption(&command.json)});
+int Merge(const MergeCommand& command, const Typed&) {
+  NewStore target(command.out);
+  const MergedStores merged(command.stores, command.order);
+  if (!merged.missing().empty()) {
+    PrintError(
+        "{}: {} of {} cases are in no part, {} among them; nothing was merged. The experiment, its "
+        "mechanisms or the program are not what they were when the parts ran\n",
+        target.file().string(), merged.missing().size(), command.order.size(),
+        merged.missing().front());
+    return 1;
+  }
+  std::vector<std::filesystem::path> files;
+  for (const auto& store : command.stores) files.push_back(StoreFile(store));
+  // partial references next to the future store are one more part
+  std::vector<std::filesystem::path> with_target = files;
+  with_target.push_back(target.file());
+  const MergedReferences references = MergeReferences(with_target);
+  std::set<std::string> problems;
+  for (std::size_t i = 0; i < merged.size(); ++i) {
+    const Record record = merged[i];
+    std::vector<std::filesystem::path> owners;
+    for (const auto& store : merged.StoresOf(i)) owners.push_back(StoreFile(store));
+    for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
+      PrintError("warning: no store has trajectories/{} as the run that is kept wrote it\n", name);
+    }
+    if (problems.insert(record.Text("problem_id")).second) {
+      CopyMechanisms({record}, files, target.file());
+    }
+    target.Append(record);
+  }
+  WriteReferences(references, target.file());
+  target.Commit();
+  for (const std::string& note : references.notes) PrintError("{}\n", note);
+  Print("{} records of {} stores are {} cases in {}\n", merged.read(), command.stores.size(),
+        merged.size(), target.file().string());
+  if (!references.texts.empty()) {
+    Print("{} references beside it\n", references.texts.size());
+  }
+  return 0;
+}
+
+void AddRun(Commands& commands) {
+  commands.Add("run", "Run experiments (resumes an interrupted run) and write results",
+               RunExperiments);
+  commands.Add("merge", "Join the stores of shards", Merge);
+  commands.Add("estimate", "Count cases and runs, and estimate their time", PrintPlans);
 }
 
 }  // namespace loopbench::harness

@@ -1,45 +1,69 @@
 // simplify: models of one problem, from the full one to the simplest.
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <charconv>
-#include <cmath>
-#include <filesystem>
-#include <string>
-#include <vector>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/models.h"
-#include "harness/config/mechanism_reader.h"
-#include "harness/isolation/processes.h"
 #include "harness/run/model_error.h"
-#include "harness/store/result_store.h"
-#include "harness/tables/table_view.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/text/words.h"
 #include "mechanism/model/mechanism.h"
-#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 
 namespace loopbench::harness {
 namespace {
 
+/// Returns names of ways to lump masses, in the order of Lumping.
+const std::vector<std::string>& LumpingNames() {
+  static const std::vector<std::string> names = {"centre-of-mass", "half", "none"};
+  return names;
+}
+
+/// Returns the default limits: "light-links 0.01, ...".
+std::string LimitsText() {
+  std::string text;
+  for (const SimplificationRule& idea : SimplificationRules()) {
+    if (idea.limit == nullptr) continue;
+    text +=
+        fmt::format("{}{}={}", text.empty() ? "" : ", ", idea.name, SimplifyOptions{}.*idea.limit);
+  }
+  return text;
+}
+
 struct SimplifyCommand {
-  std::filesystem::path mechanism;
-  std::vector<std::string> only;        ///< names of rules; empty: all
-  std::vector<std::string> thresholds;  ///< NAME=VALUE, as typed
-  Lumping lumping = Lumping::kCentreOfMass;
-  double short_run = 1.0;       ///< length of the short run [s]; 0: none
-  double horizon = 10.0;        ///< of the experiment [s]
-  double errors = 0.0;          ///< length of runs that measure model errors [s]; 0: none
-  std::filesystem::path store;  ///< store for a record of each model; none if empty
-  double accept = 0.0;          ///< accepted model error for the verdict there [m]
-  std::filesystem::path out;    ///< folder; no files if empty
-  bool assembled = false;       ///< write the complete start in the full model
-  bool force = false;           ///< write into an existing folder
+  std::filesystem::path mechanism, store, out;
+  std::vector<std::string> only, thresholds;
+  std::string lumping = LumpingNames().front();
+  double short_run = 1.0, horizon = 10.0, errors = 0.0;  ///< [s]
+  double accept = 0.0;                                   ///< [m]
+  bool assembled = false, force = false, only_list = false, all = false;
   ProcessLimits limits = kFileLimits;
+
+  std::vector<Option> Options() {
+    return {
+        MechanismArgument(&mechanism),
+        {"--list", "List possible simplifications (default)", &only_list},
+        {"--only", "Rules to apply: NAME[,NAME]", &only, kSplits},
+        {"--threshold", "Threshold of a rule, NAME=VALUE; defaults: " + LimitsText(), &thresholds},
+        {"--lump-mass", "New place of a light link's mass", &lumping, OneOf(LumpingNames())},
+        {"--trial-duration", "Duration of the trial run that finds nearly rigid parts [s]; 0: none",
+         &short_run, From(0.0, 1e6)},
+        {"--verify", "Run all models for this time [s] and report errors of their points; 0: no",
+         &errors, From(0.0, 1e6), ShowsDefault(true)},
+        {"--max-model-error",
+         "Largest acceptable error of a model [m], for its verdict in the store", &accept,
+         From(1e-15, 1e6), Needs("--verify")},
+        {"--store",
+         "Store that receives a record per model: error against the full model, times, verdict "
+         "(loopbench table STORE --kind models)",
+         &store, Needs("--max-model-error")},
+        {"--horizon", "Simulated time of the written experiment [s]", &horizon, From(1e-9, 1e9)},
+        WideOption(),
+        {"-o,--out", "New folder for the models, an experiment that runs them, and models.md", &out,
+         Excludes({"--list"})},
+        {"--assembled", "Write the full model with all coordinates of its assembled start",
+         &assembled},
+        {"--force", "Overwrite files of an existing folder", &force},
+        CpuOption(&limits),
+        MemoryOption(&limits),
+        {"--all", "Print all rows of long tables", &all}};
+  }
 };
 
 /// Returns names of rules, and of the rules with a limit.
@@ -53,9 +77,9 @@ const SimplificationRule& IdeaNamed(const std::string& name, const std::string& 
   const auto found = std::ranges::find(SimplificationRules(), name, &SimplificationRule::name);
   if (found != SimplificationRules().end()) return *found;
   const std::string nearest = NearestSpelling(name, IdeaNames());
-  throw ConfigError(fmt::format(
-      "{} {}: found \"{}\", expected one of {}{}", option, name, name, fmt::join(IdeaNames(), ", "),
-      nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest)));
+  Reject("{} {}: found \"{}\", expected one of {}{}", option, name, name,
+         fmt::join(IdeaNames(), ", "),
+         nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest));
 }
 
 std::vector<const SimplificationRule*> Chosen(const std::vector<std::string>& only) {
@@ -70,24 +94,23 @@ std::vector<const SimplificationRule*> Chosen(const std::vector<std::string>& on
 
 SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
   SimplifyOptions options;
-  options.lumping = command.lumping;
+  options.lumping = static_cast<Lumping>(std::ranges::find(LumpingNames(), command.lumping) -
+                                         LumpingNames().begin());
   for (const std::string& text : command.thresholds) {
     const std::size_t equals = text.find('=');
     if (equals == std::string::npos) {
-      throw ConfigError(fmt::format("--threshold {}: found no \"=\", expected NAME=VALUE", text));
+      Reject("--threshold {}: found no \"=\", expected NAME=VALUE", text);
     }
     const SimplificationRule& idea = IdeaNamed(text.substr(0, equals), "--threshold");
     if (idea.limit == nullptr) {
-      throw ConfigError(fmt::format("--threshold {}: found a limit, expected none: {} has none",
-                                    text, idea.name));
+      Reject("--threshold {}: found a limit, expected none: {} has none", text, idea.name);
     }
     const std::string value = text.substr(equals + 1);
     double number = 0.0;
     const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
     const bool whole = error == std::errc() && end == value.data() + value.size();
     if (!whole || !(number > 0.0) || !std::isfinite(number)) {
-      throw ConfigError(
-          fmt::format("--threshold {}: found \"{}\", expected a number > 0", text, value));
+      Reject("--threshold {}: found \"{}\", expected a number > 0", text, value);
     }
     options.*idea.limit = number;
   }
@@ -95,9 +118,7 @@ SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
 }
 
 Table CandidateTable(const SimplificationRule& idea, const Simplified& simplified) {
-  Table table;
-  table.columns = {
-      {"what", "candidate"}, {"number", "number"}, {"taken", "taken"}, {"why", "because"}};
+  Table table{.columns = Columns("what=candidate, number, taken, why=because")};
   for (const Candidate& candidate : simplified.candidates) {
     AddRow({candidate.what,
             std::isnan(candidate.number) ? "" : fmt::format("{:.3g}", candidate.number),
@@ -137,32 +158,16 @@ int SpeedsOf(const MechanismDescription& description) {
 }
 
 void PrintModels(const ProblemModels& ladder, const ExplainView& view) {
-  Table table;
-  table.columns = {{"name", "model"},
-                   {"motion", "motion"},
-                   {"space", "space"},
-                   {"bodies", "bodies", Format::kInteger},
-                   {"joints", "joints", Format::kInteger},
-                   {"speeds", "speeds", Format::kInteger},
-                   {"error", "model error [m]"},
-                   {"worst", "at"},
-                   {"evaluations", "evaluations", Format::kInteger},
-                   {"removed", "removed"}};
+  Table table{.columns = Columns(
+                  "name=model, motion, space, bodies:integer, joints:integer, speeds:integer, "
+                  "error=model error [m], worst=at, evaluations:integer, removed")};
   const MechanismDescription& whole = ladder.models.front().description;
   for (const ProblemModel& model : ladder.models) {
-    const auto& bodies = model.description.bodies;
-    std::vector<std::string> gone;
-    for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
-      const std::string& name = whole.bodies[b].name;
-      const bool stays = std::ranges::find(bodies.begin() + 1, bodies.end(), name,
-                                           &BodyDescription::name) != bodies.end();
-      if (!stays) gone.push_back(name);
-    }
     AddRow({model.name, model.is_exact ? "the same" : "changed", model.description.space,
-            bodies.size() - 1, model.description.joints.size(), SpeedsOf(model.description),
-            model.error, model.worst,
+            model.description.bodies.size() - 1, model.description.joints.size(),
+            SpeedsOf(model.description), model.error, model.worst,
             model.rhs_evaluations < 0 ? Value() : Value(model.rhs_evaluations),
-            fmt::format("{}", fmt::join(gone, ", "))},
+            fmt::format("{}", fmt::join(RemovedBodies(whole, model.description), ", "))},
            &table);
   }
   PrintSection("Models", table, view);
@@ -180,8 +185,7 @@ MechanismFile ReadWhole(const SimplifyCommand& command) {
   std::string why;
   MechanismDescription assembled = WithAssembledStart(file.description, &why);
   if (!why.empty()) {
-    throw ConfigError(
-        fmt::format("{}: its start cannot be assembled: {}", command.mechanism.string(), why));
+    Reject("{}: its start cannot be assembled: {}", command.mechanism.string(), why);
   }
   if (command.assembled) file.description = std::move(assembled);
   return file;
@@ -264,30 +268,13 @@ int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
   }
   if (command.out.empty()) return 0;
   if (!any && !command.assembled) {
-    throw ConfigError(fmt::format("{}: found nothing to simplify, so nothing is written to {}",
-                                  command.mechanism.string(), command.out.string()));
+    Reject("{}: found nothing to simplify, so nothing is written to {}", command.mechanism.string(),
+           command.out.string());
   }
   WriteModels(ladder, command.horizon, typed, command.out, command.force);
   Print("\n{}: written. loopbench run {} runs all of them.\n", command.out.string(),
         (command.out / LadderFileName(ladder)).string());
   return 0;
-}
-
-/// Returns the default limits: "light-links 0.01, ...".
-std::string LimitsText() {
-  std::string text;
-  for (const SimplificationRule& idea : SimplificationRules()) {
-    if (idea.limit == nullptr) continue;
-    text +=
-        fmt::format("{}{}={}", text.empty() ? "" : ", ", idea.name, SimplifyOptions{}.*idea.limit);
-  }
-  return text;
-}
-
-/// Returns names of ways to lump masses, in the order of Lumping.
-const std::vector<std::string>& LumpingNames() {
-  static const std::vector<std::string> names = {"centre-of-mass", "half", "none"};
-  return names;
 }
 
 /// Returns a table of the rules with their thresholds.
@@ -300,53 +287,18 @@ std::string RuleList() {
   return rules;
 }
 
+int SimplifyInChild(const SimplifyCommand& command, const Typed& typed) {
+  // the child process prints into memory, without a terminal
+  return PrintFromChild(
+      command.mechanism.string(), command.limits,
+      [&, view = ViewOfOutput(command.all)] { return SimplifyFile(command, view, typed.line); });
+}
+
 }  // namespace
 
 void AddSimplify(Commands& commands) {
-  auto& command = commands.Keep<SimplifyCommand>();
-  auto& lumping = commands.Keep(LumpingNames().front());
-  auto& only_list = commands.Keep<bool>();
-  auto& all = commands.Keep<bool>();
-  commands.Add(
-      "simplify", "Generate simpler models of a mechanism and measure their errors",
-      [&](const Typed& typed) {
-        command.lumping = static_cast<Lumping>(std::ranges::find(LumpingNames(), lumping) -
-                                               LumpingNames().begin());
-        // the child process prints into memory, without a terminal
-
-        return PrintFromChild(
-            command.mechanism.string(), command.limits,
-            [&, view = ViewOfOutput(all)] { return SimplifyFile(command, view, typed.line); });
-      },
-      {MechanismArgument(&command.mechanism),
-       {"--list", "List possible simplifications (default)", &only_list},
-       {"--only", "Rules to apply: NAME[,NAME]", &command.only, kSplits},
-       {"--threshold", "Threshold of a rule, NAME=VALUE; defaults: " + LimitsText(),
-        &command.thresholds},
-       {"--lump-mass", "New place of a light link's mass", &lumping, OneOf(LumpingNames())},
-       {"--trial-duration", "Duration of the trial run that finds nearly rigid parts [s]; 0: none",
-        &command.short_run, From(0.0, 1e6)},
-       {"--verify", "Run all models for this time [s] and report errors of their points; 0: no",
-        &command.errors, From(0.0, 1e6), ShowsDefault(true)},
-       {"--max-model-error",
-        "Largest acceptable error of a model [m], for its verdict in the store", &command.accept,
-        From(1e-15, 1e6), Needs("--verify")},
-       {"--store",
-        "Store that receives a record per model: error against the full model, times, verdict "
-        "(loopbench table STORE --kind models)",
-        &command.store, Needs("--max-model-error")},
-       {"--horizon", "Simulated time of the written experiment [s]", &command.horizon,
-        From(1e-9, 1e9)},
-       WideOption(),
-       {"-o,--out", "New folder for the models, an experiment that runs them, and models.md",
-        &command.out, Excludes({"--list"})},
-       {"--assembled", "Write the full model with all coordinates of its assembled start",
-        &command.assembled},
-       {"--force", "Overwrite files of an existing folder", &command.force},
-       CpuOption(&command.limits),
-       MemoryOption(&command.limits),
-       {"--all", "Print all rows of long tables", &all}},
-      RuleList() + "\n");
+  commands.Add("simplify", "Generate simpler models of a mechanism and measure their errors",
+               SimplifyInChild, RuleList() + "\n");
 }
 
 }  // namespace loopbench::harness

@@ -1,45 +1,35 @@
 // trajectory: output of a run over time, or an external trajectory checked against a mechanism.
 #include "harness/trajectory/trajectory.h"
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <iterator>
 #include <numbers>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
-#include "harness/config/mechanism_reader.h"
-#include "harness/figures/figure_recipes.h"
-#include "harness/record/record.h"
-#include "harness/record/select.h"
-#include "harness/store/result_store.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/fit.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
 #include "harness/trajectory/check.h"
 
 namespace loopbench::harness {
 namespace {
 
 struct TrajectoryCommand {
-  std::filesystem::path source;      ///< a store, or a trajectory (.csv)
-  Selection where;                   ///< filter for a store's records
-  std::filesystem::path out;         ///< file, or folder for a store; no files if empty
-  std::string format = "csv";        ///< csv or jsonl
-  std::vector<std::string> columns;  ///< labels, or beginnings of labels; empty: all
-  int every = 1;                     ///< row interval: the first row is kept, then every n-th
-  std::filesystem::path mechanism;   ///< mechanism to check a trajectory
-  std::filesystem::path ours;        ///< another trajectory of it
-  std::filesystem::path figure;      ///< .svg or .pdf, with `ours`
-};
+  std::filesystem::path source, out, mechanism, ours, figure;
+  Selection where;
+  std::string format = "csv";
+  std::vector<std::string> columns;
+  int every = 1;
 
-using enum Format;
+  std::vector<Option> Options() {
+    return {{"source", "Folder of a run, or a trajectory (.csv)", &source, kRequired},
+            WhereOption(&where),
+            {"-o,--out", "Output folder; for a CSV source, output file", &out},
+            FormatOption(&format, {"csv", "jsonl"}),
+            {"--columns", "Only t and columns with these prefixes: a,b", &columns, kSplits},
+            {"--every", "Only every N-th row", &every, From(1, 1e9), ShowsDefault(false)},
+            {"--mechanism", "Mechanism (JSON) to check a CSV trajectory against", &mechanism},
+            {"--compare-with", "Trajectory to compare a CSV trajectory with", &ours},
+            {"--figure", "Figure of both trajectories and their difference: .svg, .pdf", &figure,
+             Needs("--compare-with")}};
+  }
+};
 
 Value Maybe(const LargestAt& largest) {
   return largest.is_known ? Value(largest.value) : Value(std::monostate());
@@ -65,14 +55,13 @@ std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const Trajectory
   if (unused == used.end()) return chosen;
   std::string known;
   for (const TrajectoryColumn& column : columns) known += "\n  " + column.Label();
-  throw ConfigError(fmt::format("--columns: found \"{}\", expected the beginning of one of{}",
-                                command.columns[unused - used.begin()], known));
+  Reject("--columns: found \"{}\", expected the beginning of one of{}",
+         command.columns[unused - used.begin()], known);
 }
 
-/// Copies files of any size row by row, with `notes` before the file's own notes. Returns the
-/// number of rows.
-std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path& to,
-                  const TrajectoryCommand& command, std::vector<std::string> notes) {
+/// Copies files of any size row by row, with `notes` before the file's own notes.
+int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to,
+              const TrajectoryCommand& command, std::vector<std::string> notes = {}) {
   TrajectoryReader reader(from);
   const std::vector<std::size_t> chosen = Chosen(reader, command);
   std::vector<TrajectoryColumn> columns;
@@ -89,7 +78,8 @@ std::int64_t Copy(const std::filesystem::path& from, const std::filesystem::path
     writer.Write(kept);
   }
   writer.Finish(reader.later_notes());
-  return writer.rows();
+  Print("wrote {}: {} rows\n", to.string(), writer.rows());
+  return 0;
 }
 
 /// Returns true if the file is unchanged since its run; else prints the reason.
@@ -99,13 +89,6 @@ bool IsVerified(const Record& record, const std::filesystem::path& file) try {
 } catch (const ChangedFile& changed) {
   PrintError("{}\n", changed.what());
   return false;
-}
-
-int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to,
-              const TrajectoryCommand& command, const std::vector<std::string>& notes = {}) {
-  const std::int64_t rows = Copy(from, to, command, notes);
-  Print("wrote {}: {} rows\n", to.string(), rows);
-  return 0;
 }
 
 /// Returns the sweep parameters of a case and their values.
@@ -139,9 +122,8 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
     return record.Text("trajectory").empty() || !Matches(record, command.where);
   });
   if (records.empty()) {
-    throw ConfigError(
-        fmt::format("{}: found no trajectory{}, expected records of an experiment with \"output\"",
-                    command.source.string(), command.where.empty() ? "" : " that meets --where"));
+    Reject("{}: found no trajectory{}, expected records of an experiment with \"output\"",
+           command.source.string(), command.where.empty() ? "" : " that meets --where");
   }
   const std::filesystem::path file = StoreFile(command.source);
   Table table;
@@ -164,8 +146,7 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
     } else if (!command.out.empty()) {
       const auto parameters = ParametersOf(record, records);
       std::vector<std::string> notes;
-      for (const auto& [key, value] : parameters)
-        notes.push_back(fmt::format("{}: {}", key, value));
+      for (const auto& [key, value] : parameters) AddNote(notes, "{}: {}", key, value);
       ExportOne(from, command.out / (NameOf(record, parameters) + "." + command.format), command,
                 notes);
     }
@@ -181,17 +162,14 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
 void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
   const MechanismDescription user = ReadMechanism(command.mechanism).description;
   const TrajectoryCheck check = CheckTrajectory(command.source, user);
-  Table table;
-  table.title = fmt::format("{} against {}: {} rows, {:g} s to {:g} s, by {}{}",
-                            command.source.string(), user.name, check.rows, check.from, check.to,
-                            check.source, check.has_speeds ? "" : ", without speeds");
-  table.columns = {{"joint", "joint"},
-                   {"shift", "mismatch [m]", kScientific},
-                   {"shift_t", "at [s]", kSeconds},
-                   {"rotation", "rotation [rad]", kScientific},
-                   {"velocity", "speed [m/s]", kScientific},
-                   {"angular_velocity", "turning [rad/s]", kScientific},
-                   {"coordinates", "coordinates off", kScientific}};
+  Table table{
+      .title = fmt::format("{} against {}: {} rows, {:g} s to {:g} s, by {}{}",
+                           command.source.string(), user.name, check.rows, check.from, check.to,
+                           check.source, check.has_speeds ? "" : ", without speeds"),
+      .columns =
+          Columns("joint, shift=mismatch [m]:scientific, shift_t=at [s]:seconds, rotation=rotation "
+                  "[rad]:scientific, velocity=speed [m/s]:scientific, angular_velocity=turning "
+                  "[rad/s]:scientific, coordinates=coordinates off:scientific")};
   for (const JointCheck& joint : check.joints) {
     AddRow({joint.joint, Maybe(joint.shift), When(joint.shift), Maybe(joint.rotation),
             Maybe(joint.velocity), Maybe(joint.angular_velocity), Maybe(joint.coordinates)},
@@ -205,9 +183,8 @@ void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
   if (!check.speeds.empty()) {
     const auto worst = std::ranges::max_element(
         check.speeds, {}, [](const SpeedCheck& speed) { return speed.apart.value; });
-    table.notes.push_back(
-        fmt::format("speeds: at most {:.3e} from the differences of positions, {} at {:g} s",
-                    worst->apart.value, worst->label, worst->apart.t));
+    AddNote(table.notes, "speeds: at most {:.3e} from the differences of positions, {} at {:g} s",
+            worst->apart.value, worst->label, worst->apart.t);
   }
   for (const std::string& label : check.unknown) {
     table.notes.push_back("not of this mechanism, passed over: " + label);
@@ -224,9 +201,8 @@ bool IsMotion(const std::string& label) {
 void RequireFinite(double number, const std::string& label, double t,
                    const std::filesystem::path& file, const std::filesystem::path& other) {
   if (std::isfinite(number)) return;
-  throw std::runtime_error(
-      fmt::format("{}: found {} in \"{}\" at t = {}, expected a finite number, as in {}",
-                  file.string(), number, label, t, other.string()));
+  Reject<std::runtime_error>("{}: found {} in \"{}\" at t = {}, expected a finite number, as in {}",
+                             file.string(), number, label, t, other.string());
 }
 
 int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
@@ -239,16 +215,12 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
            });
   });
   if (shared.empty()) {
-    throw ConfigError(fmt::format("{} and {}: found no column that both have, expected one{}",
-                                  command.ours.string(), command.source.string(),
-                                  command.columns.empty() ? "" : " of --columns"));
+    Reject("{} and {}: found no column that both have, expected one{}", command.ours.string(),
+           command.source.string(), command.columns.empty() ? "" : " of --columns");
   }
-  Table table;
-  table.title = fmt::format("{} less {}", command.source.string(), command.ours.string());
-  table.columns = {{"column", "column"},
-                   {"largest", "largest difference", kScientific},
-                   {"t", "at [s]", kSeconds},
-                   {"compared", "rows", kInteger}};
+  Table table{.title = fmt::format("{} less {}", command.source.string(), command.ours.string()),
+              .columns = Columns("column, largest=largest difference:scientific, t=at [s]:seconds, "
+                                 "compared=rows:integer")};
   std::size_t most = 0, between = 0;
   for (std::size_t row = 0; row < theirs.rows(); ++row) {
     bool is_between = false;
@@ -281,17 +253,18 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
     AddRow({column.label, Maybe(largest), When(largest), compared}, &table);
   }
   if (most == 0) {
-    throw std::runtime_error(fmt::format("{}: found no row to compare, expected times of {}",
-                                         command.source.string(), command.ours.string()));
+    Reject<std::runtime_error>("{}: found no row to compare, expected times of {}",
+                               command.source.string(), command.ours.string());
   }
   if (most < theirs.rows()) {
-    table.notes.push_back(fmt::format("{} of {} rows are not compared: {} has no such times",
-                                      theirs.rows() - most, theirs.rows(), command.ours.string()));
+    AddNote(table.notes, "{} of {} rows are not compared: {} has no such times",
+            theirs.rows() - most, theirs.rows(), command.ours.string());
   }
   if (between > 0) {
-    table.notes.push_back(fmt::format(
+    AddNote(
+        table.notes,
         "{} of {} rows are compared with cubics through the rows of {}, which has no such times",
-        between, theirs.rows(), command.ours.string()));
+        between, theirs.rows(), command.ours.string());
   }
   std::ranges::move(whole_turns, std::back_inserter(table.notes));
   AppendProvenance(table, typed);
@@ -305,23 +278,21 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   }
   const auto fault =
       WriteFigure(command.figure, TrajectoryFigure(ours, theirs, drawn, "ours and theirs"));
-  if (fault) throw std::runtime_error(fmt::format("{}: {}", command.figure.string(), *fault));
+  if (fault) Reject<std::runtime_error>("{}: {}", command.figure.string(), *fault);
   Print("wrote {}: {} of {} columns\n", command.figure.string(), drawn.size(), shared.size());
   return 0;
 }
 
 /// Lists the trajectories of a store; writes them to `out`; checks one against a mechanism;
 /// compares it with the trajectory `ours`.
-int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed) {
+int ShowTrajectories(const TrajectoryCommand& command, const Typed& typed) {
   if (command.source.extension() != ".csv") {
-    if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed);
-    throw ConfigError(
-        fmt::format("{}: found a store beside --mechanism or --compare-with, expected a "
-                    "trajectory (.csv)",
-                    command.source.string()));
+    if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed.line);
+    Reject("{}: found a store beside --mechanism or --compare-with, expected a trajectory (.csv)",
+           command.source.string());
   }
-  if (!command.mechanism.empty()) PrintCheck(command, typed);
-  if (!command.ours.empty()) return LayBeside(command, typed);
+  if (!command.mechanism.empty()) PrintCheck(command, typed.line);
+  if (!command.ours.empty()) return LayBeside(command, typed.line);
   if (!command.out.empty()) return ExportOne(command.source, command.out, command);
   if (!command.mechanism.empty()) return 0;
   TrajectoryReader reader(command.source);
@@ -337,20 +308,8 @@ int ShowTrajectories(const TrajectoryCommand& command, const std::string& typed)
 }  // namespace
 
 void AddTrajectory(Commands& commands) {
-  auto& command = commands.Keep<TrajectoryCommand>();
-  commands.Add(
-      "trajectory", "List, write and check trajectories of runs or other programs",
-      [&](const Typed& typed) { return ShowTrajectories(command, typed.line); },
-      {{"source", "Folder of a run, or a trajectory (.csv)", &command.source, kRequired},
-       WhereOption(&command.where),
-       {"-o,--out", "Output folder; for a CSV source, output file", &command.out},
-       FormatOption(&command.format, {"csv", "jsonl"}),
-       {"--columns", "Only t and columns with these prefixes: a,b", &command.columns, kSplits},
-       {"--every", "Only every N-th row", &command.every, From(1, 1e9), ShowsDefault(false)},
-       {"--mechanism", "Mechanism (JSON) to check a CSV trajectory against", &command.mechanism},
-       {"--compare-with", "Trajectory to compare a CSV trajectory with", &command.ours},
-       {"--figure", "Figure of both trajectories and their difference: .svg, .pdf", &command.figure,
-        Needs("--compare-with")}});
+  commands.Add("trajectory", "List, write and check trajectories of runs or other programs",
+               ShowTrajectories);
 }
 
 }  // namespace loopbench::harness

@@ -226,7 +226,7 @@ constexpr Measure kMeasures[] = {
     {"closed_form_error_max", kNumber, {"closed-form error", "rad", kScientific}, {}, kError},
     {"closed_form_*", kNumber},
 
-    // simpler models (harness/cli/models.h)
+    // simpler models (harness/cli/commands.h)
     {"model", kText, {"model"}},
     {"model_motion", kText, {"motion"}},
     {"model_error", kNumber, {"model error", "m", kScientific}, {}, kError},

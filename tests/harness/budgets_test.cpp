@@ -39,9 +39,9 @@ constexpr Budget kBudgets[] = {
     {"mechanism/algebra",       { 2249,  23,   0},  1900},
     {"mechanism/description",   { 2185,  28,   1},  1750},
     {"mechanism/model",         { 3110,  22,   2},  2300},
-    {"mechanism/loops",         { 3380,  23,   2},  1900},
+    {"mechanism/loops",         { 3288,  23,   2},  1900},
     {"mechanism/start",         { 2144,  18,   4},   700},
-    {"mechanism/formulation",   { 2815,  24,   4},  1500},
+    {"mechanism/formulation",   { 2811,  24,   4},  1500},
     {"mechanism/simplify",      { 3379,  25,   5},  2600},
     {"odca",                    { 7218,  38,   5},  3900},
     {"lagrange",                {  383,   4,   4},   350},
@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3685,  18,   6},  2700},
     {"harness/figures",         { 3045,  12,   7},  1900},
     {"harness/view",            { 2399,   7,   8},  2050},
-    {"harness/exchange",        { 9631,  37,  10},  5000},
+    {"harness/exchange",        { 9090,  35,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
-    {"harness/cli",             { 8449,  26,  29},  3600},
+    {"harness/cli",             { 7797,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {94270, 510, 242}, 62000}
+    {"",                        {92981, 506, 242}, 62000}
 };
 // clang-format on
 

@@ -125,6 +125,7 @@ Run MergeParts(std::span<const Run> parts) {
     }
   }
   whole.drift = MergeDrift(parts);
+  whole.is_redundant = std::ranges::any_of(parts, &Run::is_redundant);
   return whole;
 }
 namespace {

@@ -20,6 +20,7 @@ struct Run {
   /// Corrections of projections [m], energy balance [J] and largest kinetic energy [J].
   DriftSeries correction = {}, energy = {};
   double kinetic = 0.0;
+  bool is_redundant = false;  ///< has constraints that others imply
   /// The problem's branch combinations (mechanism_reader.h) at the assembled start [rad], or empty.
   std::vector<double> branch_start = {};
 };

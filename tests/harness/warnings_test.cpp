@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -498,6 +499,34 @@ TEST(Warnings, RedundantRowsThatDriftedApartAreNoSingularPosition) {
     EXPECT_GT(record.Number("drift_position_max"), 2e-4);
     EXPECT_GT(record.Number("singularity_distance_min"), 0.1);
     EXPECT_EQ(record.Text("warnings"), "");
+  }
+}
+
+/// Bennett's redundant rows differ by the rounding of its file from the start on. Projection cannot
+/// close them, and they are no drift.
+TEST(Warnings, RoundingOfRedundantRowsIsNoDrift) {
+  const std::string exact = ReadFile(kConfigs / "experiments/overconstrained/bennett-turning.json");
+  const std::regex number(R"(-?\d\.\d{14,}(?!\d|e))");
+  for (const int digits : {11, 12, 13}) {
+    std::string rounded;
+    auto rest = exact.cbegin();
+    for (std::sregex_iterator found(exact.begin(), exact.end(), number), end; found != end;
+         ++found) {
+      rounded.append(rest, (*found)[0].first);
+      rounded += fmt::format("{:.{}f}", std::stod(found->str()), digits);
+      rest = (*found)[0].second;
+    }
+    rounded.append(rest, exact.cend());
+    const Experiment experiment = Single(ParseMechanism(rounded, "rounded.json"));
+    for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+      const Method method{
+          .formulation = "odca", .enforcement = kPosition, .coordinates = coordinates};
+      const Record record =
+          RunCase(experiment, CaseOf(experiment, "bennett-turning", method, 1e-8, 2.0));
+      ASSERT_EQ(record.Text("outcome"), "finished");
+      EXPECT_EQ(record.Text("warnings"), "") << digits;
+      EXPECT_GT(record.Number("drift_position_max"), 1e-14) << "round-off alone";
+    }
   }
 }
 

@@ -132,18 +132,28 @@ void Examine(const MechanismFile& file, double horizon, const Reference& referen
   if (finished && has_all_points) trial.error = record.Number("error_position_max");
 }
 
-/// Throws if the points used for errors do not move: every method would then be exact.
-void RequireMotion(const std::string& name, const MechanismDescription& user,
+/// Throws if the points used for errors move by less than the error bound: standing still meets it.
+void RequireMotion(const AdviseCommand& command, const MechanismDescription& user,
                    const CertainMotion& certain, const std::vector<MeasuredPoint>& points) {
   const Reference& reference = certain.reference;
   const Compiled compiled = Compile(user, {.islands = false});
   const Measured measured{user, compiled, points};
-  bool turns = false;
+  const std::string name = command.mechanism.string();
+  bool moves = false, turns = false;
   for (std::size_t k = 0; k < reference.NumTrusted(); ++k) {
     const Distance way = DistanceOf(measured, -1, reference.snapshots[k], reference.snapshots[0]);
     const Distance &bound = reference.bounds[k], &first = reference.bounds[0];
-    if (way.position > bound.position + first.position) return;
+    const bool moved = way.position > bound.position + first.position;
+    if (moved && way.position > command.error) return;
+    moves = moves || moved;
     turns = turns || way.rotation > bound.rotation + first.rotation;
+  }
+  if (moves) {
+    Reject<std::runtime_error>(
+        "{}: within {:g} s the measured points move by less than the error bound of {:g} m, so any "
+        "method meets it: give the mechanism a speed or a force that moves it, or a smaller "
+        "--max-error",
+        name, certain.horizon, command.error);
   }
   Reject<std::runtime_error>(
       "{}: {} within {:g} s, so any method is exact there, and there is no advice for a motion: {}",
@@ -330,7 +340,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
     Reject<std::runtime_error>("{}: there is no certified reference to advise by: {}", name,
                                certain.reference.message);
   }
-  RequireMotion(name, user, certain, points);
+  RequireMotion(command, user, certain, points);
   std::string shorter;
   if (certain.horizon < command.horizon) {
     shorter = fmt::format("The motion is certified until {:g} s only. Advice is for that.",

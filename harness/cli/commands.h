@@ -225,19 +225,14 @@ std::string TablesOfKinds(const std::vector<std::string>& kinds);
 
 // Output of explain, simplify and view: tables that fit the terminal.
 
-/// Amount and width of the output of explain.
+/// Amount of the output of explain.
 struct ExplainView {
   bool all = false;  ///< all rows; else the first rows of long tables and the number of others
-  /// Width of the terminal [cells]; 0: unlimited; nullopt: there is no terminal.
-  std::optional<std::size_t> width = {};
   /// Document that gets the sections under their keys (--json) instead of the terminal.
   JsonObject* document = nullptr;
   bool statics = false;    ///< forces that hold the start, too
   std::string range = "";  ///< name of a joint: the range of its coordinate, too
 };
-
-/// Returns the view of standard output.
-ExplainView ViewOfOutput(bool all);
 
 /// Prints a sentence for people, unless there is a document.
 template <typename... Values>

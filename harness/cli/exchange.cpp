@@ -88,7 +88,7 @@ int View(const ViewCommand& command) {
   if (format == "html" && command.svg.view != ViewNames().front()) {
     throw ConfigError("--view is for svg: a page is turned by hand");
   }
-  const ExplainView view = ViewOfOutput(command.all);
+  const ExplainView view{.all = command.all};
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return ViewHere(command, format, view); });
 }

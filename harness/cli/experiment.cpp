@@ -399,7 +399,7 @@ int AssembleFile(const AssembleCommand& command, const ExplainView& view) {
 
 int AssembleInChild(const AssembleCommand& command, const Typed&) {
   return PrintFromChild(command.mechanism.string(), command.limits,
-                        [&] { return AssembleFile(command, ViewOfOutput(command.all)); });
+                        [&] { return AssembleFile(command, {.all = command.all}); });
 }
 
 }  // namespace

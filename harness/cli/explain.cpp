@@ -29,7 +29,7 @@ void ExplainProblems(const Experiment& experiment) {
             description.joints.size(), Numbers(problem.horizons), problem.path},
            &table);
   }
-  PrintSection("Problems", table, ViewOfOutput(true));
+  PrintSection("Problems", table, {.all = true});
 }
 
 /// Prints the methods as a table, and the meaning of their words.
@@ -43,7 +43,7 @@ void ExplainMethods(const Experiment& experiment) {
             rest.substr(second + 1)},
            &table);
   }
-  PrintSection("Methods", table, ViewOfOutput(true));
+  PrintSection("Methods", table, {.all = true});
   const auto define = [&](std::string_view word, std::string_view sentence, auto is) {
     if (std::ranges::any_of(experiment.methods, is)) Print("  {}: {}\n", word, sentence);
   };
@@ -288,8 +288,6 @@ struct ExplainCommand {
 /// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it.
 int Explain(ExplainCommand& command, const Typed&) {
   auto& [files, limits, view, json] = command;
-  // the child process prints into memory, without a terminal
-  view.width = ViewOfOutput(view.all).width;
   int exit_code = 0;
   std::string documents;
   for (const auto& path : files.paths) {
@@ -319,12 +317,6 @@ int Explain(ExplainCommand& command, const Typed&) {
 
 }  // namespace
 
-ExplainView ViewOfOutput(bool all) {
-  ExplainView view{.all = all};
-  if (OutputIsTerminal()) view.width = OutputScreen().width;
-  return view;
-}
-
 std::string ShortNumber(double value) { return fmt::format("{:.6g}", value + 0.0); }
 
 void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
@@ -345,9 +337,10 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
     return std::ranges::all_of(shown.rows,
                                [&column](const Record& row) { return Cell(row, column).empty(); });
   });
-  const std::size_t width = view.width.value_or(0);
-  const std::string text = ToText(view.width ? FitWidth(shown, width - std::min(width, kIndent))
-                                             : LastColumnBroken(shown));
+  const Screen screen = OutputScreen();
+  const std::size_t room = screen.width - std::min(screen.width, kIndent);
+  const std::string text =
+      ToText(screen.is_terminal ? FitWidth(shown, room) : LastColumnBroken(shown));
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     if (end > begin) Print("  {}\n", text.substr(begin, end - begin));

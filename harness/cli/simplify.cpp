@@ -288,10 +288,8 @@ std::string RuleList() {
 }
 
 int SimplifyInChild(const SimplifyCommand& command, const Typed& typed) {
-  // the child process prints into memory, without a terminal
-  return PrintFromChild(
-      command.mechanism.string(), command.limits,
-      [&, view = ViewOfOutput(command.all)] { return SimplifyFile(command, view, typed.line); });
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return SimplifyFile(command, {.all = command.all}, typed.line); });
 }
 
 }  // namespace

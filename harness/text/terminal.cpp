@@ -16,7 +16,7 @@
 namespace loopbench::harness {
 namespace {
 
-bool is_wide = false;
+Screen output_screen;  ///< as PrepareStreams() found it
 
 std::string_view Variable(const char* name) {
   const char* value = std::getenv(name);
@@ -37,22 +37,16 @@ Screen ScreenOf(int descriptor) {
   if (::isatty(descriptor) != 1) return {};
   const std::string_view term = Variable("TERM");
   const bool colour = Variable("NO_COLOR").empty() && !term.empty() && term != "dumb";
-  return {WidthOf(descriptor), colour};
+  return {WidthOf(descriptor), colour, true};
 }
 
 }  // namespace
 
-bool OutputIsTerminal() { return ::isatty(STDOUT_FILENO) == 1; }
-
-Screen OutputScreen() {
-  Screen screen = ScreenOf(STDOUT_FILENO);
-  if (is_wide) screen.width = 0;
-  return screen;
-}
+Screen OutputScreen() { return output_screen; }
 
 Screen ErrorScreen() { return ScreenOf(STDERR_FILENO); }
 
-void ShowWide() { is_wide = true; }
+void ShowWide() { output_screen.width = 0; }
 
 namespace {
 
@@ -71,6 +65,7 @@ void PrepareStreams() {
     // the lowest free number is this one; read-only, so that writing fails as before
     if (::open("/dev/null", O_RDONLY) != descriptor) std::_Exit(2);
   }
+  output_screen = ScreenOf(STDOUT_FILENO);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }

@@ -14,15 +14,15 @@ namespace loopbench::harness {
 
 // Width and colour of standard output and standard error (docs/decisions/024).
 
-bool OutputIsTerminal();
-
 struct Screen {
   std::size_t width = 0;  ///< [cells]; 0: unlimited, for files and pipes
   bool colour = false;
+  bool is_terminal = false;
 };
 
-/// Returns the screen of standard output. If a terminal reports no width, it is the environment
-/// variable COLUMNS, else 80. Colour is on if the terminal supports it, unless disabled as in
+/// Returns the screen of standard output as PrepareStreams() found it; child processes that print
+/// into memory have it, too. If a terminal reports no width, it is the environment variable
+/// COLUMNS, else 80. Colour is on if the terminal supports it, unless disabled as in
 /// https://no-color.org.
 Screen OutputScreen();
 

@@ -259,6 +259,13 @@ TEST_F(CommandLineTest, ThereIsNoAdviceForWhatDoesNotMove) {
     {"name": "disc", "mass": 1, "inertia": 0.1, "points": {"rim": [0.5, 0]}}],
     "joints": [{"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "disc"}}]})");
   ExpectEnding(Call("advise rest.json --max-error 1e-5 --horizon 1"), 2, {"no joint moves"});
+  // an upright pendulum leaves its position only by the rounding of its angle
+  Write("upright.json", R"({"name": "upright", "gravity": [0, -9.81], "bodies": [
+    {"name": "bar", "mass": 1, "inertia": 0.1, "com": [0.5, 0]}], "joints": [
+    {"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "bar"}}],
+    "initial": {"coordinates": {"O": 1.5707963267948966}}})");
+  ExpectEnding(Call("advise upright.json --horizon 4"), 2,
+               {"less than the error bound of 1e-06 m"});
   // it turns, and its centre of mass stays where it is
   Write("disc.json", R"({"name": "disc", "gravity": [0, 0], "bodies": [
     {"name": "disc", "mass": 1, "inertia": 0.1, "points": {"rim": [0.5, 0]}}],

@@ -75,6 +75,23 @@ TEST_F(CliTerminalTest, TablesAreAsWideAsTheTerminalAndNameWhatIsLeftOut) {
   }
 }
 
+/// Commands that read a mechanism print from a child process, which has no terminal.
+TEST_F(CliTerminalTest, TablesOfChildProcessesFitTheTerminal) {
+  for (const std::string command :
+       {"assemble four-bar.json", "explain four-bar.json", "view four-bar.json --format text",
+        "advise four-bar.json --horizon 0.5 --max-error 1e-3"}) {
+    for (const std::string& line : TableLines(See(command, 50).text)) {
+      EXPECT_LE(line.size(), 50u) << command;
+    }
+    const TerminalEnding wide = See(command + " --wide", 50);
+    EXPECT_EQ(wide.code, 0) << wide.text;
+    EXPECT_EQ(wide.text.find("left out"), std::string::npos) << wide.text;
+    std::size_t widest = 0;
+    for (const std::string& line : TableLines(wide.text)) widest = std::max(widest, line.size());
+    EXPECT_GT(widest, 50u) << wide.text;  // or this tests nothing
+  }
+}
+
 TEST_F(CliTerminalTest, ColourIsForTerminalsWithoutNoColorAndNeverInFiles) {
   Write("short.json",
         R"({"name": "short", "problems": [{"mechanism": "four-bar.json", "horizon": 1}],

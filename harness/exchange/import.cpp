@@ -21,7 +21,7 @@ namespace {
 /// Reads a text. `path`: its file, beside which others may be; nothing without one.
 Imported Import(std::string_view text, const std::string& file,
                 const std::optional<std::filesystem::path>& path, const ImportOptions& options) {
-  XmlFile xml(text, file, path);
+  XmlDocument xml(text, file, path);
   const XmlElement root = xml.root();
   const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
                                                : tag == "robot" ? "urdf"

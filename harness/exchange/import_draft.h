@@ -154,20 +154,15 @@ const Entry& Named(const std::map<std::string, Entry>& entries, const std::strin
 
 // Joints in series without mass between them (import_chain.cpp, import_links.cpp).
 
-enum class SerialKind { kHinge, kSlide, kBall, kFree };
-/// Joint types of single joints, by SerialKind.
-inline constexpr JointType kSerialTypes[] = {JointType::kRevolute, JointType::kPrismatic,
-                                             JointType::kSpherical, JointType::kFree};
-
 /// A joint of a series, in the drawn axes of the last body.
 struct SerialJoint {
-  SerialKind kind = SerialKind::kHinge;
+  JointType type = JointType::kRevolute;               ///< or prismatic, spherical, free
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
   double reference = 0.0;                              ///< its coordinate in the drawn position
 
-  int num_q() const { return kind == SerialKind::kFree ? 7 : kind == SerialKind::kBall ? 4 : 1; }
-  int num_u() const { return kind == SerialKind::kFree ? 6 : kind == SerialKind::kBall ? 3 : 1; }
+  int num_q() const { return NumValues(type, SpaceKind::kSpatial, false); }
+  int num_u() const { return NumValues(type, SpaceKind::kSpatial, true); }
 };
 
 /// The joint of a mechanism that a series forms.
@@ -191,7 +186,7 @@ struct MasslessChain;
 
 class ImportDraft {
  public:
-  ImportDraft(const XmlFile& file, const ImportOptions& options);
+  ImportDraft(XmlDocument& file, const ImportOptions& options);
 
   MechanismDescription description;
   bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
@@ -357,7 +352,7 @@ class ImportDraft {
   void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
-  const XmlFile& file_;
+  XmlDocument& file_;
   const ImportOptions& options_;
   std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;

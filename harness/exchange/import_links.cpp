@@ -12,9 +12,8 @@
 
 namespace loopbench::harness {
 
-/// A joint of a chain; `position` and `axis` for all types.
+/// A joint of a chain of any type.
 struct ChainJoint : SerialJoint {
-  bool is_simple = false;   ///< `kind` is its type
   bool leads_out = true;    ///< from the inner body to the outer one
   Eigen::Quaterniond q_CJ;  ///< its axes in the drawn axes of the child
 };
@@ -123,9 +122,7 @@ void Place(const MechanismDescription& d, MasslessChain* chain) {
     ChainJoint& placed = chain->series[k];
     placed.leads_out = joint.to.body == (k + 1 < chain->size() ? chain->between[k] : chain->child);
     const Placement X = X_CB * PlacementOf(placed.leads_out ? joint.to : joint.from);
-    const auto type = std::ranges::find(kSerialTypes, joint.type);
-    placed.is_simple = type != std::end(kSerialTypes) && joint.type != JointType::kFree;
-    if (placed.is_simple) placed.kind = static_cast<SerialKind>(type - kSerialTypes);
+    placed.type = joint.type;
     placed.position = X.p;
     placed.axis = (placed.leads_out ? 1.0 : -1.0) * (X.q * DirectionOf(joint));
     placed.q_CJ = X.q;
@@ -154,7 +151,7 @@ std::optional<ComposedJoint> ComposeChain(const MasslessChain& chain,
   std::ptrdiff_t held = 0, moving = 0;
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const int joint = chain.joints[k];
-    if (!chain.series[k].is_simple || single[joint]) return std::nullopt;
+    if (single[joint]) return std::nullopt;
     held += std::ranges::count(initial.held, joint);
     moving += std::ranges::count(initial.speeds, joint, &JointValues::joint);
   }
@@ -178,7 +175,7 @@ bool TakeValues(const MasslessChain& chain, bool of_speeds, InitialDescription* 
     const auto found = is_of(list);
     std::vector<double> own(joint.num_u(), 0.0);
     if (found != list.end()) own = found->values;
-    if (joint.kind == SerialKind::kBall) {
+    if (joint.type == JointType::kSpherical) {
       // of M in F, to the outer body in drawn axes, with velocities in its moved axes
       const auto turn = is_of(initial->coordinates);
       Quaterniond q = Quaterniond::Identity();

@@ -62,15 +62,6 @@ std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const Element& element) 
   return attributes;
 }
 
-Element* FirstWithin(const XmlDocument& document, Element* element,
-                     const std::vector<std::string_view>& tags) {
-  for (Element* child : document.ChildrenOf(element)) {
-    if (std::ranges::find(tags, child->Name()) != tags.end()) return child;
-    if (Element* within = FirstWithin(document, child, tags)) return within;
-  }
-  return nullptr;
-}
-
 }  // namespace
 
 std::string_view xml::Trimmed(std::string_view text) {
@@ -182,8 +173,10 @@ std::vector<XmlElement> XmlElement::InSections(const char* section,
 }
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
-  Element* found = FirstWithin(*document_, element_, tags);
-  return found != nullptr ? std::optional(XmlElement(document_, found)) : std::nullopt;
+  for (Element* one : document_->Within(element_)) {
+    if (std::ranges::find(tags, one->Name()) != tags.end()) return XmlElement(document_, one);
+  }
+  return std::nullopt;
 }
 
 std::optional<XmlElement> XmlElement::Child(const char* tag) const {
@@ -202,10 +195,17 @@ XmlElement XmlElement::RequiredChild(const char* tag) const {
 }
 
 std::optional<XmlValue> XmlElement::Attribute(const std::string& name) const {
-  const tinyxml2::XMLAttribute* attribute = element_->FindAttribute(name.c_str());
-  if (attribute == nullptr) return std::nullopt;
-  document_->read.insert(attribute);
-  return XmlValue(*this, name, attribute->Value());
+  std::optional<XmlValue> found;
+  if (const auto* own = element_->FindAttribute(name.c_str()); own != nullptr) {
+    document_->read.insert(own);
+    found = XmlValue(XmlElement(document_, element_), name, own->Value());
+  }
+  if (name == "name") return found;
+  for (const XmlElement& element : defaults_) {
+    auto value = element.Attribute(name);
+    if (!found) found = std::move(value);
+  }
+  return found;
 }
 
 std::optional<XmlValue> XmlElement::Filled(const std::string& name) const {
@@ -235,12 +235,41 @@ std::optional<XmlValue> XmlElement::Content(const char* tag) const {
 void XmlElement::Ignore() const {
   for (const auto* attribute : AttributesIn(*element_)) document_->read.insert(attribute);
   for (const XmlElement& child : Children()) child.Ignore();
+  for (const XmlElement& element : defaults_) element.Ignore();
 }
 
-Element* xml::Parse(std::string_view text, const std::string& file, XmlDocument* document) {
+XmlElement XmlDocument::root() { return XmlElement(this, files.front().xml.RootElement()); }
+
+std::vector<Element*> XmlDocument::ChildrenOf(Element* element) const {
+  std::vector<Element*> children = xml::ChildrenIn(element);
+  if (included.empty() && added.empty()) return children;
+  std::vector<Element*> all;
+  for (Element* child : children) {
+    const auto found = included.find(child);
+    if (found == included.end()) {
+      all.push_back(child);
+    } else {
+      std::ranges::copy(ChildrenOf(found->second), std::back_inserter(all));
+    }
+  }
+  const auto more = added.find(element);
+  if (more != added.end()) std::ranges::copy(more->second, std::back_inserter(all));
+  return all;
+}
+
+void XmlDocument::AddWithin(Element* element, std::string_view tag,
+                            std::vector<Element*>* found) const {
+  for (Element* child : ChildrenOf(element)) {
+    const bool fits = tag.empty() || child->Name() == tag;
+    if (fits) found->push_back(child);
+    if (!fits || tag.empty()) AddWithin(child, tag, found);
+  }
+}
+
+Element* XmlDocument::Parse(std::string_view text, const std::string& file) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  auto& [xml, name] = document->files.emplace_back();
+  auto& [xml, name] = files.emplace_back();
   name = file;
   xml.SetUserData(&name);
   if (const std::string fault = EncodingFault(text); !fault.empty()) {
@@ -268,20 +297,20 @@ Element* xml::Parse(std::string_view text, const std::string& file, XmlDocument*
   return xml.RootElement();
 }
 
-std::vector<std::pair<XmlElement, std::string>> XmlFile::Unread() const {
+std::vector<std::pair<XmlElement, std::string>> XmlDocument::Unread() {
   std::vector<std::pair<XmlElement, std::string>> parts;
   const std::function<void(Element*)> add = [&](Element* element) {
-    if (!document_->read.contains(element)) {
-      parts.emplace_back(XmlElement(document_, element), "");
+    if (!read.contains(element)) {
+      parts.emplace_back(XmlElement(this, element), "");
       return;
     }
     for (const auto* one : AttributesIn(*element)) {
-      if (document_->read.contains(one)) continue;
-      parts.emplace_back(XmlElement(document_, element), IsText(one->Name()) ? one->Name() : "?");
+      if (read.contains(one)) continue;
+      parts.emplace_back(XmlElement(this, element), IsText(one->Name()) ? one->Name() : "?");
     }
-    for (Element* child : document_->ChildrenOf(element)) add(child);
+    for (Element* child : ChildrenOf(element)) add(child);
   };
-  add(document_->root());
+  add(files.front().xml.RootElement());
   return parts;
 }
 

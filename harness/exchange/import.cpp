@@ -230,6 +230,18 @@ Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions&
   return Import(ReadTextFile(path), path.string(), path, options);
 }
 
+BodyLoads::BodyLoads(const MechanismDescription& d) : joints(d.bodies.size()) {
+  for (const BodyDescription& body : d.bodies) {
+    has_load.push_back(body.mass > 0.0 || !body.inertia.isZero(0.0));
+  }
+  for (int j = 0; j < std::ssize(d.joints); ++j) {
+    for (const auto& side : {d.joints[j].from, d.joints[j].to}) joints[side.body].push_back(j);
+  }
+  for (ForceDescription force : d.forces) {
+    for (const BodyPoint* point : PartsOf(force).points) has_load[point->body] = true;
+  }
+}
+
 std::vector<int> FixedTogether(const MechanismDescription& description) {
   const std::vector<bool> sound(description.bodies.size(), true);
   const auto cluster_of = ClusterFinder(description, sound, true);
@@ -336,26 +348,14 @@ void ImportDraft::FixMasslessEnds() {
   std::set<const void*> noted;
   for (bool found = true; found;) {
     found = false;
-    std::set<int> loaded;
-    for (ForceDescription force : description.forces) {
-      for (const BodyPoint* point : PartsOf(force).points) loaded.insert(point->body);
-    }
-    std::vector<std::vector<int>> joints(description.bodies.size());
-    for (int j = 0; j <= last_joint(); ++j) {
-      for (const auto& side : {description.joints[j].from, description.joints[j].to}) {
-        joints[side.body].push_back(j);
-      }
-    }
+    const BodyLoads loads(description);
     std::vector<Attachment> attachments(description.bodies.size());
-    for (std::size_t i = 1; i < joints.size(); ++i) {
-      const int body = static_cast<int>(i);
-      const bool has_mass =
-          description.bodies[i].mass > 0.0 || !description.bodies[i].inertia.isZero(0.0);
-      if (has_mass || loaded.contains(body) || joints[i].size() != 1) continue;
-      const JointDescription& joint = description.joints[joints[i][0]];
-      const int carrier = joint.from.body == body ? joint.to.body : joint.from.body;
+    for (std::size_t i = 1; i < attachments.size(); ++i) {
+      if (loads.has_load[i] || loads.joints[i].size() != 1) continue;
+      const int joint = loads.joints[i][0],
+                carrier = Beyond(description.joints[joint], static_cast<int>(i));
       if (carrier == kGround || attachments[carrier].attached) continue;
-      if (CouplesOthers(joints[i][0])) continue;
+      if (CouplesOthers(joint)) continue;
       const Placement X = at_rest[carrier].Inverse() * at_rest[i];
       attachments[i] = {carrier, X.AsFrame(), 0.0, true};
       if (noted.insert(elements_[i].id()).second) {

@@ -114,6 +114,17 @@ Eigen::Matrix3d InertiaOf(const Get& get) {
                          get("ixz", false), get("iyz", false));
 }
 
+/// What acts on each body.
+struct BodyLoads {
+  explicit BodyLoads(const MechanismDescription& d);
+
+  std::vector<std::vector<int>> joints;  ///< joints of each body
+  std::vector<bool> has_load;            ///< a mass, an inertia or a force at a point
+};
+/// Returns the body on the other side of a joint.
+inline int Beyond(const JointDescription& joint, int body) {
+  return joint.from.body == body ? joint.to.body : joint.from.body;
+}
 /// Returns, for each body, the first body that is fixed to it; Ground for those fixed to Ground.
 std::vector<int> FixedTogether(const MechanismDescription& description);
 

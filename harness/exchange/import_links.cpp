@@ -59,44 +59,31 @@ Vector3d DirectionOf(const JointDescription& joint) {
 
 /// Returns chains of bodies without mass that have two joints and carry nothing else.
 std::vector<MasslessChain> FindChains(const MechanismDescription& d) {
-  std::vector<std::vector<int>> joints_of(d.bodies.size());
+  const BodyLoads loads(d);
   std::vector<bool> is_link(d.bodies.size(), false), seen = is_link;
   for (std::size_t i = 1; i < is_link.size(); ++i) {
-    const BodyDescription& body = d.bodies[i];
-    is_link[i] = body.mass == 0.0 && body.inertia.isZero(0.0) && body.points.empty();
+    const auto carries_only_force = [&](int joint) {
+      const JointType type = d.joints[joint].type;
+      return type == JointType::kFree || type == JointType::kRod;
+    };
+    is_link[i] = !loads.has_load[i] && d.bodies[i].points.empty() && loads.joints[i].size() == 2 &&
+                 std::ranges::none_of(loads.joints[i], carries_only_force);
   }
-  for (int j = 0; j < std::ssize(d.joints); ++j) {
-    const JointDescription& joint = d.joints[j];
-    for (const int body : {joint.from.body, joint.to.body}) {
-      joints_of[body].push_back(j);
-      if (joint.type == JointType::kFree || joint.type == JointType::kRod) is_link[body] = false;
-    }
-  }
-  for (ForceDescription force : d.forces) {
-    for (const BodyPoint* point : PartsOf(force).points) is_link[point->body] = false;
-  }
-  for (std::size_t i = 1; i < is_link.size(); ++i) {
-    if (joints_of[i].size() != 2) is_link[i] = false;
-  }
-  const auto beyond = [&](int joint, int body) {
-    const JointDescription& one = d.joints[joint];
-    return one.from.body == body ? one.to.body : one.from.body;
-  };
   const auto carries = [&](int body) { return body == kGround || d.bodies[body].mass > 0.0; };
   std::vector<MasslessChain> chains;
   for (int start = 0; start < std::ssize(is_link); ++start) {
     if (is_link[start]) continue;
-    for (const int first : joints_of[start]) {
+    for (const int first : loads.joints[start]) {
       MasslessChain chain;
       chain.parent = start;
-      chain.child = beyond(first, start);
+      chain.child = Beyond(d.joints[first], start);
       chain.joints = {first};
       while (is_link[chain.child] && !seen[chain.child]) {
         seen[chain.child] = true;  // each chain is found once
         chain.between.push_back(chain.child);
-        const std::vector<int>& two = joints_of[chain.child];
+        const std::vector<int>& two = loads.joints[chain.child];
         chain.joints.push_back(two[0] == chain.joints.back() ? two[1] : two[0]);
-        chain.child = beyond(chain.joints.back(), chain.child);
+        chain.child = Beyond(d.joints[chain.joints.back()], chain.child);
       }
       if (chain.between.empty() || chain.parent == chain.child) continue;
       if (!carries(chain.parent) || !carries(chain.child)) continue;
@@ -161,42 +148,46 @@ std::optional<ComposedJoint> ComposeChain(const MasslessChain& chain,
   return Compose({chain.series.begin(), chain.series.end()});
 }
 
-/// Moves the values of joints of a chain out of a list and appends them to `values`, as numbers of
-/// SerialJoint. Joints without values have the value 0. Returns true if some have values.
-bool TakeValues(const MasslessChain& chain, bool of_speeds, InitialDescription* initial,
-                std::vector<double>* values) {
-  auto& list = of_speeds ? initial->speeds : initial->coordinates;
-  const std::size_t count = list.size();
+/// Start of the joints of a chain, as numbers of SerialJoint; 0 where the start has no value.
+struct ChainStart {
+  std::vector<double> q, u;
+  bool has_q = false, has_u = false, is_held = false;
+  double weight = 1.0;
+};
+
+/// Moves the start of the joints of a chain out of the start of a mechanism.
+ChainStart TakeStart(const MasslessChain& chain, InitialDescription* initial) {
+  ChainStart start;
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const ChainJoint& joint = chain.series[k];
-    const auto is_of = [&](const std::vector<JointValues>& all) {
-      return std::ranges::find(all, chain.joints[k], &JointValues::joint);
-    };
-    const auto found = is_of(list);
-    std::vector<double> own(joint.num_u(), 0.0);
-    if (found != list.end()) own = found->values;
+    const auto given =
+        std::ranges::find(initial->coordinates, chain.joints[k], &JointValues::joint);
+    const auto moving = std::ranges::find(initial->speeds, chain.joints[k], &JointValues::joint);
+    std::vector<double> q(joint.num_q(), 0.0), u(joint.num_u(), 0.0);
+    if (joint.type == JointType::kSpherical) q[0] = 1.0;
+    if (moving != initial->speeds.end()) u = moving->values;
+    if (given != initial->coordinates.end()) {
+      q = given->values;
+      start.weight = std::max(start.weight, given->weight);
+    }
     if (joint.type == JointType::kSpherical) {
       // of M in F, to the outer body in drawn axes, with velocities in its moved axes
-      const auto turn = is_of(initial->coordinates);
-      Quaterniond q = Quaterniond::Identity();
-      if (turn != initial->coordinates.end()) {
-        q = Quaterniond(turn->values[0], turn->values[1], turn->values[2], turn->values[3]);
-      }
-      if (of_speeds) {
-        const Vector3d w(own[0], own[1], own[2]);
-        const Vector3d moved = joint.q_CJ * (joint.leads_out ? q.conjugate() * w : Vector3d(-w));
-        own = {moved.x(), moved.y(), moved.z()};
-      } else {
-        q = joint.q_CJ * (joint.leads_out ? q : q.conjugate()) * joint.q_CJ.conjugate();
-        own = {q.w(), q.x(), q.y(), q.z()};
-      }
+      Quaterniond turn(q[0], q[1], q[2], q[3]);
+      Vector3d w(u[0], u[1], u[2]);
+      w = joint.q_CJ * (joint.leads_out ? turn.conjugate() * w : Vector3d(-w));
+      turn = joint.q_CJ * (joint.leads_out ? turn : turn.conjugate()) * joint.q_CJ.conjugate();
+      q = {turn.w(), turn.x(), turn.y(), turn.z()};
+      u = {w.x(), w.y(), w.z()};
     }
-    values->insert(values->end(), own.begin(), own.end());
+    start.q.insert(start.q.end(), q.begin(), q.end());
+    start.u.insert(start.u.end(), u.begin(), u.end());
   }
-  std::erase_if(list, [&](const JointValues& one) {
-    return std::ranges::count(chain.joints, one.joint) > 0;
-  });
-  return list.size() < count;
+  const auto is_of_chain = [&](int joint) { return std::ranges::count(chain.joints, joint) > 0; };
+  const auto has_values = [&](const JointValues& one) { return is_of_chain(one.joint); };
+  start.has_q = std::erase_if(initial->coordinates, has_values) > 0;
+  start.has_u = std::erase_if(initial->speeds, has_values) > 0;
+  start.is_held = std::erase_if(initial->held, is_of_chain) > 0;
+  return start;
 }
 
 // Masses of the remaining links.
@@ -297,27 +288,18 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
   const std::string name =
       names.size() == 1 ? names[0] : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
   InitialDescription& initial = description.initial;
-  std::vector<double> q, u, coordinates, speeds;
-  const bool has_speeds = TakeValues(chain, true, &initial, &u);
-  double weight = 1.0;
-  bool is_cut = false;
-  for (const int part : chain.joints) {
-    const auto guess = std::ranges::find(initial.coordinates, part, &JointValues::joint);
-    if (guess != initial.coordinates.end()) weight = std::max(weight, guess->weight);
-    is_cut = is_cut || description.joints[part].cut;
-  }
-  const bool has_coordinates = TakeValues(chain, false, &initial, &q);
-  const bool is_held = std::erase_if(initial.held, [&](int joint) {
-                         return std::ranges::count(chain.joints, joint) > 0;
-                       }) > 0;
+  const ChainStart start = TakeStart(chain, &initial);
+  const bool is_cut =
+      std::ranges::any_of(chain.joints, [&](int part) { return description.joints[part].cut; });
   const int joint = chain.joints[0];
-  SetComposed({chain.series.begin(), chain.series.end()}, composed, q.data(), u.data(),
+  std::vector<double> coordinates, speeds;
+  SetComposed({chain.series.begin(), chain.series.end()}, composed, start.q.data(), start.u.data(),
               &coordinates, &speeds);
-  if (has_coordinates || composed.type == JointType::kFree) {
-    initial.coordinates.push_back({joint, coordinates, weight});
+  if (start.has_q || composed.type == JointType::kFree) {
+    initial.coordinates.push_back({joint, coordinates, start.weight});
   }
-  if (has_speeds) initial.speeds.push_back({joint, speeds});
-  if (is_held) initial.held.push_back(joint);
+  if (start.has_u) initial.speeds.push_back({joint, speeds});
+  if (start.is_held) initial.held.push_back(joint);
   const Placement X_PC = chain.places[0].Inverse();
   AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child).cut = is_cut;
   std::swap(description.joints[joint], description.joints.back());

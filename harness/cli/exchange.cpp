@@ -61,13 +61,6 @@ struct ViewCommand {
   }
 };
 
-std::string FormatOf(const ViewCommand& command) {
-  if (!command.format.empty()) return command.format;
-  const std::string ending = command.out.extension().string();
-  if (ending == ".svg") return "svg";
-  return ending == ".txt" ? "text" : "html";
-}
-
 void PrintPicture(const Picture& picture, const ExplainView& view) {
   Print("{} ({})\n", picture.name, picture.file);
   if (!picture.freedom.empty()) Print("  degrees of freedom: {}\n", picture.freedom);
@@ -105,7 +98,9 @@ int ViewHere(const ViewCommand& command, const std::string& format, const Explai
 /// Returns 0, or 2 if the start cannot be assembled: the picture then shows the mechanism of the
 /// file with its open loops.
 int View(ViewCommand& command, const Typed&) {
-  const std::string format = FormatOf(command);
+  const std::string ending = command.out.extension().string();
+  std::string format = command.format;
+  if (format.empty()) format = ending == ".svg" ? "svg" : ending == ".txt" ? "text" : "html";
   if (format == "html" && command.svg.view != ViewNames().front()) {
     throw ConfigError("--view is for svg: a page is turned by hand");
   }

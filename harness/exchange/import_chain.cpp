@@ -76,9 +76,15 @@ std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints) {
   if (joints.size() == 1) return ComposedJoint{first.type, Placement(first.position)};
   std::vector<SerialJoint> hinges, slides, balls;
   for (const SerialJoint& joint : joints) {
-    const bool is_simple = joint.type == kSpherical || joint.type == kRevolute;
-    if (!is_simple && joint.type != kPrismatic) return std::nullopt;
-    (joint.type == kRevolute ? hinges : joint.type == kPrismatic ? slides : balls).push_back(joint);
+    if (joint.type == kRevolute) {
+      hinges.push_back(joint);
+    } else if (joint.type == kPrismatic) {
+      slides.push_back(joint);
+    } else if (joint.type == kSpherical) {
+      balls.push_back(joint);
+    } else {
+      return std::nullopt;
+    }
   }
   // a slot, line or plane is on the parent when the slides come first, else on the child
   const bool from_is_child = first.type != kPrismatic;
@@ -188,15 +194,6 @@ void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& co
       (*speeds)[i] += column.angular[k] * w[k] + column.linear[k] * v[k];
     }
   }
-}
-
-JointDescription& ImportDraft::AddComposed(const std::string& name, const ComposedJoint& composed,
-                                           int parent, const Placement& X_PF, int child) {
-  FrameOn F{parent, X_PF}, M{child, composed.X_BJ};
-  if (composed.from_is_child) std::swap(F, M);
-  JointDescription& joint = AddJoint(name, composed.type, F, M);
-  if (composed.keeps_angle) joint.motions.push_back({0, Polynomial{{0.0}}});
-  return joint;
 }
 
 }  // namespace loopbench::harness

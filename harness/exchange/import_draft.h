@@ -114,7 +114,7 @@ Eigen::Matrix3d InertiaOf(const Get& get) {
                          get("ixz", false), get("iyz", false));
 }
 
-/// What acts on each body.
+/// Joints and loads of each body.
 struct BodyLoads {
   explicit BodyLoads(const MechanismDescription& d);
 
@@ -254,9 +254,6 @@ class ImportDraft {
   /// children.
   void AddBall(const XmlElement& element, const std::function<int(const XmlElement&)>& body,
                const std::function<XmlValue(const XmlElement&)>& point);
-  /// Adds the joint of a series between two bodies; X_PF is its frame on the parent.
-  JointDescription& AddComposed(const std::string& name, const ComposedJoint& composed, int parent,
-                                const Placement& X_PF, int child);
   /// Adds a weld of a body, named after it with this ending.
   void Fix(int parent, const Placement& X, int body, const char* ending) {
     const std::string name = description.bodies[body].name + ending;
@@ -337,7 +334,6 @@ class ImportDraft {
  private:
   void NameJoints();
   void HoldFloatingParts();
-  void ReadLateMasses() const;
   /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
   /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);

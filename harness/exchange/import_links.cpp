@@ -192,60 +192,30 @@ ChainStart TakeStart(const MasslessChain& chain, InitialDescription* initial) {
 
 // Masses of the remaining links.
 
-/// Mass and inertia that move equally with both bodies of a joint.
-struct Lump {
-  double mass = 0.0;                  ///< of each point [kg]
-  std::vector<Vector3d> points = {};  ///< [m]
-  Matrix3d inertia = Matrix3d::Zero();
-
-  Lump In(const Placement& X) const {
-    Lump lump{mass, points, X.q * inertia * X.q.conjugate().toRotationMatrix()};
-    for (Vector3d& point : lump.points) point = X.At(point);
-    return lump;
-  }
-};
-
-/// Returns a lump at a joint of this type. `size`: its extent [m].
-Lump LumpAt(const JointDescription& joint, const Vector3d& at, const Vector3d& axis, double mass,
-            double size) {
+/// Returns a lump of mass or inertia that moves equally with both bodies of a joint of this type;
+/// empty if there is none. `size`: its extent [m].
+BodyDescription LumpAt(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
+                       double mass, double size) {
   const Matrix3d all = mass * size * size * Matrix3d::Identity();
+  const Matrix3d across = all - mass * size * size * axis * axis.transpose();
   switch (joint.type) {
-    case JointType::kRevolute:
-      return {mass / 2.0, {at - size * axis, at + size * axis}};
+    case JointType::kRevolute:  // two points on the axis
+      return {"", mass, at, across, {}};
     case JointType::kUniversal:
     case JointType::kSpherical:
-      return {mass, {at}};
+      return {"", mass, at, Matrix3d::Zero(), {}};
     case JointType::kPrismatic:
     case JointType::kTranslation:
-      return {.inertia = all};
+      return {"", 0.0, Vector3d::Zero(), all, {}};
     case JointType::kPlanar:
     case JointType::kCylindrical:
     case JointType::kHelical:
     case JointType::kPinInSlot:
     case JointType::kSchoenflies:  // the bodies rotate relative to each other about the axis
-      return {.inertia = all - mass * size * size * axis * axis.transpose()};
+      return {"", 0.0, Vector3d::Zero(), across, {}};
     default:
       return {};
   }
-}
-
-/// Adds a lump in the axes of a body, or takes it away with `sign` = -1.
-BodyDescription With(const BodyDescription& body, double sign, const Lump& lump) {
-  const auto spread = [](const Vector3d& r) -> Matrix3d {
-    return r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
-  };
-  BodyDescription sum = body;
-  sum.inertia += sign * lump.inertia;
-  if (lump.points.empty()) return sum;
-  sum.mass += sign * lump.mass * static_cast<double>(lump.points.size());
-  sum.com *= body.mass;
-  for (const Vector3d& point : lump.points) sum.com += sign * lump.mass * point;
-  sum.com /= sum.mass;
-  sum.inertia += body.mass * spread(body.com - sum.com);
-  for (const Vector3d& point : lump.points) {
-    sum.inertia += sign * lump.mass * spread(point - sum.com);
-  }
-  return sum;
 }
 
 double RadiusOf(const BodyDescription& body) {
@@ -254,14 +224,15 @@ double RadiusOf(const BodyDescription& body) {
 
 /// Takes a small lump from a body, which keeps most of its smallest moment, and moments of which
 /// none exceeds the sum of the others. Empty if there is none.
-Lump Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
-          BodyDescription* body) {
+BodyDescription Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
+                     BodyDescription* body) {
   const Vector3d moments = SymmetricEigenvalues(body->inertia);
   // small shares, so that many links can be beside one body
   for (double share = 1.0 / 64.0; share > 1e-5; share /= 4.0) {
     for (const double reach : {1.0, 0.25, 1.0 / 16.0}) {
-      const Lump lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));
-      const BodyDescription rest = With(*body, -1.0, lump);
+      const auto lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));
+      BodyDescription rest = *body;
+      AddMass({"", -lump.mass, lump.com, -lump.inertia, {}}, Frame(), &rest);
       const Vector3d left = SymmetricEigenvalues(rest.inertia);
       constexpr double kSlack = 64.0 * std::numeric_limits<double>::epsilon();
       if (!(left[0] > 0.9 * moments[0] && left[2] <= (1.0 + kSlack) * (left[0] + left[1]))) {
@@ -300,8 +271,12 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
   }
   if (start.has_u) initial.speeds.push_back({joint, speeds});
   if (start.is_held) initial.held.push_back(joint);
-  const Placement X_PC = chain.places[0].Inverse();
-  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child).cut = is_cut;
+  FrameOn F{chain.parent, chain.places[0].Inverse() * composed.X_BJ};
+  FrameOn M{chain.child, composed.X_BJ};
+  if (composed.from_is_child) std::swap(F, M);
+  JointDescription& made = AddJoint(name, composed.type, F, M);
+  made.cut = is_cut;
+  if (composed.keeps_angle) made.motions.push_back({0, Polynomial{{0.0}}});
   std::swap(description.joints[joint], description.joints.back());
   description.joints.pop_back();
   for (std::size_t k = 1; k < chain.size(); ++k) {
@@ -324,10 +299,10 @@ void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
       const Placement X_BC = X_CB.Inverse();
       const Vector3d position = X_BC.At(at.position), axis = X_BC.q * at.axis;
       // mass of the ground moves as little there
-      const Lump lump = body == kGround
+      const auto lump = body == kGround
                             ? LumpAt(joint, position, axis, child.mass / 8.0, RadiusOf(child))
                             : Take(joint, position, axis, &bodies[body]);
-      link = With(link, 1.0, lump.In(X_LC * X_CB));
+      AddMass(lump, (X_LC * X_CB).AsFrame(), &link);
     };
     if (i == 0) add(0, chain.parent, chain.places[0]);
     if (i + 1 == chain.between.size()) add(i + 1, chain.child, {});
@@ -336,7 +311,8 @@ void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
     if (!is_whole) {
       const double mass = kSmall * child.mass, radius = RadiusOf(child);
       const Vector3d at = link.mass > 0.0 ? link.com : X_LC.At(chain.series[i + 1].position);
-      link = With(link, 1.0, {mass, {at}, mass * radius * radius * Matrix3d::Identity()});
+      const Matrix3d inertia = mass * radius * radius * Matrix3d::Identity();
+      AddMass({"", mass, at, inertia, {}}, Frame(), &link);
     }
     bodies[chain.between[i]] = link;
     Note(elements_[chain.between[i]],
@@ -361,11 +337,7 @@ void ImportDraft::RejectRepeated(const MasslessChain& chain,
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const int child = k + 1 < chain.size() ? chain.between[k] : chain.child;
     numbers.emplace(child, static_cast<int>(d.bodies.size()));
-    BodyDescription body;
-    body.name = fmt::format("{}", k);
-    body.mass = 1.0;
-    body.inertia.setIdentity();
-    d.bodies.push_back(body);
+    d.bodies.push_back({fmt::format("{}", k), 1.0, Vector3d::Zero(), Matrix3d::Identity(), {}});
     JointDescription joint = description.joints[chain.joints[k]];
     if (determined[chain.joints[k]]) joint.type = JointType::kWeld;
     for (JointSide* side : {&joint.from, &joint.to}) side->body = numbers.at(side->body);

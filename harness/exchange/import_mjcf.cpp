@@ -63,7 +63,7 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
     *value = BoolOr(element.Attribute(name), *value);
   };
   const auto number = [&](const char* name, double* value, const Range& range) {
-    *value = NumberOr(element.Attribute(name), *value, range);
+    *value = element.Number(name, *value, range);
   };
   if (const auto angle = element.Attribute("angle")) {
     settings->degrees = angle->Choice<bool>({{"radian", false}, {"degree", true}});

@@ -80,7 +80,7 @@ struct MjcfJoint : SerialJoint {
 
 /// One copy of the contents of a <replicate>, within a copy of each <replicate> around it.
 struct MjcfReplica {
-  std::size_t replicate = 0;  ///< index into MjcfModel::replicates
+  const void* replicate = nullptr;  ///< identity of its element
   const MjcfReplica* around = nullptr;
   std::string suffix;  ///< of names: its own, then that of the replica around it
 };
@@ -101,7 +101,8 @@ class MjcfModel {
   mutable std::map<std::string, Solid> mesh_solids;  ///< of meshes that have been read
   std::map<std::string, std::size_t> joint_names;
   std::set<int> links;  ///< bodies without mass between joints of one body of MuJoCo
-  std::vector<std::vector<const MjcfReplica*>> replicates;  ///< all copies of each <replicate>
+  std::map<const void*, std::vector<const MjcfReplica*>>
+      replicates;  ///< copies of each <replicate>
 
   /// Returns the next copy of the contents of a <replicate>; nullptr stands for no replica.
   const MjcfReplica* AddReplica(const XmlElement& element, const MjcfReplica* around,
@@ -157,8 +158,7 @@ class MjcfModel {
 
  private:
   std::deque<MjcfReplica> replicas_;
-  std::map<const void*, std::size_t> known_;       ///< replicates by element
-  std::map<std::string, std::size_t> replicated_;  ///< replicates by kind and name
+  std::map<std::string, const void*> replicated_;  ///< replicates by kind and name
   const MjcfReplica* present_ = nullptr;           ///< the replica that is read
   std::size_t num_copies_ = 0;
 };

@@ -345,7 +345,7 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   is_fixed = is_fixed && contents["joint"].empty();
   ReadMasses(contents, body, is_fixed, model);
   ReadSites(contents["site"], body, model);
-  const double lift = NumberOr(element.Attribute("gravcomp"), 0.0);
+  const double lift = element.Number("gravcomp", 0.0);
   if (lift != 0.0 && model->settings.has_passive()) draft->AddLift(body, lift);
   if (BoolOr(element.Attribute("mocap"))) {
     draft->Note(element, "mocap", "stays where the file draws it", true);
@@ -367,7 +367,7 @@ void BoundBelow(double least, Eigen::Matrix3d* inertia) {
 // <replicate>: copies of elements, their names, and the elements that refer to them.
 
 /// Returns the replica itself or the one around it of this <replicate>, if any.
-const MjcfReplica* ReplicaOf(std::size_t replicate, const MjcfReplica* replica) {
+const MjcfReplica* ReplicaOf(const void* replicate, const MjcfReplica* replica) {
   while (replica != nullptr && replica->replicate != replicate) replica = replica->around;
   return replica;
 }
@@ -416,11 +416,9 @@ const MjcfReplica* MjcfModel::AddReplica(const XmlElement& element, const MjcfRe
   std::size_t depth = 1;
   for (const MjcfReplica* outer = around; outer != nullptr; outer = outer->around) ++depth;
   element.RequireFew(depth, 16, "nested <replicate>");
-  const auto [known, is_new] = known_.emplace(element.id(), replicates.size());
-  if (is_new) replicates.emplace_back();
   const std::string outer = around != nullptr ? around->suffix : "";
-  replicas_.push_back({known->second, around, suffix + outer});
-  return replicates[known->second].emplace_back(&replicas_.back());
+  replicas_.push_back({element.id(), around, suffix + outer});
+  return replicates[element.id()].emplace_back(&replicas_.back());
 }
 
 std::string MjcfModel::NameOf(const std::string& kind, const XmlValue& reference) const {

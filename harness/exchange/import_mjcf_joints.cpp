@@ -78,9 +78,8 @@ void AddJoint(MjcfModel* model, const XmlElement& body, int parent, int child,
   const std::string name = joint.name.empty()
                                ? draft->NameLater(draft->description.bodies[child].name)
                                : draft->NewJointName(body, joint.name);
-  const ComposedJoint ours = *Compose({joint});
-  const Placement X_PF = is_free ? Placement() : X_PB * ours.X_BJ;
-  JointDescription& made = draft->AddComposed(name, ours, parent, X_PF, child);
+  const Placement X_BJ(joint.position), X_PF = is_free ? Placement() : X_PB * X_BJ;
+  JointDescription& made = draft->AddJoint(name, joint.type, {parent, X_PF}, {child, X_BJ});
   joint.joint = draft->last_joint();
   if (is_free) {
     const Eigen::Quaterniond& q = X_PB.q;
@@ -151,10 +150,10 @@ void SetServo(const XmlElement& layer, Law* law) {
     law->gain[0] = NumberOr(kp, 1.0, kNotNegative);
     law->bias[1] = -law->gain[0];
     if (kv) law->bias[2] = -kv->Number(kNotNegative);
-    law->inherited_range = NumberOr(layer.Attribute("inheritrange"), 0.0, kNotNegative);
+    law->inherited_range = layer.Number("inheritrange", 0.0, kNotNegative);
     // these need inertias or a state
     for (const char* name : {"dampratio", "timeconst"}) {
-      if (NumberOr(layer.Attribute(name), 0.0) != 0.0) law->is_other = true;
+      if (layer.Number(name, 0.0) != 0.0) law->is_other = true;
     }
   }
   law->dynamics = "none";
@@ -287,16 +286,22 @@ void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int chi
     body.Fail(fmt::format("joints with {} degrees of freedom on one body", freedoms),
               "at most 6, as in MuJoCo");
   }
-  if (joints.empty()) draft->Fix(parent, X_PB, child, " fixed");
   Placement X = X_PB;
-  for (std::size_t i = 0; i < std::max<std::size_t>(joints.size(), 1); ++i) {
-    const bool is_last = i + 1 >= joints.size();
-    const int next = is_last ? child : draft->AddLink(body, child);
-    if (!is_last) model->links.insert(next);
+  const auto place = [&](int next) {
     auto& poses = model->where_springs_are_free;
     poses.resize(draft->at_rest.size());
     poses[next] = poses[parent] * X;
-    if (!joints.empty()) AddJoint(model, body, parent, next, X, std::move(joints[i]));
+  };
+  if (joints.empty()) {
+    draft->Fix(parent, X_PB, child, " fixed");
+    place(child);
+  }
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const bool is_last = i + 1 == joints.size();
+    const int next = is_last ? child : draft->AddLink(body, child);
+    if (!is_last) model->links.insert(next);
+    place(next);
+    AddJoint(model, body, parent, next, X, std::move(joints[i]));
     parent = next;
     X = {};
   }

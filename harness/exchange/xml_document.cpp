@@ -24,11 +24,6 @@ std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '
 /// which would garble messages and cannot be written as JSON.
 bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
 
-[[noreturn]] void FailParsing(const std::string& file, std::ptrdiff_t line, std::string_view found,
-                              std::string_view expected) {
-  throw ConfigError(fmt::format("{}:{}: found {}, expected {}", file, line, found, expected));
-}
-
 /// Limits attributes before parsing, since the parser compares all attributes of an element.
 void RefuseManyAttributes(std::string_view text, const std::string& file) {
   constexpr int kMost = 1000;
@@ -48,7 +43,7 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
       if (quote == '\0' || quote == c) quote = quote == c ? '\0' : c;
     }
     if (count <= kMost) continue;
-    FailParsing(file, 1 + std::ranges::count(text.substr(0, at), '\n'),
+    xml::FailIn(file, 1 + std::ranges::count(text.substr(0, at), '\n'),
                 fmt::format("an element with {} attributes", count),
                 fmt::format("at most {}", kMost));
   }
@@ -63,6 +58,12 @@ std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const Element& element) 
 }
 
 }  // namespace
+
+void xml::FailIn(const std::string& file, std::ptrdiff_t line, std::string_view found,
+                 std::string_view expected) {
+  const std::string place = line == 0 ? file : fmt::format("{}:{}", file, line);
+  throw ConfigError(fmt::format("{}: found {}, expected {}", place, found, expected));
+}
 
 std::string_view xml::Trimmed(std::string_view text) {
   const std::size_t start = text.find_first_not_of(kBlanks);
@@ -278,21 +279,21 @@ Element* XmlDocument::Parse(std::string_view text, const std::string& file) {
   RefuseManyAttributes(text, file);
   const auto error = xml.Parse(text.data(), text.size());
   if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
-    FailParsing(file, xml.ErrorLineNum(),
+    xml::FailIn(file, xml.ErrorLineNum(),
                 fmt::format("more than {} elements within each other", TINYXML2_MAX_ELEMENT_DEPTH),
                 "fewer");
   }
   if (error != tinyxml2::XML_SUCCESS) {
-    FailParsing(file, std::max(1, xml.ErrorLineNum()),
+    xml::FailIn(file, std::max(1, xml.ErrorLineNum()),
                 fmt::format("a fault of syntax ({})", xml.ErrorIDToName(error)), "well-formed XML");
   }
   for (const auto* node = xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
     if (node->ToUnknown() == nullptr) continue;
-    FailParsing(file, node->GetLineNum(), "a document type or declaration of entities",
+    xml::FailIn(file, node->GetLineNum(), "a document type or declaration of entities",
                 "none: they are not read");
   }
   if (xml.RootElement() == nullptr) {
-    FailParsing(file, 1, "no element", "<mujoco>, <robot> or <sdf>");
+    xml::FailIn(file, 1, "no element", "<mujoco>, <robot> or <sdf>");
   }
   return xml.RootElement();
 }

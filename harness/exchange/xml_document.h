@@ -51,6 +51,9 @@ inline Element* OriginalOf(Element* element) {
   return original != nullptr ? static_cast<Element*>(original) : element;
 }
 
+/// Throws ConfigError: FILE:LINE: found ..., expected ...; without the line if it is 0.
+[[noreturn]] void FailIn(const std::string& file, std::ptrdiff_t line, std::string_view found,
+                         std::string_view expected);
 /// Returns "" for files that do not exist.
 inline std::filesystem::path CanonicalOf(const std::filesystem::path& path) {
   std::error_code error;

@@ -30,6 +30,13 @@
 namespace loopbench::harness {
 namespace {
 
+/// Returns the output file; without one, the name of the input with this ending in this folder.
+std::filesystem::path OutOr(const std::filesystem::path& out, const std::filesystem::path& input,
+                            std::string_view ending) {
+  if (!out.empty()) return out;
+  return FileName(input.stem().string()) + std::string(ending);
+}
+
 struct ViewCommand {
   std::filesystem::path mechanism;
   std::string format;         ///< html, svg or text; "" for the ending of `out`, else html
@@ -37,14 +44,22 @@ struct ViewCommand {
   SvgOptions svg;
   bool all = false;  ///< every row of long tables
   ProcessLimits limits = kFileLimits;
-};
 
-std::string FormatOf(const ViewCommand& command) {
-  if (!command.format.empty()) return command.format;
-  const std::string ending = command.out.extension().string();
-  if (ending == ".svg") return "svg";
-  return ending == ".txt" ? "text" : "html";
-}
+  std::vector<Option> Options() {
+    return {
+        MechanismArgument(&mechanism),
+        FormatOption(&format, {"html", "svg", "text"},
+                     "Output format (default: by the ending of --out, else html)"),
+        {"-o,--out", "Output file (default: NAME.html or NAME.svg here; text goes to the terminal)",
+         &out},
+        {"--view", "Viewing direction of a spatial mechanism (SVG)", &svg.view, OneOf(ViewNames())},
+        {"--no-annotations", "SVG of the mechanism alone, without text and unassembled start",
+         &svg.plain},
+        {"--all", "Print all rows of long tables (text)", &all},
+        CpuOption(&limits),
+        MemoryOption(&limits)};
+  }
+};
 
 void PrintPicture(const Picture& picture, const ExplainView& view) {
   Print("{} ({})\n", picture.name, picture.file);
@@ -64,8 +79,7 @@ int ViewHere(const ViewCommand& command, const std::string& format, const Explai
   if (format == "text" && command.out.empty()) {
     PrintPicture(picture, view);
   } else {
-    std::filesystem::path out = command.out;
-    if (out.empty()) out = FileName(command.mechanism.stem().string()) + "." + format;
+    const auto out = OutOr(command.out, command.mechanism, "." + format);
     std::string text;
     if (format == "text") {
       for (const Table& table : ToTables(picture)) text += ToText(table) + "\n";
@@ -83,8 +97,10 @@ int ViewHere(const ViewCommand& command, const std::string& format, const Explai
 
 /// Returns 0, or 2 if the start cannot be assembled: the picture then shows the mechanism of the
 /// file with its open loops.
-int View(const ViewCommand& command) {
-  const std::string format = FormatOf(command);
+int View(ViewCommand& command, const Typed&) {
+  const std::string ending = command.out.extension().string();
+  std::string format = command.format;
+  if (format.empty()) format = ending == ".svg" ? "svg" : ending == ".txt" ? "text" : "html";
   if (format == "html" && command.svg.view != ViewNames().front()) {
     throw ConfigError("--view is for svg: a page is turned by hand");
   }
@@ -93,41 +109,37 @@ int View(const ViewCommand& command) {
                         [&] { return ViewHere(command, format, view); });
 }
 
-}  // namespace
-
-void AddView(Commands& commands) {
-  auto& command = commands.Keep<ViewCommand>();
-  commands.Add(
-      "view", "Draw a mechanism: interactive HTML, SVG or text",
-      [&](const Typed&) { return View(command); },
-      {MechanismArgument(&command.mechanism),
-       FormatOption(&command.format, {"html", "svg", "text"},
-                    "Output format (default: by the ending of --out, else html)"),
-       {"-o,--out", "Output file (default: NAME.html or NAME.svg here; text goes to the terminal)",
-        &command.out},
-       {"--view", "Viewing direction of a spatial mechanism (SVG)", &command.svg.view,
-        OneOf(ViewNames())},
-       {"--no-annotations", "SVG of the mechanism alone, without text and unassembled start",
-        &command.svg.plain},
-       {"--all", "Print all rows of long tables (text)", &command.all},
-       CpuOption(&command.limits),
-       MemoryOption(&command.limits)});
-}
-
-namespace {
-
 struct ImportCommand {
   std::filesystem::path file;
   std::filesystem::path out;  ///< "": the file's name with .json, in the current folder
   ImportOptions options;
+  std::string gravity;  ///< "": the file's
   bool json = false;
   ProcessLimits limits = kFileLimits;
+
+  std::vector<Option> Options() {
+    return {
+        {"file", "Model file (XML)", &file, kRequired},
+        {"-o,--out", "Mechanism file (default: NAME.json here)", &out},
+        {"--input-format", "Expected input format", &options.format, OneOf(ImportFormats())},
+        {"--loops", "Sidecar file (JSON): loops, joints, forces, initial, gravity, known_solution",
+         &options.sidecar},
+        {"--planar", "Import as a planar mechanism; an error if it is spatial", &options.planar},
+        {"--floating", "Free root link instead of a fixed one (URDF)", &options.floats},
+        {"--keep-digits", "Keep rounded angles and directions (1.5708) as written",
+         &options.keeps_digits},
+        {"--balance-inertia", "Replace moments of inertia that no body has by their mean",
+         &options.balances_inertia},
+        {"--gravity", "Gravity x,y,z [m/s^2] instead of the file's", &gravity},
+        {"--json", "One JSON document instead (docs/exchange.md has its keys)", &json},
+        CpuOption(&limits),
+        MemoryOption(&limits)};
+  }
 };
 
 /// Returns the output file, which is never an input file.
 std::filesystem::path OutOf(const ImportCommand& command) {
-  std::filesystem::path out = command.out;
-  if (out.empty()) out = FileName(command.file.stem().string()) + ".json";
+  std::filesystem::path out = OutOr(command.out, command.file, ".json");
   std::error_code none;
   for (const std::filesystem::path& read : {command.file, command.options.sidecar}) {
     if (!read.empty() && std::filesystem::equivalent(out, read, none)) {
@@ -143,23 +155,13 @@ JsonObject Document(const Imported& imported, const ImportCommand& command,
   const MechanismDescription& description = imported.description;
   std::vector<JsonObject> notes;
   for (const ImportNote& note : imported.notes) {
-    JsonObject& one = notes.emplace_back();
-    one.Add("file", note.file).Add("line", std::int64_t{note.line});
-    one.Add("element", note.element);
-    one.Add("reason", note.reason);
-    one.Add("changes_motion", note.changes_motion);
+    notes.push_back(JsonOf("file", note.file, "line", note.line, "element", note.element, "reason",
+                           note.reason, "changes_motion", note.changes_motion));
   }
-  JsonObject document;
-  document.Add("file", command.file.string());
-  document.Add("format", imported.format);
-  document.Add("mechanism", out.string());
-  document.Add("name", description.name);
-  document.Add("space", std::string(ToString(description.space)));
-  document.Add("bodies", Count(description.bodies.size() - 1));
-  document.Add("joints", Count(description.joints.size()));
-  document.Add("forces", Count(description.forces.size()));
-  document.Add("notes", notes);
-  return document;
+  return JsonOf("file", command.file.string(), "format", imported.format, "mechanism", out.string(),
+                "name", description.name, "space", description.space, "bodies",
+                description.bodies.size() - 1, "joints", description.joints.size(), "forces",
+                description.forces.size(), "notes", notes);
 }
 
 /// Writes the mechanism and prints the parts of the file that it lacks.
@@ -170,10 +172,7 @@ int ImportHere(const ImportCommand& command) {
   const std::string comment =
       fmt::format("Imported from {} ({}).", command.file.filename().string(), imported.format);
   WriteFileAtomically(out, MechanismText(description, imported.observe, comment));
-  if (command.json) {
-    PrintText(Document(imported, command, out).Text() + "\n");
-    return 0;
-  }
+  if (command.json) return PrintJson(Document(imported, command, out));
   for (const ImportNote& note : imported.notes) {
     Print("{}:{}: {}: {}{}\n", note.file, note.line, note.element, note.reason,
           note.changes_motion ? " [changes the motion]" : "");
@@ -202,37 +201,18 @@ Eigen::Vector3d ParseGravity(const std::string& text) {
   return gravity;
 }
 
-}  // namespace
-
-void AddImport(Commands& commands) {
-  auto& command = commands.Keep<ImportCommand>();
-  auto& gravity = commands.Keep<std::string>();
-  ImportOptions& options = command.options;
-  commands.Add(
-      "import", "Read a mechanism of MuJoCo (MJCF), URDF or SDF",
-      [&](const Typed&) {
-        if (!gravity.empty()) command.options.gravity = ParseGravity(gravity);
-        return PrintFromChild(command.file.string(), command.limits,
-                              [&] { return ImportHere(command); });
-      },
-      {{"file", "Model file (XML)", &command.file, kRequired},
-       {"-o,--out", "Mechanism file (default: NAME.json here)", &command.out},
-       {"--input-format", "Expected input format", &options.format, OneOf(ImportFormats())},
-       {"--loops", "Sidecar file (JSON): loops, joints, forces, initial, gravity, known_solution",
-        &options.sidecar},
-       {"--planar", "Import as a planar mechanism; an error if it is spatial", &options.planar},
-       {"--floating", "Free root link instead of a fixed one (URDF)", &options.floats},
-       {"--keep-digits", "Keep rounded angles and directions (1.5708) as written",
-        &options.keeps_digits},
-       {"--balance-inertia", "Replace moments of inertia that no body has by their mean",
-        &options.balances_inertia},
-       {"--gravity", "Gravity x,y,z [m/s^2] instead of the file's", &gravity},
-       {"--json", "One JSON document instead (docs/exchange.md has its keys)", &command.json},
-       CpuOption(&command.limits),
-       MemoryOption(&command.limits)});
+int Import(ImportCommand& command, const Typed&) {
+  if (!command.gravity.empty()) command.options.gravity = ParseGravity(command.gravity);
+  return PrintFromChild(command.file.string(), command.limits, [&] { return ImportHere(command); });
 }
 
-namespace {
+std::vector<std::string> ExportFormatNames() {
+  std::vector<std::string> names;
+  for (const exchange::ExportFormat& format : exchange::ExportFormats()) {
+    names.emplace_back(format.name);
+  }
+  return names;
+}
 
 struct ConvertCommand {
   std::filesystem::path mechanism;
@@ -241,49 +221,49 @@ struct ConvertCommand {
   exchange::ExportOptions options;
   bool json = false;
   ProcessLimits limits = kFileLimits;
-};
 
-const exchange::ExportFormat& FormatNamed(const std::string& name) {
-  return *std::ranges::find(exchange::ExportFormats(), name, &exchange::ExportFormat::name);
-}
+  std::vector<Option> Options() {
+    return {MechanismArgument(&mechanism),
+            {"--to", "mjcf: MuJoCo model; simbody: C++17 program", &to, kRequired,
+             OneOf(ExportFormatNames())},
+            {"-o,--out", "Output file (default: NAME.xml or NAME.cpp here)", &out},
+            {"--step", "MuJoCo's step [s]; loop constraints are as stiff as it permits (mjcf)",
+             &options.time_step, From(1e-12, 1e3)},
+            JsonOption(&json),
+            CpuOption(&limits),
+            MemoryOption(&limits)};
+  }
+};
 
 /// Prints the document; `out` is empty if no file is written.
 void PrintDocument(const ConvertCommand& command, const std::string& name,
                    const std::filesystem::path& out, const std::vector<std::string>& missing,
                    const std::vector<exchange::Note>& notes) {
-  std::vector<JsonObject> said;
+  std::vector<JsonObject> rows;
   for (const exchange::Note& note : notes) {
-    said.emplace_back().Add("loss", note.loss).Add("text", note.text);
+    rows.push_back(JsonOf("loss", note.loss, "text", note.text));
   }
-  JsonObject document;
-  document.Add("file", command.mechanism.string()).Add("name", name).Add("to", command.to);
+  JsonObject document = JsonOf("file", command.mechanism.string(), "name", name, "to", command.to);
   if (!out.empty()) document.Add("out", out.string());
-  PrintText(document.Add("missing", missing).Add("notes", said).Text() + "\n");
-}
-
-int Refuse(const ConvertCommand& command, const std::string& name,
-           const std::vector<std::string>& missing) {
-  PrintError("{}: found what {} does not have, so nothing is written:\n",
-             command.mechanism.string(), command.to);
-  for (const std::string& part : missing) PrintError("  {}\n", part);
-  if (command.json) PrintDocument(command, name, {}, missing, {});
-  return 2;
+  PrintJson(Put(document, "missing", missing, "notes", rows));
 }
 
 /// Returns 0. If the format cannot represent parts of the mechanism, prints them, writes nothing
 /// and returns 2.
 int ConvertHere(const ConvertCommand& command) {
-  const exchange::ExportFormat& format = FormatNamed(command.to);
+  const exchange::ExportFormat& format =
+      *std::ranges::find(exchange::ExportFormats(), command.to, &exchange::ExportFormat::name);
   const MechanismDescription mechanism = ReadMechanism(command.mechanism).description;
-  std::filesystem::path out = command.out;
-  if (out.empty()) {
-    out = FileName(command.mechanism.stem().string()) + std::string(format.ending);
-  }
+  const auto out = OutOr(command.out, command.mechanism, format.ending);
   exchange::ExportedFile file;
   try {
-    file = exchange::Export(mechanism, format, command.options);
+    file = format.write(mechanism, command.options);
   } catch (const exchange::Unsupported& missing) {
-    return Refuse(command, mechanism.name, missing.parts());
+    PrintError("{}: found what {} does not have, so nothing is written:\n",
+               command.mechanism.string(), command.to);
+    for (const std::string& part : missing.parts()) PrintError("  {}\n", part);
+    if (command.json) PrintDocument(command, mechanism.name, {}, missing.parts(), {});
+    return 2;
   } catch (const std::runtime_error& error) {
     throw ConfigError(command.mechanism.string() + ": " + error.what());
   }
@@ -300,35 +280,10 @@ int ConvertHere(const ConvertCommand& command) {
   return 0;
 }
 
-std::vector<std::string> ExportFormatNames() {
-  std::vector<std::string> names;
-  for (const exchange::ExportFormat& format : exchange::ExportFormats()) {
-    names.emplace_back(format.name);
-  }
-  return names;
+int Convert(ConvertCommand& command, const Typed&) {
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return ConvertHere(command); });
 }
-
-}  // namespace
-
-void AddConvert(Commands& commands) {
-  auto& command = commands.Keep<ConvertCommand>();
-  commands.Add("export-mechanism", "Write a mechanism for MuJoCo or Simbody",
-               [&](const Typed&) {
-                 return PrintFromChild(command.mechanism.string(), command.limits,
-                                       [&] { return ConvertHere(command); });
-               },
-               {MechanismArgument(&command.mechanism),
-                {"--to", "mjcf: MuJoCo model; simbody: C++17 program", &command.to, kRequired,
-                 OneOf(ExportFormatNames())},
-                {"-o,--out", "Output file (default: NAME.xml or NAME.cpp here)", &command.out},
-                {"--step", "MuJoCo's step [s]; loop constraints are as stiff as it permits (mjcf)",
-                 &command.options.time_step, From(1e-12, 1e3)},
-                JsonOption(&command.json),
-                CpuOption(&command.limits),
-                MemoryOption(&command.limits)});
-}
-
-namespace {
 
 struct GenerateCommand {
   std::filesystem::path mechanism, out;
@@ -339,6 +294,25 @@ struct GenerateCommand {
   double step = 0.0;      ///< step of the example and of co-simulation [s]; 0: from the motion
   bool json = false;
   ProcessLimits limits = kFileLimits;
+
+  std::vector<Option> Options() {
+    return {MechanismArgument(&mechanism),
+            {"-o,--out", "Folder of the C files", &out, kRequired},
+            {"--fmu", "File for an FMU (FMI 2.0) of the same code", &fmu},
+            {"--formulation", "Formulation", &formulation, OneOf(FormulationNamesWithoutPeers())},
+            {"--enforcement", "Level of enforcement", &level, OneOf({"acceleration", "velocity"})},
+            {"--coordinates", "Coordinate set", &coordinates, OneOf({"joint", "absolute"})},
+            {"--solver", "Solver", &solver, OneOf({"plain", "rank-revealing"})},
+            {"--horizon", "Duration of the motion whose branches are generated [s]", &horizon,
+             From(0.0, 1e6)},
+            {"--step",
+             "Step of the example and of co-simulation [s] (default: a quarter of the median step "
+             "of ode45 at 1e-6, at most 1e-3)",
+             &step, From(1e-9, 1e3)},
+            JsonOption(&json),
+            CpuOption(&limits),
+            MemoryOption(&limits)};
+  }
 };
 
 // integrator of the motion along which branches are recorded
@@ -437,35 +411,24 @@ int GenerateHere(const GenerateCommand& command) {
     WriteFileAtomically(command.out / part.name, part.text);
   }
   if (!fmu.empty()) WriteFileAtomically(command.fmu, fmu);
-  std::vector<JsonObject> functions;
-  for (const exchange::CodeFunction& function : code.functions) {
-    functions.emplace_back()
-        .Add("name", function.name)
-        .Add("flops", function.operations)
-        .Add("branches", std::int64_t{function.branches})
-        .Add("states_missed", static_cast<std::int64_t>(function.missed));
-  }
   if (command.json) {
-    JsonObject document;
-    document.Add("file", command.mechanism.string())
-        .Add("out", command.out.string())
-        .Add("identifier", code.identifier)
-        .Add("states", static_cast<std::int64_t>(code.state_names.size()))
-        .Add("t_reached", motion.t_reached)
-        .Add("functions", functions);
-    PrintText(document.Text() + "\n");
-    return 0;
+    std::vector<JsonObject> functions;
+    for (const exchange::CodeFunction& function : code.functions) {
+      functions.push_back(JsonOf("name", function.name, "flops", function.operations, "branches",
+                                 function.branches, "states_missed", function.missed));
+    }
+    return PrintJson(JsonOf("file", command.mechanism.string(), "out", command.out.string(),
+                            "identifier", code.identifier, "states", code.state_names.size(),
+                            "t_reached", motion.t_reached, "functions", functions));
   }
   Print("wrote {0}.h, {0}.c, {0}_example.c and CMakeLists.txt to {1}{2}\n", code.identifier,
         command.out.string(), fmu.empty() ? "" : ", and " + command.fmu.string());
-  Print("{} states; weighted operations (branches): ", code.state_names.size());
-  bool is_first = true;
+  std::vector<std::string> counts;
   for (const exchange::CodeFunction& function : code.functions) {
-    Print("{}{} {} ({})", is_first ? "" : ", ", function.name, function.operations,
-          function.branches);
-    is_first = false;
+    AddNote(counts, "{} {} ({})", function.name, function.operations, function.branches);
   }
-  Print("\n");
+  Print("{} states; weighted operations (branches): {}\n", code.state_names.size(),
+        fmt::join(counts, ", "));
   if (motion.outcome != Outcome::kFinished) {
     Print(
         "warning: the motion ended as {} at t = {:.6g} s of {:.6g} s; branches behind that are "
@@ -480,34 +443,24 @@ int GenerateHere(const GenerateCommand& command) {
   return 0;
 }
 
+int Generate(GenerateCommand& command, const Typed&) {
+  return PrintFromChild(command.mechanism.string(), command.limits,
+                        [&] { return GenerateHere(command); });
+}
+
 }  // namespace
 
+void AddView(Commands& commands) {
+  commands.Add("view", "Draw a mechanism: interactive HTML, SVG or text", View);
+}
+void AddImport(Commands& commands) {
+  commands.Add("import", "Read a mechanism of MuJoCo (MJCF), URDF or SDF", Import);
+}
+void AddConvert(Commands& commands) {
+  commands.Add("export-mechanism", "Write a mechanism for MuJoCo or Simbody", Convert);
+}
 void AddGenerate(Commands& commands) {
-  auto& command = commands.Keep<GenerateCommand>();
-  commands.Add(
-      "generate", "Write a mechanism's equations of motion as C99 or FMU",
-      [&](const Typed&) {
-        return PrintFromChild(command.mechanism.string(), command.limits,
-                              [&] { return GenerateHere(command); });
-      },
-      {MechanismArgument(&command.mechanism),
-       {"-o,--out", "Folder of the C files", &command.out, kRequired},
-       {"--fmu", "File for an FMU (FMI 2.0) of the same code", &command.fmu},
-       {"--formulation", "Formulation", &command.formulation,
-        OneOf(FormulationNamesWithoutPeers())},
-       {"--enforcement", "Level of enforcement", &command.level,
-        OneOf({"acceleration", "velocity"})},
-       {"--coordinates", "Coordinate set", &command.coordinates, OneOf({"joint", "absolute"})},
-       {"--solver", "Solver", &command.solver, OneOf({"plain", "rank-revealing"})},
-       {"--horizon", "Duration of the motion whose branches are generated [s]", &command.horizon,
-        From(0.0, 1e6)},
-       {"--step",
-        "Step of the example and of co-simulation [s] (default: a quarter of the median step of "
-        "ode45 at 1e-6, at most 1e-3)",
-        &command.step, From(1e-9, 1e3)},
-       JsonOption(&command.json),
-       CpuOption(&command.limits),
-       MemoryOption(&command.limits)});
+  commands.Add("generate", "Write a mechanism's equations of motion as C99 or FMU", Generate);
 }
 
 }  // namespace loopbench::harness

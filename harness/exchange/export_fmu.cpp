@@ -2,7 +2,6 @@
 
 #include <boost/crc.hpp>
 #include <cstdint>
-#include <sstream>
 
 #include "harness/exchange/export_c.h"
 #include "harness/exchange/export_names.h"
@@ -16,50 +15,9 @@ namespace {
 
 using fmt::format;
 
-// A line "%NAME(PARAMETERS) {" begins a function of a component c that returns a status;
-// "%NAME(PARAMETERS) = RESULT" is a whole function.
-constexpr const char* kShortFunctions =
+constexpr const char* kFunctions =
 #include "harness/exchange/export_fmu.inc"
     ;
-
-/// Returns all functions in full, in lines of 100 letters. What a result does not use is (void).
-std::string Functions() {
-  std::istringstream lines(kShortFunctions);
-  std::string text, line, more;
-  while (std::getline(lines, line)) {
-    if (!line.starts_with('%')) {
-      text += line + "\n";
-      continue;
-    }
-    for (; line.ends_with(',') || line.ends_with('='); line += more.substr(3)) {
-      std::getline(lines, more);
-    }
-    const std::size_t open = line.find('('), close = line.find(')');
-    const std::string parameters = "fmi2Component c" + std::string(open + 1 < close ? ", " : "") +
-                                   line.substr(open + 1, close - open - 1);
-    std::string head =
-        format("EXPORT fmi2Status FMI2({})({}) {{", line.substr(1, open - 1), parameters);
-    const std::string indent(head.find(")(") + 2, ' ');
-    for (std::size_t end; head.size() > 100; head = indent + head.substr(end + 1)) {
-      end = head.rfind(", ", 99) + 1;
-      text += head.substr(0, end) + "\n";
-    }
-    text += head + "\n";
-    if (line.ends_with('{')) continue;
-    std::string result = line.substr(close + 4), unused;
-    const std::size_t fails = result.find("fail(");
-    std::istringstream each(parameters);
-    for (std::string one; std::getline(each, one, ',');) {
-      const std::string name = one.substr(one.find_last_of(" *") + 1);
-      if (name == "c" ? fails != std::string::npos : result.starts_with(name + " ")) continue;
-      unused += (unused.empty() ? "  (void)" : ", (void)") + name.substr(0, name.find('['));
-    }
-    if (!unused.empty()) text += unused + ";\n";
-    if (fails != std::string::npos) result.insert(fails + 5, "(const Model*)c, ");
-    text += "  return " + result + ";\n}\n";
-  }
-  return text;
-}
 
 /// A zip archive with uncompressed files (APPNOTE.TXT of PKWARE, sections 4.3.7, 4.3.12 and
 /// 4.3.16). Dates are 1 January 1980, so that equal contents give equal bytes.
@@ -222,11 +180,11 @@ std::string MakeFmu(const Code& code, const std::string& model_name, double step
   words["STEP"] = NumberText(step);
   const CodeFile* header = &code.files[0];
   const CodeFile* source = &code.files[1];
-  const std::string all = Fill(Functions(), words) + header->text + source->text +
+  const std::string all = Fill(kFunctions, words) + header->text + source->text +
                           Description(code, model_name, "", step);
   const std::string guid = harness::Fnv1a(all) + harness::Fnv1a(harness::Fnv1a(all) + all);
   words["GUID"] = guid;
-  const std::string functions = Fill(Functions(), words);
+  const std::string functions = Fill(kFunctions, words);
   const std::string fmi = format("fmi2_{}.c", code.identifier);
   const harness::TemporaryFolder folder("loopbench-fmu");
   harness::WriteFileAtomically(folder.path() / header->name, header->text);

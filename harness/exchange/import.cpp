@@ -21,7 +21,7 @@ namespace {
 /// Reads a text. `path`: its file, beside which others may be; nothing without one.
 Imported Import(std::string_view text, const std::string& file,
                 const std::optional<std::filesystem::path>& path, const ImportOptions& options) {
-  XmlFile xml(text, file, path);
+  XmlDocument xml(text, file, path);
   const XmlElement root = xml.root();
   const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
                                                : tag == "robot" ? "urdf"
@@ -82,40 +82,34 @@ struct Cluster {
   int carrier = -1;  ///< -1 if no body has a mass
 };
 
-/// Returns a function of the root. Bodies with valid mass properties (`sound`) end a cluster and
-/// carry it, unless `whole` includes all parts fixed together.
-std::function<Cluster(int)> ClusterFinder(const MechanismDescription& d,
-                                          const std::vector<bool>& sound, bool whole) {
-  std::vector<std::vector<const JointDescription*>> welds(d.bodies.size());
-  for (const JointDescription& joint : d.joints) {
-    if (joint.type != JointType::kWeld) continue;
-    for (const int body : {joint.from.body, joint.to.body}) welds[body].push_back(&joint);
-  }
-  return [&d, &sound, whole, welds](int root) {
-    Cluster cluster;
-    int best = 0;
-    const auto add = [&](int body, const Frame& X) {
-      cluster.poses[body] = X;
-      const bool ends = body == kGround || (sound[body] && !whole);
-      if (!ends || body == root) cluster.members.push_back(body);
-      const int rank = body == kGround ? 3 : sound[body] ? 2 : d.bodies[body].mass > 0.0 ? 1 : 0;
-      if (rank <= best) return;
-      best = rank;
-      cluster.carrier = body;
-    };
-    add(root, Frame());
-    for (std::size_t k = 0; k < cluster.members.size(); ++k) {
-      const int at = cluster.members[k];
-      for (const JointDescription* weld : welds[at]) {
-        for (const auto& [here, there] :
-             {std::pair{&weld->from, &weld->to}, {&weld->to, &weld->from}}) {
-          if (here->body != at || cluster.poses.contains(there->body)) continue;
-          add(there->body, cluster.poses[at] * PoseOf(*here) * PoseOf(*there).Inverse());
-        }
+/// Returns the cluster of a body. Bodies with valid mass properties (`sound`) end it and carry it,
+/// unless `whole` includes all parts fixed together.
+Cluster ClusterOf(const MechanismDescription& d, const BodyLoads& loads,
+                  const std::vector<bool>& sound, bool whole, int root) {
+  Cluster cluster;
+  int best = 0;
+  const auto add = [&](int body, const Frame& X) {
+    cluster.poses[body] = X;
+    const bool ends = body == kGround || (sound[body] && !whole);
+    if (!ends || body == root) cluster.members.push_back(body);
+    const int rank = body == kGround ? 3 : sound[body] ? 2 : d.bodies[body].mass > 0.0 ? 1 : 0;
+    if (rank <= best) return;
+    best = rank;
+    cluster.carrier = body;
+  };
+  add(root, Frame());
+  for (std::size_t k = 0; k < cluster.members.size(); ++k) {
+    const int at = cluster.members[k];
+    for (const int joint : loads.joints[at]) {
+      const JointDescription& weld = d.joints[joint];
+      if (weld.type != JointType::kWeld) continue;
+      for (const auto& [here, there] : {std::pair{&weld.from, &weld.to}, {&weld.to, &weld.from}}) {
+        if (here->body != at || cluster.poses.contains(there->body)) continue;
+        add(there->body, cluster.poses[at] * PoseOf(*here) * PoseOf(*there).Inverse());
       }
     }
-    return cluster;
-  };
+  }
+  return cluster;
 }
 
 // Sidecar: loops, forces and a start that the other format cannot express, with the keys of
@@ -230,23 +224,27 @@ Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions&
   return Import(ReadTextFile(path), path.string(), path, options);
 }
 
+BodyLoads::BodyLoads(const MechanismDescription& d) : joints(d.bodies.size()) {
+  for (const BodyDescription& body : d.bodies) {
+    has_load.push_back(body.mass > 0.0 || !body.inertia.isZero(0.0));
+  }
+  for (int j = 0; j < std::ssize(d.joints); ++j) {
+    for (const auto& side : {d.joints[j].from, d.joints[j].to}) joints[side.body].push_back(j);
+  }
+  for (ForceDescription force : d.forces) {
+    for (const BodyPoint* point : PartsOf(force).points) has_load[point->body] = true;
+  }
+}
+
 std::vector<int> FixedTogether(const MechanismDescription& description) {
   const std::vector<bool> sound(description.bodies.size(), true);
-  const auto cluster_of = ClusterFinder(description, sound, true);
+  const BodyLoads loads(description);
   std::vector<int> groups(sound.size(), -1);
   for (int i = 0; i < std::ssize(groups); ++i) {
     if (groups[i] >= 0) continue;
-    for (const int body : cluster_of(i).members) groups[body] = i;
+    for (const int body : ClusterOf(description, loads, sound, true, i).members) groups[body] = i;
   }
   return groups;
-}
-
-void ImportDraft::ReadLateMasses() const {
-  if (late_masses_.empty()) return;
-  const std::vector<int> groups = FixedTogether(description);
-  for (const auto& [body, read] : late_masses_) {
-    if (groups[body] != kGround) read();
-  }
 }
 
 void ImportDraft::MergeFixed(bool whole) {
@@ -256,10 +254,10 @@ void ImportDraft::MergeFixed(bool whole) {
     sound[i] = i == kGround || MassFaultOf(description.bodies[i]).first.empty();
   }
   std::vector<Attachment> attachments(count);
-  const auto cluster_of = ClusterFinder(description, sound, whole);
+  const BodyLoads loads(description);
   for (int i = 1; i < std::ssize(sound); ++i) {
     if (sound[i] || seen[i]) continue;
-    Cluster cluster = cluster_of(i);
+    Cluster cluster = ClusterOf(description, loads, sound, whole, i);
     if (cluster.carrier < 0) cluster.carrier = i;  // a link without mass of several parts
     for (const int body : cluster.members) {
       seen[body] = true;
@@ -336,26 +334,14 @@ void ImportDraft::FixMasslessEnds() {
   std::set<const void*> noted;
   for (bool found = true; found;) {
     found = false;
-    std::set<int> loaded;
-    for (ForceDescription force : description.forces) {
-      for (const BodyPoint* point : PartsOf(force).points) loaded.insert(point->body);
-    }
-    std::vector<std::vector<int>> joints(description.bodies.size());
-    for (int j = 0; j <= last_joint(); ++j) {
-      for (const auto& side : {description.joints[j].from, description.joints[j].to}) {
-        joints[side.body].push_back(j);
-      }
-    }
+    const BodyLoads loads(description);
     std::vector<Attachment> attachments(description.bodies.size());
-    for (std::size_t i = 1; i < joints.size(); ++i) {
-      const int body = static_cast<int>(i);
-      const bool has_mass =
-          description.bodies[i].mass > 0.0 || !description.bodies[i].inertia.isZero(0.0);
-      if (has_mass || loaded.contains(body) || joints[i].size() != 1) continue;
-      const JointDescription& joint = description.joints[joints[i][0]];
-      const int carrier = joint.from.body == body ? joint.to.body : joint.from.body;
+    for (std::size_t i = 1; i < attachments.size(); ++i) {
+      if (loads.has_load[i] || loads.joints[i].size() != 1) continue;
+      const int joint = loads.joints[i][0],
+                carrier = Beyond(description.joints[joint], static_cast<int>(i));
       if (carrier == kGround || attachments[carrier].attached) continue;
-      if (CouplesOthers(joints[i][0])) continue;
+      if (CouplesOthers(joint)) continue;
       const Placement X = at_rest[carrier].Inverse() * at_rest[i];
       attachments[i] = {carrier, X.AsFrame(), 0.0, true};
       if (noted.insert(elements_[i].id()).second) {
@@ -416,7 +402,10 @@ Imported ImportDraft::Finish(const std::string& format) {
                                         -description.gravity.z()));
   }
   if (options_.gravity) description.gravity = *options_.gravity;
-  ReadLateMasses();
+  const std::vector<int> groups = FixedTogether(description);
+  for (const auto& [body, read] : late_masses_) {
+    if (groups[body] != kGround) read();
+  }
   for (const auto& [body, share] : lifts_) {
     const BodyDescription& lifted = description.bodies[body];
     if (!(lifted.mass > 0.0) || description.gravity.isZero(0.0)) continue;

@@ -68,116 +68,72 @@ bool Independent(const std::vector<SerialJoint>& joints) {
   return std::abs(axes.determinant()) > kAligned;
 }
 
-// Conversion of coordinates and speeds.
-
-/// Motion of a chain of joints at its coordinates, in drawn body axes.
-struct ChainMotion {
-  Placement X;                    ///< the product of their motions
-  Vector3d w = Vector3d::Zero();  ///< angular velocity
-  Vector3d v = Vector3d::Zero();  ///< velocity of the point `at` in the moved body
-};
-
-ChainMotion Move(const std::vector<SerialJoint>& series, const ComposedJoint& composed,
-                 const double* q, const double* u) {
-  std::vector<Placement> before;
-  ChainMotion motion;
-  const double* position = q;
-  for (const SerialJoint& joint : series) {
-    before.push_back(motion.X);
-    motion.X = motion.X * MotionOf(joint, position);
-    position += joint.num_q();
-  }
-  const Vector3d Mo = motion.X.At(composed.X_BJ.p);
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    const SerialJoint& joint = series[i];
-    const Placement& after = i + 1 < before.size() ? before[i + 1] : motion.X;
-    if (joint.kind == SerialKind::kSlide) {
-      motion.v += before[i].q * joint.axis * u[0];
-    } else {
-      const Vector3d w = joint.kind == SerialKind::kBall ? after.q * Vector3d(u[0], u[1], u[2])
-                                                         : before[i].q * joint.axis * u[0];
-      motion.w += w;
-      motion.v += w.cross(Mo - before[i].At(joint.position));
-    }
-    u += joint.num_u();
-  }
-  return motion;
-}
-
 }  // namespace
 
 std::optional<ComposedJoint> Compose(const std::vector<SerialJoint>& joints) {
   using enum JointType;
   const SerialJoint& first = joints.front();
-  if (joints.size() == 1) {
-    return ComposedJoint{kSerialTypes[static_cast<int>(first.kind)], Placement(first.position)};
-  }
+  if (joints.size() == 1) return ComposedJoint{first.type, Placement(first.position)};
   std::vector<SerialJoint> hinges, slides, balls;
   for (const SerialJoint& joint : joints) {
-    if (joint.kind == SerialKind::kFree) return std::nullopt;
-    const bool turns = joint.kind == SerialKind::kHinge, slips = joint.kind == SerialKind::kSlide;
-    (turns ? hinges : slips ? slides : balls).push_back(joint);
+    if (joint.type == kRevolute) {
+      hinges.push_back(joint);
+    } else if (joint.type == kPrismatic) {
+      slides.push_back(joint);
+    } else if (joint.type == kSpherical) {
+      balls.push_back(joint);
+    } else {
+      return std::nullopt;
+    }
   }
-  const bool is_pair = joints.size() == 2;
   // a slot, line or plane is on the parent when the slides come first, else on the child
-  const bool from_is_child = first.kind != SerialKind::kSlide;
-  if (is_pair && hinges.size() == 2) {
-    const Vector3d &a = hinges[0].axis, &b = hinges[1].axis;
-    const auto point = Perpendicular(a, b) ? MeetingPoint(hinges) : std::nullopt;
-    // about x of F, then about y of M
-    if (point) return ComposedJoint{kUniversal, {Axes(a, a.cross(b)), *point}};
-  }
-  if (is_pair && slides.size() == 2) {
-    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
-    if (Parallel(a, b)) return std::nullopt;
-    return ComposedJoint{kPlanar, {Axes(a, a.cross(b)), Vector3d::Zero()}, false, true};
-  }
-  if (is_pair && hinges.size() == 1 && slides.size() == 1) {
-    const Vector3d &turn = hinges[0].axis, &slide = slides[0].axis, &at = hinges[0].position;
-    if (Parallel(turn, slide)) return ComposedJoint{kCylindrical, {TurnOfZ(turn), at}};
-    if (Perpendicular(turn, slide)) {
-      return ComposedJoint{kPinInSlot, {Axes(slide, turn), at}, from_is_child};
-    }
-  }
-  if (slides.size() == 2 && hinges.size() == 1) {
-    const Vector3d &z = hinges[0].axis, &a = slides[0].axis, &b = slides[1].axis;
-    if (Perpendicular(z, a) && Perpendicular(z, b) && !Parallel(a, b)) {
-      return ComposedJoint{kPlanar, {Axes(a, z), hinges[0].position}};
-    }
-  }
-  const bool spans = slides.size() == 3 && Independent(slides);
-  if (spans && joints.size() == 3) {
-    const Vector3d &a = slides[0].axis, &b = slides[1].axis;
-    return ComposedJoint{kTranslation, {Axes(a, a.cross(b)), Vector3d::Zero()}};
-  }
-  if (spans && joints.size() == 4 && hinges.size() == 1) {
-    return ComposedJoint{kSchoenflies, {TurnOfZ(hinges[0].axis), hinges[0].position}};
-  }
+  const bool from_is_child = first.type != kPrismatic;
+  const bool is_mixed = !std::ranges::is_partitioned(joints, [&](const SerialJoint& joint) {
+    return (joint.type == kPrismatic) != from_is_child;
+  });
+  // rotations: 3 about a centre, or as many as hinges
   std::optional<Vector3d> centre;
   if (balls.size() == 1 && hinges.empty()) centre = balls[0].position;
   if (balls.empty() && hinges.size() == 3 && Independent(hinges)) centre = MeetingPoint(hinges);
-  if (centre && slides.empty()) return ComposedJoint{kSpherical, Placement(*centre)};
-  if (centre && spans) return ComposedJoint{kFree, Placement(*centre)};
-  const bool is_mixed = !std::ranges::is_partitioned(joints, [&](const SerialJoint& joint) {
-    return (joint.kind == SerialKind::kSlide) != from_is_child;
-  });
-  if (!centre || is_mixed) return std::nullopt;
-  const Vector3d& x = slides[0].axis;
-  if (slides.size() == 1) {
-    const Vector3d other = std::abs(x.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
-    return ComposedJoint{kPointOnLine, {Axes(x, other), *centre}, from_is_child};
+  const std::size_t turns = centre ? 3 : hinges.size();
+  if (!centre && (turns > 2 || !balls.empty())) return std::nullopt;
+  const Vector3d z = hinges.empty() ? Vector3d::Zero() : hinges[0].axis;
+  const Vector3d at = centre ? *centre : turns > 0 ? hinges[0].position : Vector3d::Zero();
+  const Vector3d x = slides.empty() ? Vector3d::Zero() : slides[0].axis;
+  const Vector3d y = slides.size() < 2 ? Vector3d::Zero() : slides[1].axis;
+  const bool is_line = slides.size() == 1, is_plane = slides.size() == 2 && !Parallel(x, y);
+  const bool is_space = slides.size() == 3 && Independent(slides);
+  if (turns == 0 && is_plane) return ComposedJoint{kPlanar, {Axes(x, x.cross(y)), at}, false, true};
+  if (turns == 0 && is_space) return ComposedJoint{kTranslation, {Axes(x, x.cross(y)), at}};
+  if (turns == 1 && is_line && Parallel(z, x)) return ComposedJoint{kCylindrical, {TurnOfZ(z), at}};
+  if (turns == 1 && is_line && Perpendicular(z, x)) {
+    return ComposedJoint{kPinInSlot, {Axes(x, z), at}, from_is_child};
   }
-  if (slides.size() == 2 && !Parallel(x, slides[1].axis)) {
-    const Vector3d z = x.cross(slides[1].axis);
-    return ComposedJoint{kPointInPlane, {Axes(x, z), *centre}, from_is_child};
+  if (turns == 1 && is_plane && Perpendicular(z, x) && Perpendicular(z, y)) {
+    return ComposedJoint{kPlanar, {Axes(x, z), at}};
+  }
+  if (turns == 1 && is_space) return ComposedJoint{kSchoenflies, {TurnOfZ(z), at}};
+  if (turns == 2 && slides.empty() && Perpendicular(z, hinges[1].axis)) {
+    // about x of F, then about y of M
+    const auto point = MeetingPoint(hinges);
+    if (point) return ComposedJoint{kUniversal, {Axes(z, z.cross(hinges[1].axis)), *point}};
+  }
+  if (turns == 3 && slides.empty()) return ComposedJoint{kSpherical, Placement(at)};
+  if (turns == 3 && is_space) return ComposedJoint{kFree, Placement(at)};
+  if (turns == 3 && is_line && !is_mixed) {
+    const Vector3d other = std::abs(x.z()) < 0.9 ? Vector3d::UnitZ() : Vector3d::UnitX();
+    return ComposedJoint{kPointOnLine, {Axes(x, other), at}, from_is_child};
+  }
+  if (turns == 3 && is_plane && !is_mixed) {
+    return ComposedJoint{kPointInPlane, {Axes(x, x.cross(y)), at}, from_is_child};
   }
   return std::nullopt;
 }
 
 Placement MotionOf(const SerialJoint& joint, const double* q) {
-  if (joint.kind == SerialKind::kSlide) return Placement((q[0] - joint.reference) * joint.axis);
+  if (joint.type == JointType::kPrismatic) return Placement((q[0] - joint.reference) * joint.axis);
   Placement X;
-  X.q = joint.kind == SerialKind::kBall
+  X.q = joint.type == JointType::kSpherical
             ? Quaterniond(q[0], q[1], q[2], q[3]).normalized()
             : Quaterniond(Eigen::AngleAxisd(q[0] - joint.reference, joint.axis));
   X.p = joint.position - X.q * joint.position;
@@ -187,10 +143,31 @@ Placement MotionOf(const SerialJoint& joint, const double* q) {
 void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& composed,
                  const double* q, const double* u, std::vector<double>* coordinates,
                  std::vector<double>* speeds) {
-  const ChainMotion motion = Move(series, composed, q, u);
+  std::vector<Placement> moved = {Placement()};  // the product of motions up to each joint
+  for (const SerialJoint& joint : series) {
+    moved.push_back(moved.back() * MotionOf(joint, q));
+    q += joint.num_q();
+  }
+  // angular velocity of the last body, and velocity of the joint's origin on it, in drawn axes
+  const Vector3d Mo = moved.back().At(composed.X_BJ.p);
+  Vector3d w = Vector3d::Zero(), v = Vector3d::Zero();
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const SerialJoint& joint = series[i];
+    if (joint.type == JointType::kPrismatic) {
+      v += moved[i].q * joint.axis * u[0];
+    } else {
+      const Vector3d turn = joint.type == JointType::kSpherical
+                                ? moved[i + 1].q * Vector3d(u[0], u[1], u[2])
+                                : moved[i].q * joint.axis * u[0];
+      w += turn;
+      v += turn.cross(Mo - moved[i].At(joint.position));
+    }
+    u += joint.num_u();
+  }
   const JointKind<Spatial, double>& kind = KindOf<Spatial, double>(composed.type);
-  Placement X_FM = composed.X_BJ.Inverse() * motion.X * composed.X_BJ;
-  Vector3d w = composed.X_BJ.q.conjugate() * motion.w, v = composed.X_BJ.q.conjugate() * motion.v;
+  Placement X_FM = composed.X_BJ.Inverse() * moved.back() * composed.X_BJ;
+  w = composed.X_BJ.q.conjugate() * w;
+  v = composed.X_BJ.q.conjugate() * v;
   if (composed.from_is_child) {
     // reversed: velocity of the origin of the parent's frame, in axes of the child's frame
     const Placement X_MF = X_FM.Inverse();
@@ -203,29 +180,20 @@ void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& co
   pose.p = X_FM.p;
   coordinates->resize(static_cast<std::size_t>(kind.num_q));
   kind.coordinates(pose, coordinates->data(), 0.0);
-  speeds->resize(static_cast<std::size_t>(kind.num_u));
+  speeds->assign(static_cast<std::size_t>(kind.num_u), 0.0);
   Basis<Spatial, double> basis;
   if (kind.basis != nullptr) kind.basis(pose, basis, 0.0);
   for (int i = 0; i < kind.num_u; ++i) {
-    double& speed = (*speeds)[i];
-    if (kind.basis != nullptr) {
-      const auto column = basis[i];
-      speed = 0.0;
-      for (int k = 0; k < 3; ++k) speed += column.angular[k] * w[k] + column.linear[k] * v[k];
-    } else {
+    if (kind.basis == nullptr) {
       const int axis = kind.axes[i];
-      speed = axis < 3 ? w[axis] : v[axis - 3];
+      (*speeds)[i] = axis < 3 ? w[axis] : v[axis - 3];
+      continue;
+    }
+    const auto column = basis[i];
+    for (int k = 0; k < 3; ++k) {
+      (*speeds)[i] += column.angular[k] * w[k] + column.linear[k] * v[k];
     }
   }
-}
-
-JointDescription& ImportDraft::AddComposed(const std::string& name, const ComposedJoint& composed,
-                                           int parent, const Placement& X_PF, int child) {
-  FrameOn F{parent, X_PF}, M{child, composed.X_BJ};
-  if (composed.from_is_child) std::swap(F, M);
-  JointDescription& joint = AddJoint(name, composed.type, F, M);
-  if (composed.keeps_angle) joint.motions.push_back({0, Polynomial{{0.0}}});
-  return joint;
 }
 
 }  // namespace loopbench::harness

@@ -154,7 +154,7 @@ Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
   return {0.5 * root, -z.y() * inverse, z.x() * inverse, 0.0};
 }
 
-ImportDraft::ImportDraft(const XmlFile& file, const ImportOptions& options)
+ImportDraft::ImportDraft(XmlDocument& file, const ImportOptions& options)
     : at_rest(1), file_(file), options_(options), elements_{file.root()} {
   description.space = SpaceKind::kSpatial;
   description.bodies[kGround].name = "ground";

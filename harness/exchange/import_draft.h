@@ -114,6 +114,17 @@ Eigen::Matrix3d InertiaOf(const Get& get) {
                          get("ixz", false), get("iyz", false));
 }
 
+/// Joints and loads of each body.
+struct BodyLoads {
+  explicit BodyLoads(const MechanismDescription& d);
+
+  std::vector<std::vector<int>> joints;  ///< joints of each body
+  std::vector<bool> has_load;            ///< a mass, an inertia or a force at a point
+};
+/// Returns the body on the other side of a joint.
+inline int Beyond(const JointDescription& joint, int body) {
+  return joint.from.body == body ? joint.to.body : joint.from.body;
+}
 /// Returns, for each body, the first body that is fixed to it; Ground for those fixed to Ground.
 std::vector<int> FixedTogether(const MechanismDescription& description);
 
@@ -154,20 +165,15 @@ const Entry& Named(const std::map<std::string, Entry>& entries, const std::strin
 
 // Joints in series without mass between them (import_chain.cpp, import_links.cpp).
 
-enum class SerialKind { kHinge, kSlide, kBall, kFree };
-/// Joint types of single joints, by SerialKind.
-inline constexpr JointType kSerialTypes[] = {JointType::kRevolute, JointType::kPrismatic,
-                                             JointType::kSpherical, JointType::kFree};
-
 /// A joint of a series, in the drawn axes of the last body.
 struct SerialJoint {
-  SerialKind kind = SerialKind::kHinge;
+  JointType type = JointType::kRevolute;               ///< or prismatic, spherical, free
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
   double reference = 0.0;                              ///< its coordinate in the drawn position
 
-  int num_q() const { return kind == SerialKind::kFree ? 7 : kind == SerialKind::kBall ? 4 : 1; }
-  int num_u() const { return kind == SerialKind::kFree ? 6 : kind == SerialKind::kBall ? 3 : 1; }
+  int num_q() const { return NumValues(type, SpaceKind::kSpatial, false); }
+  int num_u() const { return NumValues(type, SpaceKind::kSpatial, true); }
 };
 
 /// The joint of a mechanism that a series forms.
@@ -191,7 +197,7 @@ struct MasslessChain;
 
 class ImportDraft {
  public:
-  ImportDraft(const XmlFile& file, const ImportOptions& options);
+  ImportDraft(XmlDocument& file, const ImportOptions& options);
 
   MechanismDescription description;
   bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
@@ -248,9 +254,6 @@ class ImportDraft {
   /// children.
   void AddBall(const XmlElement& element, const std::function<int(const XmlElement&)>& body,
                const std::function<XmlValue(const XmlElement&)>& point);
-  /// Adds the joint of a series between two bodies; X_PF is its frame on the parent.
-  JointDescription& AddComposed(const std::string& name, const ComposedJoint& composed, int parent,
-                                const Placement& X_PF, int child);
   /// Adds a weld of a body, named after it with this ending.
   void Fix(int parent, const Placement& X, int body, const char* ending) {
     const std::string name = description.bodies[body].name + ending;
@@ -331,7 +334,6 @@ class ImportDraft {
  private:
   void NameJoints();
   void HoldFloatingParts();
-  void ReadLateMasses() const;
   /// Merges bodies without valid own mass with bodies that they are welded to; with `whole`, merges
   /// all bodies that are fixed together with such a body.
   void MergeFixed(bool whole);
@@ -357,7 +359,7 @@ class ImportDraft {
   void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
-  const XmlFile& file_;
+  XmlDocument& file_;
   const ImportOptions& options_;
   std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;

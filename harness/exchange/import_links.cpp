@@ -12,9 +12,8 @@
 
 namespace loopbench::harness {
 
-/// A joint of a chain; `position` and `axis` for all types.
+/// A joint of a chain of any type.
 struct ChainJoint : SerialJoint {
-  bool is_simple = false;   ///< `kind` is its type
   bool leads_out = true;    ///< from the inner body to the outer one
   Eigen::Quaterniond q_CJ;  ///< its axes in the drawn axes of the child
 };
@@ -60,44 +59,31 @@ Vector3d DirectionOf(const JointDescription& joint) {
 
 /// Returns chains of bodies without mass that have two joints and carry nothing else.
 std::vector<MasslessChain> FindChains(const MechanismDescription& d) {
-  std::vector<std::vector<int>> joints_of(d.bodies.size());
+  const BodyLoads loads(d);
   std::vector<bool> is_link(d.bodies.size(), false), seen = is_link;
   for (std::size_t i = 1; i < is_link.size(); ++i) {
-    const BodyDescription& body = d.bodies[i];
-    is_link[i] = body.mass == 0.0 && body.inertia.isZero(0.0) && body.points.empty();
+    const auto carries_only_force = [&](int joint) {
+      const JointType type = d.joints[joint].type;
+      return type == JointType::kFree || type == JointType::kRod;
+    };
+    is_link[i] = !loads.has_load[i] && d.bodies[i].points.empty() && loads.joints[i].size() == 2 &&
+                 std::ranges::none_of(loads.joints[i], carries_only_force);
   }
-  for (int j = 0; j < std::ssize(d.joints); ++j) {
-    const JointDescription& joint = d.joints[j];
-    for (const int body : {joint.from.body, joint.to.body}) {
-      joints_of[body].push_back(j);
-      if (joint.type == JointType::kFree || joint.type == JointType::kRod) is_link[body] = false;
-    }
-  }
-  for (ForceDescription force : d.forces) {
-    for (const BodyPoint* point : PartsOf(force).points) is_link[point->body] = false;
-  }
-  for (std::size_t i = 1; i < is_link.size(); ++i) {
-    if (joints_of[i].size() != 2) is_link[i] = false;
-  }
-  const auto beyond = [&](int joint, int body) {
-    const JointDescription& one = d.joints[joint];
-    return one.from.body == body ? one.to.body : one.from.body;
-  };
   const auto carries = [&](int body) { return body == kGround || d.bodies[body].mass > 0.0; };
   std::vector<MasslessChain> chains;
   for (int start = 0; start < std::ssize(is_link); ++start) {
     if (is_link[start]) continue;
-    for (const int first : joints_of[start]) {
+    for (const int first : loads.joints[start]) {
       MasslessChain chain;
       chain.parent = start;
-      chain.child = beyond(first, start);
+      chain.child = Beyond(d.joints[first], start);
       chain.joints = {first};
       while (is_link[chain.child] && !seen[chain.child]) {
         seen[chain.child] = true;  // each chain is found once
         chain.between.push_back(chain.child);
-        const std::vector<int>& two = joints_of[chain.child];
+        const std::vector<int>& two = loads.joints[chain.child];
         chain.joints.push_back(two[0] == chain.joints.back() ? two[1] : two[0]);
-        chain.child = beyond(chain.joints.back(), chain.child);
+        chain.child = Beyond(d.joints[chain.joints.back()], chain.child);
       }
       if (chain.between.empty() || chain.parent == chain.child) continue;
       if (!carries(chain.parent) || !carries(chain.child)) continue;
@@ -123,9 +109,7 @@ void Place(const MechanismDescription& d, MasslessChain* chain) {
     ChainJoint& placed = chain->series[k];
     placed.leads_out = joint.to.body == (k + 1 < chain->size() ? chain->between[k] : chain->child);
     const Placement X = X_CB * PlacementOf(placed.leads_out ? joint.to : joint.from);
-    const auto type = std::ranges::find(kSerialTypes, joint.type);
-    placed.is_simple = type != std::end(kSerialTypes) && joint.type != JointType::kFree;
-    if (placed.is_simple) placed.kind = static_cast<SerialKind>(type - kSerialTypes);
+    placed.type = joint.type;
     placed.position = X.p;
     placed.axis = (placed.leads_out ? 1.0 : -1.0) * (X.q * DirectionOf(joint));
     placed.q_CJ = X.q;
@@ -154,7 +138,7 @@ std::optional<ComposedJoint> ComposeChain(const MasslessChain& chain,
   std::ptrdiff_t held = 0, moving = 0;
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const int joint = chain.joints[k];
-    if (!chain.series[k].is_simple || single[joint]) return std::nullopt;
+    if (single[joint]) return std::nullopt;
     held += std::ranges::count(initial.held, joint);
     moving += std::ranges::count(initial.speeds, joint, &JointValues::joint);
   }
@@ -164,100 +148,74 @@ std::optional<ComposedJoint> ComposeChain(const MasslessChain& chain,
   return Compose({chain.series.begin(), chain.series.end()});
 }
 
-/// Moves the values of joints of a chain out of a list and appends them to `values`, as numbers of
-/// SerialJoint. Joints without values have the value 0. Returns true if some have values.
-bool TakeValues(const MasslessChain& chain, bool of_speeds, InitialDescription* initial,
-                std::vector<double>* values) {
-  auto& list = of_speeds ? initial->speeds : initial->coordinates;
-  const std::size_t count = list.size();
+/// Start of the joints of a chain, as numbers of SerialJoint; 0 where the start has no value.
+struct ChainStart {
+  std::vector<double> q, u;
+  bool has_q = false, has_u = false, is_held = false;
+  double weight = 1.0;
+};
+
+/// Moves the start of the joints of a chain out of the start of a mechanism.
+ChainStart TakeStart(const MasslessChain& chain, InitialDescription* initial) {
+  ChainStart start;
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const ChainJoint& joint = chain.series[k];
-    const auto is_of = [&](const std::vector<JointValues>& all) {
-      return std::ranges::find(all, chain.joints[k], &JointValues::joint);
-    };
-    const auto found = is_of(list);
-    std::vector<double> own(joint.num_u(), 0.0);
-    if (found != list.end()) own = found->values;
-    if (joint.kind == SerialKind::kBall) {
-      // of M in F, to the outer body in drawn axes, with velocities in its moved axes
-      const auto turn = is_of(initial->coordinates);
-      Quaterniond q = Quaterniond::Identity();
-      if (turn != initial->coordinates.end()) {
-        q = Quaterniond(turn->values[0], turn->values[1], turn->values[2], turn->values[3]);
-      }
-      if (of_speeds) {
-        const Vector3d w(own[0], own[1], own[2]);
-        const Vector3d moved = joint.q_CJ * (joint.leads_out ? q.conjugate() * w : Vector3d(-w));
-        own = {moved.x(), moved.y(), moved.z()};
-      } else {
-        q = joint.q_CJ * (joint.leads_out ? q : q.conjugate()) * joint.q_CJ.conjugate();
-        own = {q.w(), q.x(), q.y(), q.z()};
-      }
+    const auto given =
+        std::ranges::find(initial->coordinates, chain.joints[k], &JointValues::joint);
+    const auto moving = std::ranges::find(initial->speeds, chain.joints[k], &JointValues::joint);
+    std::vector<double> q(joint.num_q(), 0.0), u(joint.num_u(), 0.0);
+    if (joint.type == JointType::kSpherical) q[0] = 1.0;
+    if (moving != initial->speeds.end()) u = moving->values;
+    if (given != initial->coordinates.end()) {
+      q = given->values;
+      start.weight = std::max(start.weight, given->weight);
     }
-    values->insert(values->end(), own.begin(), own.end());
+    if (joint.type == JointType::kSpherical) {
+      // of M in F, to the outer body in drawn axes, with velocities in its moved axes
+      Quaterniond turn(q[0], q[1], q[2], q[3]);
+      Vector3d w(u[0], u[1], u[2]);
+      w = joint.q_CJ * (joint.leads_out ? turn.conjugate() * w : Vector3d(-w));
+      turn = joint.q_CJ * (joint.leads_out ? turn : turn.conjugate()) * joint.q_CJ.conjugate();
+      q = {turn.w(), turn.x(), turn.y(), turn.z()};
+      u = {w.x(), w.y(), w.z()};
+    }
+    start.q.insert(start.q.end(), q.begin(), q.end());
+    start.u.insert(start.u.end(), u.begin(), u.end());
   }
-  std::erase_if(list, [&](const JointValues& one) {
-    return std::ranges::count(chain.joints, one.joint) > 0;
-  });
-  return list.size() < count;
+  const auto is_of_chain = [&](int joint) { return std::ranges::count(chain.joints, joint) > 0; };
+  const auto has_values = [&](const JointValues& one) { return is_of_chain(one.joint); };
+  start.has_q = std::erase_if(initial->coordinates, has_values) > 0;
+  start.has_u = std::erase_if(initial->speeds, has_values) > 0;
+  start.is_held = std::erase_if(initial->held, is_of_chain) > 0;
+  return start;
 }
 
 // Masses of the remaining links.
 
-/// Mass and inertia that move equally with both bodies of a joint.
-struct Lump {
-  double mass = 0.0;                  ///< of each point [kg]
-  std::vector<Vector3d> points = {};  ///< [m]
-  Matrix3d inertia = Matrix3d::Zero();
-
-  Lump In(const Placement& X) const {
-    Lump lump{mass, points, X.q * inertia * X.q.conjugate().toRotationMatrix()};
-    for (Vector3d& point : lump.points) point = X.At(point);
-    return lump;
-  }
-};
-
-/// Returns a lump at a joint of this type. `size`: its extent [m].
-Lump LumpAt(const JointDescription& joint, const Vector3d& at, const Vector3d& axis, double mass,
-            double size) {
+/// Returns a lump of mass or inertia that moves equally with both bodies of a joint of this type;
+/// empty if there is none. `size`: its extent [m].
+BodyDescription LumpAt(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
+                       double mass, double size) {
   const Matrix3d all = mass * size * size * Matrix3d::Identity();
+  const Matrix3d across = all - mass * size * size * axis * axis.transpose();
   switch (joint.type) {
-    case JointType::kRevolute:
-      return {mass / 2.0, {at - size * axis, at + size * axis}};
+    case JointType::kRevolute:  // two points on the axis
+      return {"", mass, at, across, {}};
     case JointType::kUniversal:
     case JointType::kSpherical:
-      return {mass, {at}};
+      return {"", mass, at, Matrix3d::Zero(), {}};
     case JointType::kPrismatic:
     case JointType::kTranslation:
-      return {.inertia = all};
+      return {"", 0.0, Vector3d::Zero(), all, {}};
     case JointType::kPlanar:
     case JointType::kCylindrical:
     case JointType::kHelical:
     case JointType::kPinInSlot:
     case JointType::kSchoenflies:  // the bodies rotate relative to each other about the axis
-      return {.inertia = all - mass * size * size * axis * axis.transpose()};
+      return {"", 0.0, Vector3d::Zero(), across, {}};
     default:
       return {};
   }
-}
-
-/// Adds a lump in the axes of a body, or takes it away with `sign` = -1.
-BodyDescription With(const BodyDescription& body, double sign, const Lump& lump) {
-  const auto spread = [](const Vector3d& r) -> Matrix3d {
-    return r.squaredNorm() * Matrix3d::Identity() - r * r.transpose();
-  };
-  BodyDescription sum = body;
-  sum.inertia += sign * lump.inertia;
-  if (lump.points.empty()) return sum;
-  sum.mass += sign * lump.mass * static_cast<double>(lump.points.size());
-  sum.com *= body.mass;
-  for (const Vector3d& point : lump.points) sum.com += sign * lump.mass * point;
-  sum.com /= sum.mass;
-  sum.inertia += body.mass * spread(body.com - sum.com);
-  for (const Vector3d& point : lump.points) {
-    sum.inertia += sign * lump.mass * spread(point - sum.com);
-  }
-  return sum;
 }
 
 double RadiusOf(const BodyDescription& body) {
@@ -266,14 +224,15 @@ double RadiusOf(const BodyDescription& body) {
 
 /// Takes a small lump from a body, which keeps most of its smallest moment, and moments of which
 /// none exceeds the sum of the others. Empty if there is none.
-Lump Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
-          BodyDescription* body) {
+BodyDescription Take(const JointDescription& joint, const Vector3d& at, const Vector3d& axis,
+                     BodyDescription* body) {
   const Vector3d moments = SymmetricEigenvalues(body->inertia);
   // small shares, so that many links can be beside one body
   for (double share = 1.0 / 64.0; share > 1e-5; share /= 4.0) {
     for (const double reach : {1.0, 0.25, 1.0 / 16.0}) {
-      const Lump lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));
-      const BodyDescription rest = With(*body, -1.0, lump);
+      const auto lump = LumpAt(joint, at, axis, share * body->mass, reach * RadiusOf(*body));
+      BodyDescription rest = *body;
+      AddMass({"", -lump.mass, lump.com, -lump.inertia, {}}, Frame(), &rest);
       const Vector3d left = SymmetricEigenvalues(rest.inertia);
       constexpr double kSlack = 64.0 * std::numeric_limits<double>::epsilon();
       if (!(left[0] > 0.9 * moments[0] && left[2] <= (1.0 + kSlack) * (left[0] + left[1]))) {
@@ -300,29 +259,24 @@ void ImportDraft::ReplaceChain(const MasslessChain& chain, const ComposedJoint& 
   const std::string name =
       names.size() == 1 ? names[0] : joints_.Take(fmt::format("{}", fmt::join(names, "+")));
   InitialDescription& initial = description.initial;
-  std::vector<double> q, u, coordinates, speeds;
-  const bool has_speeds = TakeValues(chain, true, &initial, &u);
-  double weight = 1.0;
-  bool is_cut = false;
-  for (const int part : chain.joints) {
-    const auto guess = std::ranges::find(initial.coordinates, part, &JointValues::joint);
-    if (guess != initial.coordinates.end()) weight = std::max(weight, guess->weight);
-    is_cut = is_cut || description.joints[part].cut;
-  }
-  const bool has_coordinates = TakeValues(chain, false, &initial, &q);
-  const bool is_held = std::erase_if(initial.held, [&](int joint) {
-                         return std::ranges::count(chain.joints, joint) > 0;
-                       }) > 0;
+  const ChainStart start = TakeStart(chain, &initial);
+  const bool is_cut =
+      std::ranges::any_of(chain.joints, [&](int part) { return description.joints[part].cut; });
   const int joint = chain.joints[0];
-  SetComposed({chain.series.begin(), chain.series.end()}, composed, q.data(), u.data(),
+  std::vector<double> coordinates, speeds;
+  SetComposed({chain.series.begin(), chain.series.end()}, composed, start.q.data(), start.u.data(),
               &coordinates, &speeds);
-  if (has_coordinates || composed.type == JointType::kFree) {
-    initial.coordinates.push_back({joint, coordinates, weight});
+  if (start.has_q || composed.type == JointType::kFree) {
+    initial.coordinates.push_back({joint, coordinates, start.weight});
   }
-  if (has_speeds) initial.speeds.push_back({joint, speeds});
-  if (is_held) initial.held.push_back(joint);
-  const Placement X_PC = chain.places[0].Inverse();
-  AddComposed(name, composed, chain.parent, X_PC * composed.X_BJ, chain.child).cut = is_cut;
+  if (start.has_u) initial.speeds.push_back({joint, speeds});
+  if (start.is_held) initial.held.push_back(joint);
+  FrameOn F{chain.parent, chain.places[0].Inverse() * composed.X_BJ};
+  FrameOn M{chain.child, composed.X_BJ};
+  if (composed.from_is_child) std::swap(F, M);
+  JointDescription& made = AddJoint(name, composed.type, F, M);
+  made.cut = is_cut;
+  if (composed.keeps_angle) made.motions.push_back({0, Polynomial{{0.0}}});
   std::swap(description.joints[joint], description.joints.back());
   description.joints.pop_back();
   for (std::size_t k = 1; k < chain.size(); ++k) {
@@ -345,10 +299,10 @@ void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
       const Placement X_BC = X_CB.Inverse();
       const Vector3d position = X_BC.At(at.position), axis = X_BC.q * at.axis;
       // mass of the ground moves as little there
-      const Lump lump = body == kGround
+      const auto lump = body == kGround
                             ? LumpAt(joint, position, axis, child.mass / 8.0, RadiusOf(child))
                             : Take(joint, position, axis, &bodies[body]);
-      link = With(link, 1.0, lump.In(X_LC * X_CB));
+      AddMass(lump, (X_LC * X_CB).AsFrame(), &link);
     };
     if (i == 0) add(0, chain.parent, chain.places[0]);
     if (i + 1 == chain.between.size()) add(i + 1, chain.child, {});
@@ -357,7 +311,8 @@ void ImportDraft::GiveMassToLinks(const MasslessChain& chain) {
     if (!is_whole) {
       const double mass = kSmall * child.mass, radius = RadiusOf(child);
       const Vector3d at = link.mass > 0.0 ? link.com : X_LC.At(chain.series[i + 1].position);
-      link = With(link, 1.0, {mass, {at}, mass * radius * radius * Matrix3d::Identity()});
+      const Matrix3d inertia = mass * radius * radius * Matrix3d::Identity();
+      AddMass({"", mass, at, inertia, {}}, Frame(), &link);
     }
     bodies[chain.between[i]] = link;
     Note(elements_[chain.between[i]],
@@ -382,11 +337,7 @@ void ImportDraft::RejectRepeated(const MasslessChain& chain,
   for (std::size_t k = 0; k < chain.size(); ++k) {
     const int child = k + 1 < chain.size() ? chain.between[k] : chain.child;
     numbers.emplace(child, static_cast<int>(d.bodies.size()));
-    BodyDescription body;
-    body.name = fmt::format("{}", k);
-    body.mass = 1.0;
-    body.inertia.setIdentity();
-    d.bodies.push_back(body);
+    d.bodies.push_back({fmt::format("{}", k), 1.0, Vector3d::Zero(), Matrix3d::Identity(), {}});
     JointDescription joint = description.joints[chain.joints[k]];
     if (determined[chain.joints[k]]) joint.type = JointType::kWeld;
     for (JointSide* side : {&joint.from, &joint.to}) side->body = numbers.at(side->body);

@@ -63,7 +63,7 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
     *value = BoolOr(element.Attribute(name), *value);
   };
   const auto number = [&](const char* name, double* value, const Range& range) {
-    *value = NumberOr(element.Attribute(name), *value, range);
+    *value = element.Number(name, *value, range);
   };
   if (const auto angle = element.Attribute("angle")) {
     settings->degrees = angle->Choice<bool>({{"radian", false}, {"degree", true}});
@@ -138,7 +138,7 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
 void ReadAssets(const XmlElement& root, MjcfModel* model) {
   for (const XmlElement& assets : root.Children({"asset"})) {
     for (const XmlElement& mesh : assets.Children({"mesh"})) {
-      const MjcfElement element = model->defaults.Of(mesh, "");
+      const XmlElement element = model->defaults.Of(mesh, "");
       const auto name = mesh.Attribute("name"), file = element.Attribute("file");
       if (!name && !file) continue;
       const std::string known =
@@ -209,24 +209,24 @@ void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   }
 }
 
-MjcfElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
-                             const std::string& tag, bool uses) const {
+XmlElement MjcfDefaults::Of(const XmlElement& element, const std::string& childclass,
+                            const std::string& tag, bool uses) const {
   const std::string wanted = DescribedBy(tag.empty() ? element.tag() : tag);
   std::string name = childclass.empty() ? kMain : childclass;
   if (const auto given = element.Attribute("class")) {
     CheckClass(*given);
     name = given->text();
   }
-  MjcfElement made(element);
+  XmlElement made = element;
   for (auto found = classes_.find(Known(name)); found != classes_.end();
        found = classes_.find(found->second.parent)) {
     const auto defaults = found->second.elements.find(wanted);
     if (defaults == found->second.elements.end()) continue;
     // of several defaults in one class, the last one counts
     std::for_each(defaults->second.rbegin(), defaults->second.rend(),
-                  [&made](const XmlElement& layer) { made.Add(layer); });
+                  [&made](const XmlElement& layer) { made.AddDefault(layer); });
     if (uses) used_.emplace(found->first, wanted);
-    element.RequireFew(made.layers().size() - 1, kMaxLayers, "defaults of its kind");
+    element.RequireFew(made.Layers().size() - 1, kMaxLayers, "defaults of its kind");
   }
   return made;
 }
@@ -240,11 +240,11 @@ void MjcfDefaults::IgnoreUnused() const {
   }
 }
 
-Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
+Quaterniond MjcfModel::OrientationOf(const XmlElement& element) const {
   constexpr const char* kWays[] = {"quat", "axisangle", "euler", "xyaxes", "zaxis"};
   std::optional<XmlValue> found;
   std::string way;
-  for (const XmlElement& layer : element.layers()) {
+  for (const XmlElement& layer : element.Layers()) {
     std::string here;
     for (const char* one : kWays) {
       auto value = layer.Attribute(one);
@@ -280,7 +280,7 @@ Quaterniond MjcfModel::OrientationOf(const MjcfElement& element) const {
   return FromAxes(x, y, x.cross(y));
 }
 
-std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const std::string& flag,
+std::optional<MjcfLimits> MjcfModel::LimitsOf(const XmlElement& element, const std::string& flag,
                                               const std::string& range) const {
   const auto limited = element.Attribute(flag), given = element.Attribute(range);
   std::optional<bool> choice;  // none: by the range
@@ -289,7 +289,7 @@ std::optional<MjcfLimits> MjcfModel::LimitsOf(const MjcfElement& element, const 
         {{"false", false}, {"true", true}, {"auto", std::nullopt}});
   }
   if (!choice.value_or(given && settings.limits_by_range)) return std::nullopt;
-  if (!given) element.own().Fail(fmt::format("\"{}\" without \"{}\"", flag, range), "both");
+  if (!given) element.Fail(fmt::format("\"{}\" without \"{}\"", flag, range), "both");
   const std::vector<double> ends = given->Numbers(2, 2);
   if (ends[0] < ends[1]) return MjcfLimits{ends[0], ends[1]};
   if (choice) given->Fail("two numbers, the first below the second");

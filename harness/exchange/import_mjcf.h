@@ -12,37 +12,6 @@ namespace loopbench::harness {
 /// Attributes that limit the efforts of all actuators of a joint.
 inline constexpr const char *kEffortFlag = "actuatorfrclimited", *kEffortRange = "actuatorfrcrange";
 
-/// An element with the defaults of its classes: own attributes first, then the nearest class.
-class MjcfElement {
- public:
-  explicit MjcfElement(const XmlElement& own) : layers_{own} {}
-
-  const XmlElement& own() const { return layers_[0]; }
-  /// Returns the element and its classes, nearest first.
-  const std::vector<XmlElement>& layers() const { return layers_; }
-  void Add(const XmlElement& layer) { layers_.push_back(layer); }
-
-  std::optional<XmlValue> Attribute(const std::string& name) const {
-    std::optional<XmlValue> found;
-    for (const XmlElement& layer : layers_) {
-      auto value = layer.Attribute(name);
-      if (!found) found = std::move(value);
-    }
-    return found;
-  }
-  double Number(const std::string& name, double otherwise, const Range& range = {}) const {
-    return NumberOr(Attribute(name), otherwise, range);
-  }
-  /// Returns an attribute; if absent, throws with `expected`.
-  XmlValue Required(const std::string& name, std::string_view expected) const {
-    const auto value = Attribute(name);
-    return value ? *value : own().Required(name, expected);
-  }
-
- private:
-  std::vector<XmlElement> layers_;
-};
-
 /// <default> and its nested classes. The top class is "main", the default of elements without a
 /// class; it may have another name too.
 class MjcfDefaults {
@@ -51,8 +20,8 @@ class MjcfDefaults {
   /// Returns the element with its defaults. `childclass`: class of the enclosing bodies; `tag`: tag
   /// of its defaults, if different from its own; `uses`: its classes count as used, which is wrong
   /// for an element that may still be dropped.
-  MjcfElement Of(const XmlElement& element, const std::string& childclass,
-                 const std::string& tag = "", bool uses = true) const;
+  XmlElement Of(const XmlElement& element, const std::string& childclass,
+                const std::string& tag = "", bool uses = true) const;
   /// Rejects an undefined class.
   void CheckClass(const XmlValue& value) const {
     const std::string name = Known(value.text());
@@ -100,24 +69,18 @@ struct MjcfSettings {
 using MjcfLimits = std::pair<double, double>;
 
 struct MjcfJoint : SerialJoint {
-  explicit MjcfJoint(MjcfElement element_) : element(std::move(element_)) {}
+  explicit MjcfJoint(XmlElement element_) : element(std::move(element_)) {}
 
-  MjcfElement element;
+  XmlElement element;
   std::string name;
   double spring_reference = 0.0;  ///< its coordinate with a relaxed spring
+  std::vector<double> drawn;      ///< its part of qpos in the drawn position
   int joint = -1;                 ///< of the mechanism, until chains are composed
-};
-
-/// A body or link, and its connection to its parent: a joint, or fixed.
-struct MjcfStep {
-  int parent = kGround, child = kGround;
-  Placement X_PB;  ///< drawn pose in the parent
-  int joint = -1;  ///< in MjcfModel::joints; -1: fixed
 };
 
 /// One copy of the contents of a <replicate>, within a copy of each <replicate> around it.
 struct MjcfReplica {
-  std::size_t replicate = 0;  ///< index into MjcfModel::replicates
+  const void* replicate = nullptr;  ///< identity of its element
   const MjcfReplica* around = nullptr;
   std::string suffix;  ///< of names: its own, then that of the replica around it
 };
@@ -130,13 +93,16 @@ class MjcfModel {
   MjcfSettings settings;
   MjcfDefaults defaults;
   std::vector<MjcfJoint> joints;  ///< in the order of qpos
-  std::vector<MjcfStep> steps;    ///< of all bodies and links, in the order of the file
+  /// Poses of bodies in ground axes with relaxed joint springs, which define the default rest
+  /// length of tendons.
+  std::vector<Placement> where_springs_are_free = {Placement()};
   std::map<std::string, FrameOn> sites;
-  std::map<std::string, MjcfElement> meshes;
+  std::map<std::string, XmlElement> meshes;
   mutable std::map<std::string, Solid> mesh_solids;  ///< of meshes that have been read
   std::map<std::string, std::size_t> joint_names;
   std::set<int> links;  ///< bodies without mass between joints of one body of MuJoCo
-  std::vector<std::vector<const MjcfReplica*>> replicates;  ///< all copies of each <replicate>
+  std::map<const void*, std::vector<const MjcfReplica*>>
+      replicates;  ///< copies of each <replicate>
 
   /// Returns the next copy of the contents of a <replicate>; nullptr stands for no replica.
   const MjcfReplica* AddReplica(const XmlElement& element, const MjcfReplica* around,
@@ -161,28 +127,25 @@ class MjcfModel {
   void ForReplicas(const References& references, const std::function<void()>& read);
 
   /// Returns the orientation of the element in any notation; by default the one of its class.
-  Eigen::Quaterniond OrientationOf(const MjcfElement& element) const;
-  Placement PlacementOf(const MjcfElement& element) const {
+  Eigen::Quaterniond OrientationOf(const XmlElement& element) const;
+  Placement PlacementOf(const XmlElement& element) const {
     const Eigen::Vector3d p = VectorOr(element.Attribute("pos"));
     return {OrientationOf(element), p};
   }
   /// Returns the limits in `range`, if `flag` or, without it, the range itself makes them active.
-  std::optional<MjcfLimits> LimitsOf(const MjcfElement& element, const std::string& flag,
+  std::optional<MjcfLimits> LimitsOf(const XmlElement& element, const std::string& flag,
                                      const std::string& range) const;
   /// Notes that limits of a joint or tendon are dropped, with or without a range.
-  void NoteLimits(const MjcfElement& element, const char* reason) const {
+  void NoteLimits(const XmlElement& element, const char* reason) const {
     const auto flag = element.Attribute("limited"), range = element.Attribute("range");
     if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
-      draft->Drop(element.own(), range ? "range" : "limited", reason);
+      draft->Drop(element, range ? "range" : "limited", reason);
     }
   }
   /// Notes that a nonzero number is dropped.
-  void DropNonzero(const MjcfElement& element, const char* name, const char* reason) const {
-    if (element.Number(name, 0.0) != 0.0) draft->Drop(element.own(), name, reason);
+  void DropNonzero(const XmlElement& element, const char* name, const char* reason) const {
+    if (element.Number(name, 0.0) != 0.0) draft->Drop(element, name, reason);
   }
-  /// Returns poses of bodies in ground axes with relaxed joint springs; they define the default
-  /// rest length of tendons.
-  std::vector<Placement> WhereSpringsAreFree() const;
   const FrameOn& SiteNamed(const XmlValue& value) const {
     return Named(sites, NameOf("site", value), value, "the name of a site");
   }
@@ -195,8 +158,7 @@ class MjcfModel {
 
  private:
   std::deque<MjcfReplica> replicas_;
-  std::map<const void*, std::size_t> known_;       ///< replicates by element
-  std::map<std::string, std::size_t> replicated_;  ///< replicates by kind and name
+  std::map<std::string, const void*> replicated_;  ///< replicates by kind and name
   const MjcfReplica* present_ = nullptr;           ///< the replica that is read
   std::size_t num_copies_ = 0;
 };
@@ -205,7 +167,8 @@ class MjcfModel {
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
 /// Applies the total mass and the bounds of <compiler> to all bodies.
 void AdjustMasses(MjcfModel* model);
-/// An element within a body, its enclosing frame in the body, and its default class.
+/// An element within a body with its defaults, its enclosing frame in the body, and the default
+/// class there.
 struct MjcfPlaced {
   XmlElement element;
   Placement X;

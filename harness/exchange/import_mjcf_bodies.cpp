@@ -8,12 +8,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A geom of a body, its class, and its enclosing frame.
-struct MjcfGeom {
-  MjcfElement element;
-  Placement X;
-};
-
 // Masses of MuJoCo shapes.
 
 constexpr double kDensity = 1000.0;  // [kg/m^3], MuJoCo's default
@@ -27,11 +21,11 @@ enum Type { kSphere, kCapsule, kCylinder, kBox, kEllipsoid, kWithoutMass, kOfMes
 constexpr std::size_t kSizes[] = {1, 2, 2, 3, 3};
 
 /// Returns the sizes of a geom and its frame; `fromto` gives position, axis and half length.
-Vector3d PlaceAndSize(const MjcfModel& model, const MjcfElement& geom, Type type, Placement* X) {
+Vector3d PlaceAndSize(const MjcfModel& model, const XmlElement& geom, Type type, Placement* X) {
   const auto size = geom.Attribute("size");
   const auto along = geom.Attribute("fromto");
   *X = model.PlacementOf(geom);
-  if (!size) geom.own().Fail("no \"size\"", "the sizes of the shape");
+  if (!size) geom.Fail("no \"size\"", "the sizes of the shape");
   const bool has_ends = along && type != kSphere;
   std::vector<double> sizes = size->Numbers(has_ends ? 1 : kSizes[type], 3);
   sizes.resize(3);
@@ -86,11 +80,10 @@ TriangleMesh ReadVertices(const XmlValue& vertex, const std::optional<XmlValue>&
 
 /// Reads a mesh of <asset> as a solid in its own frame. Points without triangles mean their convex
 /// hull.
-Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
+Solid ReadMeshSolid(const MjcfModel& model, const XmlElement& asset) {
   const auto file = asset.Attribute("file"), vertex = asset.Attribute("vertex");
   if (!file && !vertex) {
-    asset.own().Fail("a mesh without points",
-                     "\"file\", an .stl or .obj with triangles, or \"vertex\"");
+    asset.Fail("a mesh without points", "\"file\", an .stl or .obj with triangles, or \"vertex\"");
   }
   const auto inertia = asset.Attribute("inertia");
   const bool is_convex = inertia && inertia->text() == "convex";
@@ -134,22 +127,23 @@ Solid ReadMeshSolid(const MjcfModel& model, const MjcfElement& asset) {
     given.Fail(fmt::format("a closed mesh: {} edges have a triangle on one side only", open));
   }
   if (open > 0 && rule == kPyramids) {
-    model.draft->Note(asset.own(), file ? "file" : "vertex",
+    model.draft->Note(asset, file ? "file" : "vertex",
                       fmt::format("not closed at {} edges: mass by MuJoCo's legacy rule", open));
   }
   return solid;
 }
 
 const Solid& MeshSolid(const MjcfModel& model, const XmlValue& name) {
-  const MjcfElement& asset = Named(model.meshes, name.Name(), name, "the name of a mesh");
+  const XmlElement& asset = Named(model.meshes, name.Name(), name, "the name of a mesh");
   const auto [known, is_new] = model.mesh_solids.try_emplace(name.text());
   if (is_new) known->second = ReadMeshSolid(model, asset);
   return known->second;
 }
 
 /// Reads a geom; returns false if it has no mass.
-bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, PlacedSolid* read) {
-  const MjcfElement& element = geom.element;
+bool ReadGeom(const MjcfModel& model, const MjcfPlaced& geom, bool drops_meshes,
+              PlacedSolid* read) {
+  const XmlElement& element = geom.element;
   const auto given = element.Attribute("type");
   const auto mesh = element.Attribute("mesh");
   constexpr XmlChoice<Type> kTypes[] = {{"sphere", kSphere},       {"capsule", kCapsule},
@@ -174,12 +168,12 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, P
   } else {
     const Vector3d size = PlaceAndSize(model, element, type, &read->X);
     for (std::size_t i = 0; i < kSizes[type]; ++i) {
-      if (!(size[i] > 0.0)) element.own().Fail("a size that is not > 0", "sizes > 0");
+      if (!(size[i] > 0.0)) element.Fail("a size that is not > 0", "sizes > 0");
     }
     read->solid = ShapeOf(type, size);
   }
   if (kg > 0.0 && !(read->solid.volume > kLeast)) {
-    model.draft->Note(element.own(), "mass",
+    model.draft->Note(element, "mass",
                       fmt::format("dropped, as in MuJoCo: its shape has {:.2g} m^3, not more than "
                                   "{:.0e}",
                                   read->solid.volume, kLeast),
@@ -191,21 +185,13 @@ bool ReadGeom(const MjcfModel& model, const MjcfGeom& geom, bool drops_meshes, P
   return read->mass > kLeast;
 }
 
-/// Computes mass, centre of mass and inertia in body axes; meshes may be ignored.
-BodyDescription MassOfGeoms(const MjcfModel& model, const std::vector<MjcfGeom>& geoms,
-                            bool drops_meshes) {
-  std::vector<PlacedSolid> parts;
-  for (const MjcfGeom& geom : geoms) {
-    PlacedSolid part;
-    if (ReadGeom(model, geom, drops_meshes, &part)) parts.push_back(part);
+/// Marks geoms and their classes as read, with a note.
+void IgnoreGeoms(const std::vector<MjcfPlaced>& geoms, const std::string& fate,
+                 const MjcfModel& model) {
+  for (const MjcfPlaced& geom : geoms) {
+    geom.element.Ignore();
+    if (model.settings.has_contact) model.draft->Note(geom.element, fate + "there is no contact");
   }
-  return SumOf(parts);
-}
-
-/// Marks a geom and its classes as read, with a note.
-void IgnoreGeom(const MjcfElement& geom, const std::string& fate, MjcfModel* model) {
-  for (const XmlElement& layer : geom.layers()) layer.Ignore();
-  if (model->settings.has_contact) model->draft->Note(geom.own(), fate + "there is no contact");
 }
 
 // Bodies.
@@ -265,8 +251,10 @@ void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
       child.Fail("a joint in a <replicate>", "joints in its bodies");
     }
     if (tag != "frame" && tag != "replicate") {
+      const bool has_class = tag != "body" && tag != "inertial";
       (*contents)[tag == "freejoint" ? "joint" : tag].push_back(
-          {child, placed.X, placed.childclass, placed.replica});
+          {has_class ? model->defaults.Of(child, placed.childclass) : child, placed.X,
+           placed.childclass, placed.replica});
       continue;
     }
     child.Attribute("name");
@@ -275,7 +263,7 @@ void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
     if (tag == "replicate") {
       GatherReplicas(model, within, contents);
     } else {
-      within.X = placed.X * model->PlacementOf(MjcfElement(child));
+      within.X = placed.X * model->PlacementOf(child);
       Gather(model, within, contents);
     }
   }
@@ -283,9 +271,8 @@ void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
 
 void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model) {
   for (const MjcfPlaced& site : sites) {
-    const MjcfElement element = model->defaults.Of(site.element, site.childclass);
     const auto given = site.element.Attribute("name");
-    const Placement X = site.X * model->PlacementOf(element);
+    const Placement X = site.X * model->PlacementOf(site.element);
     if (!given) continue;
     const std::string name = model->NewName("site", *given, site.replica);
     if (!model->sites.emplace(name, FrameOn{body, X}).second) {
@@ -298,7 +285,7 @@ void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model)
 /// Reads <inertial>: about its own axes, rotated into body axes.
 BodyDescription ReadInertial(const MjcfPlaced& placed, const MjcfModel& model) {
   const XmlElement& element = placed.element;
-  const Placement X = placed.X * model.PlacementOf(MjcfElement(element));
+  const Placement X = placed.X * model.PlacementOf(element);
   BodyDescription read;
   read.mass = element.Required("mass", "a number [kg]").Number(kNotNegative);
   read.com = X.p;
@@ -323,14 +310,15 @@ void ReadMasses(Contents& contents, int body, bool is_fixed, MjcfModel* model) {
     inertials[1].element.Fail("a second <inertial>", "at most one in a body");
   }
   const MjcfSettings& settings = model->settings;
-  std::vector<MjcfGeom> geoms;
-  for (const MjcfPlaced& geom : contents["geom"]) {
-    geoms.push_back({model->defaults.Of(geom.element, geom.childclass), geom.X});
-  }
   const bool wants_geoms = settings.inertia == MjcfSettings::kFromGeoms ||
                            (settings.inertia == MjcfSettings::kAuto && !has_inertial);
-  BodyDescription masses;
-  if (wants_geoms) masses = MassOfGeoms(*model, geoms, is_fixed && settings.total_mass <= 0.0);
+  const bool drops_meshes = is_fixed && settings.total_mass <= 0.0;
+  std::vector<PlacedSolid> parts;
+  for (const MjcfPlaced& geom : contents["geom"]) {
+    PlacedSolid part;
+    if (wants_geoms && ReadGeom(*model, geom, drops_meshes, &part)) parts.push_back(part);
+  }
+  BodyDescription masses = SumOf(parts);
   const bool from_geoms = masses.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains
   if (from_geoms && has_inertial) {
     model->draft->DropWhole(inertials[0].element, "inertiafromgeom asks for the geoms' masses");
@@ -338,9 +326,8 @@ void ReadMasses(Contents& contents, int body, bool is_fixed, MjcfModel* model) {
     masses = ReadInertial(inertials[0], *model);
   }
   model->draft->SetMass(body, masses.mass, masses.com, masses.inertia);
-  for (const MjcfGeom& geom : geoms) {
-    IgnoreGeom(geom.element, from_geoms ? "no shape here, only its mass: " : "dropped: ", model);
-  }
+  IgnoreGeoms(contents["geom"],
+              from_geoms ? "no shape here, only its mass: " : "dropped: ", *model);
 }
 
 /// Reads a body. `is_fixed`: the parent is the ground or is fixed to it.
@@ -351,14 +338,14 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   const auto name = element.Attribute("name");
   const int body =
       draft->AddBody(element, name ? model->NewName("body", *name, placed.replica) : "");
-  const Placement X_PB = placed.X * model->PlacementOf(MjcfElement(element));
+  const Placement X_PB = placed.X * model->PlacementOf(element);
   draft->at_rest[body] = draft->at_rest[parent] * X_PB;
   Contents contents;
   Gather(model, {element, {}, childclass, placed.replica}, &contents);
   is_fixed = is_fixed && contents["joint"].empty();
   ReadMasses(contents, body, is_fixed, model);
   ReadSites(contents["site"], body, model);
-  const double lift = NumberOr(element.Attribute("gravcomp"), 0.0);
+  const double lift = element.Number("gravcomp", 0.0);
   if (lift != 0.0 && model->settings.has_passive()) draft->AddLift(body, lift);
   if (BoolOr(element.Attribute("mocap"))) {
     draft->Note(element, "mocap", "stays where the file draws it", true);
@@ -380,7 +367,7 @@ void BoundBelow(double least, Eigen::Matrix3d* inertia) {
 // <replicate>: copies of elements, their names, and the elements that refer to them.
 
 /// Returns the replica itself or the one around it of this <replicate>, if any.
-const MjcfReplica* ReplicaOf(std::size_t replicate, const MjcfReplica* replica) {
+const MjcfReplica* ReplicaOf(const void* replicate, const MjcfReplica* replica) {
   while (replica != nullptr && replica->replicate != replicate) replica = replica->around;
   return replica;
 }
@@ -390,9 +377,7 @@ const MjcfReplica* ReplicaOf(std::size_t replicate, const MjcfReplica* replica) 
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model) {
   Contents contents;
   Gather(model, {world, {}, ClassWithin(*model, world, "")}, &contents);
-  for (const MjcfPlaced& geom : contents["geom"]) {
-    IgnoreGeom(model->defaults.Of(geom.element, geom.childclass), "dropped: ", model);
-  }
+  IgnoreGeoms(contents["geom"], "dropped: ", *model);
   for (const MjcfPlaced& joint : contents["joint"]) {
     joint.element.Fail("a joint of the world", "joints in bodies");
   }
@@ -431,11 +416,9 @@ const MjcfReplica* MjcfModel::AddReplica(const XmlElement& element, const MjcfRe
   std::size_t depth = 1;
   for (const MjcfReplica* outer = around; outer != nullptr; outer = outer->around) ++depth;
   element.RequireFew(depth, 16, "nested <replicate>");
-  const auto [known, is_new] = known_.emplace(element.id(), replicates.size());
-  if (is_new) replicates.emplace_back();
   const std::string outer = around != nullptr ? around->suffix : "";
-  replicas_.push_back({known->second, around, suffix + outer});
-  return replicates[known->second].emplace_back(&replicas_.back());
+  replicas_.push_back({element.id(), around, suffix + outer});
+  return replicates[element.id()].emplace_back(&replicas_.back());
 }
 
 std::string MjcfModel::NameOf(const std::string& kind, const XmlValue& reference) const {

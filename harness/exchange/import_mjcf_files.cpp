@@ -48,7 +48,7 @@ std::string KindAndName(const Element* element, const std::string& prefix = "") 
 /// Resolves the <include> and <attach> elements of MJCF.
 class Includer {
  public:
-  explicit Includer(const std::shared_ptr<XmlDocument>& document)
+  explicit Includer(XmlDocument* document)
       : document_(document), open_{xml::CanonicalOf(*document->path)} {
     known_.insert(open_[0]);
   }
@@ -56,9 +56,7 @@ class Includer {
   /// Resolves a model, whose file is in `folder`.
   void Resolve(Element* root, const fs::path& folder) {
     Include(root, folder);
-    std::vector<Element*> places;
-    for (Element* world : Named(root, "worldbody")) AddWithin(world, "attach", &places);
-    for (Element* place : places) Attach(place, root, folder);
+    for (Element* place : InWorlds(root, "attach")) Attach(place, root, folder);
   }
 
  private:
@@ -97,7 +95,7 @@ class Includer {
       name.Fail(fmt::format("files of at most {} MiB in all", kMaxConfigBytes >> 20));
     }
     open_.push_back(path);
-    return xml::Parse(ReadTextFile(path), shown->string(), document_.get());
+    return document_->Parse(ReadTextFile(path), shown->string());
   }
 
   std::vector<Element*> Named(Element* root, std::string_view tag) const {
@@ -114,14 +112,13 @@ class Includer {
       }
     }
   }
-  /// Adds the descendants of an element with this tag and not those within them, or all without
-  /// tag.
-  void AddWithin(Element* element, std::string_view tag, std::vector<Element*>* found) const {
-    for (Element* child : document_->ChildrenOf(element)) {
-      const bool fits = tag.empty() || child->Name() == tag;
-      if (fits) found->push_back(child);
-      if (!fits || tag.empty()) AddWithin(child, tag, found);
+  /// Returns the elements in <worldbody>, as XmlDocument::Within().
+  std::vector<Element*> InWorlds(Element* root, std::string_view tag = "") const {
+    std::vector<Element*> all;
+    for (Element* world : Named(root, "worldbody")) {
+      std::ranges::copy(document_->Within(world, tag), std::back_inserter(all));
     }
+    return all;
   }
   /// Returns an attribute of <compiler>, of the last one that has it.
   std::string Setting(Element* root, const char* name, const char* otherwise) const {
@@ -178,12 +175,12 @@ class Includer {
     auto part = attach.Attribute("body");
     if (part && part->text() == "world") part.reset();
     if (!part) part = attach.Attribute("frame");
-    std::vector<Element*> contents, all;
+    std::vector<Element*> contents;
     for (Element* world : Named(other, "worldbody")) {
       std::ranges::copy(document_->ChildrenOf(world), std::back_inserter(contents));
-      AddWithin(world, "", &all);
     }
     if (part) {
+      const std::vector<Element*> all = InWorlds(other);
       const auto named = std::ranges::find_if(all, [&](const Element* one) {
         const char* name = one->Attribute("name");
         return one->Name() == part->attribute() && name != nullptr && part->text() == name;
@@ -247,8 +244,8 @@ class Includer {
         part->Fail(fmt::format("a {} that is not in a <replicate>", kind));
       }
     }
-    std::vector<Element*> parts = {original->element};
-    AddWithin(original->element, "", &parts);
+    std::vector<Element*> parts = document_->Within(original->element);
+    parts.push_back(original->element);
     std::set<std::string> inside, made;
     for (const Element* one : parts) {
       inside.insert(KindAndName(one));
@@ -325,8 +322,8 @@ class Includer {
   /// Returns the number of references of an element and its contents into `inside`, or -1 if some
   /// are to other elements.
   int NumReferences(Element* element, const std::set<std::string>& inside) const {
-    std::vector<Element*> own = {element};
-    AddWithin(element, "", &own);
+    std::vector<Element*> own = document_->Within(element);
+    own.push_back(element);
     int count = 0;
     for (const Element* one : own) {
       for (const auto& [key, kind] : kReferences) {
@@ -367,9 +364,7 @@ class Includer {
       const std::string meshes = Setting(root, "meshdir", Setting(root, "assetdir", "").c_str());
       one->SetAttribute("file", fs::absolute(folder / meshes / path).c_str());
     });
-    std::vector<Element*> all;
-    AddWithin(root, "", &all);
-    for (Element* one : all) {
+    for (Element* one : document_->Within(root)) {
       for (const char* key : kNames) Prefix(one, key, prefix);
       for (const auto& [key, kind] : kReferences) Prefix(one, key, prefix);
       for (const char* key : {"class", "childclass"}) {
@@ -388,9 +383,7 @@ class Includer {
   /// Hides tendons, constraints and actuators of a model that refer to parts outside `frame`.
   void DropOutside(Element* root, Element* frame) {
     std::set<std::string> inside = {"body world"};
-    std::vector<Element*> parts;
-    AddWithin(frame, "", &parts);
-    for (const Element* one : parts) inside.insert(KindAndName(one));
+    for (const Element* one : document_->Within(frame)) inside.insert(KindAndName(one));
     Element* none = root->GetDocument()->NewElement("none");
     ForElements(root, kReferring, [&](Element* one, const char* tag) {
       if (NumReferences(one, inside) >= 0) {
@@ -401,7 +394,7 @@ class Includer {
     });
   }
 
-  std::shared_ptr<XmlDocument> document_;
+  XmlDocument* document_;
   std::vector<fs::path> open_;  ///< the files around the element, the main file first
   std::set<fs::path> known_;    ///< of the model that is read
   std::uintmax_t bytes_ = 0;
@@ -410,10 +403,8 @@ class Includer {
 
 }  // namespace
 
-void XmlFile::Include() {
-  if (document_->path) {
-    Includer(document_).Resolve(document_->root(), document_->path->parent_path());
-  }
+void XmlDocument::Include() {
+  if (path) Includer(this).Resolve(files.front().xml.RootElement(), path->parent_path());
 }
 
 }  // namespace loopbench::harness

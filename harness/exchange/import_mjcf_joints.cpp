@@ -10,7 +10,7 @@ using Eigen::Vector3d;
 
 /// Adds springs, dampers and the rotor of the joint that was added last; a ball's are dropped.
 void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
-  const MjcfElement& element = joint.element;
+  const XmlElement& element = joint.element;
   double k = element.Number("stiffness", 0.0, kNotNegative);
   double c = element.Number("damping", 0.0, kNotNegative);
   if (!model->settings.has_springs) k = 0.0;
@@ -21,39 +21,39 @@ void AddJointForces(MjcfModel* model, const MjcfJoint& joint) {
     model->draft->description.joints.back().rotor_inertia = rotor;
     return;
   }
-  if (rotor > 0.0) model->draft->Drop(element.own(), "armature", kNoRotors);
-  if (k > 0.0) model->draft->Drop(element.own(), "stiffness", kNeedsOneCoordinate);
-  if (c > 0.0) model->draft->Drop(element.own(), "damping", kNeedsOneCoordinate);
+  if (rotor > 0.0) model->draft->Drop(element, "armature", kNoRotors);
+  if (k > 0.0) model->draft->Drop(element, "stiffness", kNeedsOneCoordinate);
+  if (c > 0.0) model->draft->Drop(element, "damping", kNeedsOneCoordinate);
 }
 
 /// Reads a <joint> or <freejoint>, but not its springs and dampers.
 MjcfJoint ReadJoint(MjcfModel* written, const MjcfPlaced& placed) {
   const MjcfModel& model = *written;
   const auto& [element, X, childclass, replica] = placed;
-  MjcfJoint joint(model.defaults.Of(element, childclass));
+  MjcfJoint joint(element);
   if (const auto name = element.Attribute("name")) {
     joint.name = written->NewName("joint", *name, replica);
   }
   if (element.tag() == "freejoint") {
-    joint.kind = SerialKind::kFree;
+    joint.type = JointType::kFree;
     return joint;
   }
-  using enum SerialKind;
-  constexpr XmlChoice<SerialKind> kTypes[] = {
-      {"hinge", kHinge}, {"slide", kSlide}, {"ball", kBall}, {"free", kFree}};
-  if (const auto type = joint.element.Attribute("type")) joint.kind = type->Choice(kTypes);
+  using enum JointType;
+  constexpr XmlChoice<JointType> kTypes[] = {
+      {"hinge", kRevolute}, {"slide", kPrismatic}, {"ball", kSpherical}, {"free", kFree}};
+  if (const auto type = joint.element.Attribute("type")) joint.type = type->Choice(kTypes);
   const auto position = joint.element.Attribute("pos");
-  if (joint.kind != kFree) joint.position = X.At(VectorOr(position));
+  if (joint.type != kFree) joint.position = X.At(VectorOr(position));
   if (const auto axis = joint.element.Attribute("axis")) {
     joint.axis = model.draft->Vector(*axis, "d");
-    const bool matters = joint.kind == kHinge || joint.kind == kSlide;
+    const bool matters = joint.type == kRevolute || joint.type == kPrismatic;
     if (matters && !(joint.axis.norm() > 0.0)) axis->Fail("an axis that is not zero");
     if (std::abs(joint.axis.squaredNorm() - 1.0) > 0.0) joint.axis.normalize();
   }
   joint.axis = X.q * joint.axis;
   const auto angle_or_length = [&](const char* name) {
     const double value = joint.element.Number(name, 0.0);
-    return joint.kind == kHinge ? model.settings.Angle(value) : value;
+    return joint.type == kRevolute ? model.settings.Angle(value) : value;
   };
   joint.reference = angle_or_length("ref");
   joint.spring_reference = angle_or_length("springref");
@@ -66,26 +66,34 @@ MjcfJoint ReadJoint(MjcfModel* written, const MjcfPlaced& placed) {
   return joint;
 }
 
-void AddJoint(MjcfModel* model, const XmlElement& body, const MjcfStep& step, MjcfJoint joint) {
+/// Adds a joint between two bodies; X_PB is the drawn pose of the child.
+void AddJoint(MjcfModel* model, const XmlElement& body, int parent, int child,
+              const Placement& X_PB, MjcfJoint joint) {
   ImportDraft* draft = model->draft;
-  const bool is_free = joint.kind == SerialKind::kFree;
-  if (is_free && step.parent != kGround) {
-    joint.element.own().Fail("a free joint of a body within another",
-                             "a free joint in a body of <worldbody>");
+  const bool is_free = joint.type == JointType::kFree;
+  if (is_free && parent != kGround) {
+    joint.element.Fail("a free joint of a body within another",
+                       "a free joint in a body of <worldbody>");
   }
   const std::string name = joint.name.empty()
-                               ? draft->NameLater(draft->description.bodies[step.child].name)
+                               ? draft->NameLater(draft->description.bodies[child].name)
                                : draft->NewJointName(body, joint.name);
-  const ComposedJoint ours = *Compose({joint});
-  const Placement X_PF = is_free ? Placement() : step.X_PB * ours.X_BJ;
-  JointDescription& made = draft->AddComposed(name, ours, step.parent, X_PF, step.child);
+  const Placement X_BJ(joint.position), X_PF = is_free ? Placement() : X_PB * X_BJ;
+  JointDescription& made = draft->AddJoint(name, joint.type, {parent, X_PF}, {child, X_BJ});
   joint.joint = draft->last_joint();
   if (is_free) {
-    draft->description.initial.coordinates.push_back({joint.joint, step.X_PB.AsCoordinates()});
+    const Eigen::Quaterniond& q = X_PB.q;
+    draft->description.initial.coordinates.push_back({joint.joint, X_PB.AsCoordinates()});
+    joint.drawn = {X_PB.p.x(), X_PB.p.y(), X_PB.p.z(), q.w(), q.x(), q.y(), q.z()};
   } else if (joint.num_q() == 1) {
-    const bool turns = joint.kind == SerialKind::kHinge;
+    const bool turns = joint.type == JointType::kRevolute;
     const Vector3d own = turns ? Vector3d::UnitZ() : Vector3d::UnitX();
     if (joint.axis != own) made.axis = joint.axis;
+    joint.drawn = {joint.reference};
+    Placement& X = model->where_springs_are_free[child];
+    X = X * MotionOf(joint, &joint.spring_reference);
+  } else {
+    joint.drawn = {1.0, 0.0, 0.0, 0.0};
   }
   if (!joint.name.empty()) model->joint_names.emplace(joint.name, model->joints.size());
   AddJointForces(model, joint);
@@ -142,10 +150,10 @@ void SetServo(const XmlElement& layer, Law* law) {
     law->gain[0] = NumberOr(kp, 1.0, kNotNegative);
     law->bias[1] = -law->gain[0];
     if (kv) law->bias[2] = -kv->Number(kNotNegative);
-    law->inherited_range = NumberOr(layer.Attribute("inheritrange"), 0.0, kNotNegative);
+    law->inherited_range = layer.Number("inheritrange", 0.0, kNotNegative);
     // these need inertias or a state
     for (const char* name : {"dampratio", "timeconst"}) {
-      if (NumberOr(layer.Attribute(name), 0.0) != 0.0) law->is_other = true;
+      if (layer.Number(name, 0.0) != 0.0) law->is_other = true;
     }
   }
   law->dynamics = "none";
@@ -153,9 +161,10 @@ void SetServo(const XmlElement& layer, Law* law) {
 
 /// Returns the law from layers of all kinds of actuators, where the nearest one has precedence. In
 /// a shorter list the remaining values stay unchanged.
-Law LawOf(const MjcfElement& actuator) {
+Law LawOf(const XmlElement& actuator) {
   Law law;
-  for (auto layer = actuator.layers().rbegin(); layer != actuator.layers().rend(); ++layer) {
+  const std::vector<XmlElement> layers = actuator.Layers();
+  for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
     const std::string tag = layer->tag();
     if (tag == "motor") {
       law = Law();
@@ -197,12 +206,12 @@ constexpr const char* kNoMotor =
     "only motors, positions, velocities and dampers of joints act (<key ctrl=...>)";
 
 /// Returns the range of an actuator's control.
-std::optional<MjcfLimits> ControlRange(const MjcfElement& actuator, const Law& law,
+std::optional<MjcfLimits> ControlRange(const XmlElement& actuator, const Law& law,
                                        const MjcfJoint& joint, const MjcfModel& model) {
   if (law.inherited_range <= 0.0) return model.LimitsOf(actuator, "ctrllimited", "ctrlrange");
   auto range = model.LimitsOf(joint.element, "limited", "range");
   if (!range) return std::nullopt;
-  const double unit = joint.kind == SerialKind::kHinge ? model.settings.Angle(1.0) : 1.0;
+  const double unit = joint.type == JointType::kRevolute ? model.settings.Angle(1.0) : 1.0;
   const double middle = 0.5 * unit * (range->first + range->second);
   const double half = 0.5 * unit * law.inherited_range * (range->second - range->first);
   return MjcfLimits{middle - half, middle + half};
@@ -215,7 +224,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
     return std::nullopt;
   };
   const MjcfSettings& settings = model->settings;
-  const MjcfElement peeked = model->defaults.Of(element, "", "", false);
+  const XmlElement peeked = model->defaults.Of(element, "", "", false);
   const auto group = static_cast<int>(std::clamp(peeked.Number("group", 0.0), -1e6, 1e6));
   if (!settings.has_actuation || settings.silent_groups.contains(group)) {
     return drop("it is switched off (<option>)", false);
@@ -240,7 +249,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   if (force[1] > 0.0 || force[2] > 0.0) {
     return drop("its stiffness or damping is negative, or a damping ratio", true);
   }
-  const MjcfElement motor = model->defaults.Of(element, "");
+  const XmlElement motor = model->defaults.Of(element, "");
   // without effect on an actuator without dynamics
   for (const char* rest : {"name", "group", "user", "dynprm", "actdim", "actlimited", "actrange",
                            "actearly", "lengthrange", "cranklength"}) {
@@ -267,7 +276,7 @@ void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int chi
   ImportDraft* draft = model->draft;
   std::vector<MjcfJoint> joints;
   for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(model, joint));
-  if (joints.size() > 1 && std::ranges::count(joints, SerialKind::kFree, &MjcfJoint::kind) > 0) {
+  if (joints.size() > 1 && std::ranges::count(joints, JointType::kFree, &MjcfJoint::type) > 0) {
     body.Fail(fmt::format("{} joints on one body, one of them free", joints.size()),
               "a free joint alone");
   }
@@ -277,20 +286,24 @@ void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int chi
     body.Fail(fmt::format("joints with {} degrees of freedom on one body", freedoms),
               "at most 6, as in MuJoCo");
   }
-  MjcfStep step{parent, child, X_PB};
+  Placement X = X_PB;
+  const auto place = [&](int next) {
+    auto& poses = model->where_springs_are_free;
+    poses.resize(draft->at_rest.size());
+    poses[next] = poses[parent] * X;
+  };
   if (joints.empty()) {
     draft->Fix(parent, X_PB, child, " fixed");
-    model->steps.push_back(step);
+    place(child);
   }
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const bool is_last = i + 1 == joints.size();
-    step.child = is_last ? child : draft->AddLink(body, child);
-    if (!is_last) model->links.insert(step.child);
-    step.joint = static_cast<int>(model->joints.size());
-    AddJoint(model, body, step, std::move(joints[i]));
-    model->steps.push_back(step);
-    step.parent = step.child;
-    step.X_PB = {};
+    const int next = is_last ? child : draft->AddLink(body, child);
+    if (!is_last) model->links.insert(next);
+    place(next);
+    AddJoint(model, body, parent, next, X, std::move(joints[i]));
+    parent = next;
+    X = {};
   }
 }
 
@@ -322,8 +335,7 @@ void ReadMjcfActuators(const XmlElement& root, const std::optional<XmlValue>& co
     const auto limits = model->LimitsOf(joint.element, kEffortFlag, kEffortRange);
     const bool is_constant = effort.stiffness == 0.0 && effort.damping == 0.0;
     if (limits && !is_constant) {
-      model->draft->Drop(joint.element.own(), kEffortRange,
-                         "springs and dampers have no largest effort");
+      model->draft->Drop(joint.element, kEffortRange, "springs and dampers have no largest effort");
     }
     const double constant = is_constant ? Within(limits, effort.constant) : effort.constant;
     if (effort.stiffness > 0.0) {

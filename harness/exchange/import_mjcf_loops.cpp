@@ -5,78 +5,52 @@ namespace loopbench::harness {
 
 namespace {
 
-/// Two frames of a loop, coincident at zero coordinates.
-struct Ends {
-  FrameOn first, second;
-};
-
-/// Returns the frame on a body that coincides with `F` at rest.
-Placement AtRestOn(const MjcfModel& model, const FrameOn& F, int body) {
-  const auto& rest = model.draft->at_rest;
-  return rest[body].Inverse() * rest[F.body] * F.X;
+std::string NameOr(const XmlElement& element, const std::string& otherwise) {
+  const auto name = element.Attribute("name");
+  return name ? name->Name() : otherwise;
 }
 
-std::optional<Ends> EndsAtSites(const MjcfModel& model, const MjcfElement& equality) {
+/// Adds a <connect> or <weld> of two sites, or of two bodies by a point or pose at rest.
+void AddClosure(const XmlElement& equality, MjcfModel* model) {
+  const bool is_weld = equality.tag() == "weld";
+  const auto& rest = model->draft->at_rest;
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
-  if (!site1) return std::nullopt;
-  if (!site2) equality.own().Fail("no \"site2\"", "a site of the other body");
-  return Ends{model.SiteNamed(*site1), model.SiteNamed(*site2)};
-}
-
-Ends EndsOnBodies(const MjcfModel& model, const MjcfElement& equality) {
-  Ends ends;
-  const auto body2 = equality.Attribute("body2");
-  ends.first.body = model.BodyNamed(equality.Required("body1", "the name of a body"));
-  if (body2) ends.second.body = model.BodyNamed(*body2);
-  return ends;
-}
-
-void AddLoopJoint(const MjcfElement& equality, JointType type, const Ends& ends,
-                  const MjcfModel& model) {
-  const auto name = equality.own().Attribute("name");
-  model.draft->AddLoop(
-      equality.own(),
-      model.draft->NameLater((name ? name->Name() : equality.own().tag()) + model.Suffix()), type,
-      ends.first, ends.second);
-}
-
-void AddConnect(const MjcfElement& equality, MjcfModel* model) {
-  auto ends = EndsAtSites(*model, equality);
-  if (!ends) {
-    ends = EndsOnBodies(*model, equality);
-    ends->first.X.p = equality.Required("anchor", "3 numbers").Vector();
-    ends->second.X.p = AtRestOn(*model, ends->first, ends->second.body).p;
+  FrameOn first, second;
+  if (site1) {
+    if (!site2) equality.Fail("no \"site2\"", "a site of the other body");
+    first = model->SiteNamed(*site1);
+    second = model->SiteNamed(*site2);
+  } else {
+    const auto body2 = equality.Attribute("body2");
+    first.body = model->BodyNamed(equality.Required("body1", "the name of a body"));
+    if (body2) second.body = model->BodyNamed(*body2);
   }
-  ends->first.X.q.setIdentity();
-  ends->second.X.q.setIdentity();
-  AddLoopJoint(equality, JointType::kSpherical, *ends, *model);
-}
-
-/// Returns the ends of a weld of bodies. `relpose`: pose of the second body in the first, from the
-/// anchor on the second.
-Ends EndsOfBodies(const MjcfElement& equality, const MjcfModel& model) {
-  Ends ends = EndsOnBodies(model, equality);
-  ends.first.X = AtRestOn(model, ends.second, ends.first.body);
-  if (const auto pose = equality.Attribute("relpose")) {
-    const std::vector<double> p = model.draft->Numbers(*pose, "nnnq");
-    const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
-    // a zero quaternion selects the drawn poses
-    if (q.norm() > 0.0) ends.first.X = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
+  if (!site1 && is_weld) {
+    first.X = rest[first.body].Inverse() * rest[second.body];
+    if (const auto pose = equality.Attribute("relpose")) {
+      // pose of the second body in the first; a zero quaternion selects the drawn poses
+      const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
+      const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
+      if (q.norm() > 0.0) first.X = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
+    }
+  } else if (!site1) {
+    first.X.p = equality.Required("anchor", "3 numbers").Vector();
+    second.X = rest[second.body].Inverse() * rest[first.body] * first.X;
   }
-  return ends;
-}
-
-/// Adds a weld of two bodies, or of two sites, whose frames coincide.
-void AddWeld(const MjcfElement& equality, MjcfModel* model) {
-  auto ends = EndsAtSites(*model, equality);
-  if (!ends) ends = EndsOfBodies(equality, *model);
-  // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
-  for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
-  AddLoopJoint(equality, JointType::kWeld, *ends, *model);
+  if (is_weld) {
+    // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
+    for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
+  } else {
+    first.X.q.setIdentity();
+    second.X.q.setIdentity();
+  }
+  const std::string name = NameOr(equality, equality.tag()) + model->Suffix();
+  model->draft->AddLoop(equality, model->draft->NameLater(name),
+                        is_weld ? JointType::kWeld : JointType::kSpherical, first, second);
 }
 
 /// Returns the coefficients of `polycoef`; missing ones have their defaults.
-std::vector<double> PolynomialOf(const MjcfElement& equality) {
+std::vector<double> PolynomialOf(const XmlElement& equality) {
   std::vector<double> a = {0.0, 1.0, 0.0, 0.0, 0.0};
   if (const auto given = equality.Attribute("polycoef")) {
     std::ranges::copy(given->Numbers(1, 5), a.begin());
@@ -88,18 +62,18 @@ std::vector<double> PolynomialOf(const MjcfElement& equality) {
 ///
 /// MuJoCo: q1 - q1_0 = a_0 + a_1 (q2 - q2_0) + ..., with q_0 the coordinates in the drawn position.
 /// Loopbench's coordinates are 0 there.
-bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
+bool AddJointEquality(const XmlElement& equality, MjcfModel* model) {
   const MjcfJoint& joint =
       model->joints[model->JointNamed(equality.Required("joint1", "the name of a joint"))];
   const std::vector<double> a = PolynomialOf(equality);
   const auto other = equality.Attribute("joint2");
   const MjcfJoint* leader = other ? &model->joints[model->JointNamed(*other)] : nullptr;
   if (joint.num_q() != 1 || (leader != nullptr && leader->num_q() != 1)) {
-    model->draft->Note(equality.own(), kNotCoupled, true);
+    model->draft->Note(equality, kNotCoupled, true);
     return false;
   }
   if (leader != nullptr && (a[2] != 0.0 || a[3] != 0.0 || a[4] != 0.0)) {
-    model->draft->Note(equality.own(), "polycoef",
+    model->draft->Note(equality, "polycoef",
                        "dropped: couplings are linear: this is a freedom more than in the file",
                        true);
     return false;
@@ -108,9 +82,8 @@ bool AddJointEquality(const MjcfElement& equality, MjcfModel* model) {
     model->draft->description.joints[joint.joint].motions = {{0, Polynomial{{a[0]}}}};
     return true;
   }
-  const auto name = equality.own().Attribute("name");
-  model->draft->AddFollower(equality.own(), (name ? name->Name() : "equality") + model->Suffix(),
-                            joint.joint, {leader->joint, a[1]}, a[0]);
+  model->draft->AddFollower(equality, NameOr(equality, "equality") + model->Suffix(), joint.joint,
+                            {leader->joint, a[1]}, a[0]);
   return true;
 }
 
@@ -121,7 +94,7 @@ void ReadEquality(const XmlElement& root, MjcfModel* model) {
       model->draft->DropWhole(element, "it is not active");
       continue;
     }
-    const MjcfElement equality = model->defaults.Of(element, "", "equality");
+    const XmlElement equality = model->defaults.Of(element, "", "equality");
     for (const char* name : {"solref", "solimp"}) equality.Attribute(name);
     const std::string tag = element.tag();
     bool is_exact = tag == "connect" || tag == "weld";
@@ -136,8 +109,7 @@ void ReadEquality(const XmlElement& root, MjcfModel* model) {
       }
     }
     model->ForReplicas(references, [&] {
-      if (tag == "connect") AddConnect(equality, model);
-      if (tag == "weld") AddWeld(equality, model);
+      if (tag == "connect" || tag == "weld") AddClosure(equality, model);
       if (tag == "joint") is_exact = AddJointEquality(equality, model);
     });
     if (is_exact) {
@@ -152,7 +124,7 @@ void ReadEquality(const XmlElement& root, MjcfModel* model) {
 std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
   std::map<std::string, XmlElement> held;
   for (const XmlElement& element : root.InSections("equality", {"tendon"})) {
-    const MjcfElement equality = model.defaults.Of(element, "", "equality", false);
+    const XmlElement equality = model.defaults.Of(element, "", "equality", false);
     const auto active = equality.Attribute("active");
     const auto first = equality.Attribute("tendon1");
     if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
@@ -174,7 +146,7 @@ std::optional<std::pair<BodyPoint, BodyPoint>> StraightEnds(const XmlElement& el
   return std::pair{end(sites[0]), end(sites[1])};
 }
 
-void AddSpring(const MjcfElement& tendon, const std::pair<BodyPoint, BodyPoint>& ends,
+void AddSpring(const XmlElement& tendon, const std::pair<BodyPoint, BodyPoint>& ends,
                double free_length, MjcfModel* model) {
   SpringDamper spring;
   std::tie(spring.from, spring.to) = ends;
@@ -212,11 +184,11 @@ void AddFixedTendon(const XmlElement& element, const XmlElement& held, MjcfModel
     if (part != parts.end()) child.Fail("a joint twice", "each joint once");
     parts.push_back({joint.joint, child.Required("coef", "a number").Number()});
   }
-  const MjcfElement equality = model->defaults.Of(held, "", "equality");
-  equality.own().Attribute("name");  // the coupling has the name of the tendon
+  const XmlElement equality = model->defaults.Of(held, "", "equality");
+  equality.Attribute("name");  // the coupling has the name of the tendon
   model->draft->AddCoupling(element, element.Attribute("name")->Name() + model->Suffix(),
                             std::move(parts), PolynomialOf(equality)[0]);
-  const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
+  const XmlElement tendon = model->defaults.Of(element, "", "tendon");
   model->NoteLimits(tendon, "tendons do not end");
   for (const char* key : {"stiffness", "damping", "frictionloss", "armature"}) {
     model->DropNonzero(tendon, key, "the length of the tendon is constant");
@@ -224,7 +196,7 @@ void AddFixedTendon(const XmlElement& element, const XmlElement& held, MjcfModel
 }
 
 void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElement>& held,
-                const std::vector<Placement>& free_poses, MjcfModel* model) {
+                MjcfModel* model) {
   const auto name = element.Attribute("name");
   const bool is_held = name && held.contains(name->text()) && model->settings.has_equality;
   if (element.tag() == "fixed" && is_held) {
@@ -239,14 +211,14 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
                 : "only spatial tendons straight between two sites of two bodies are springs here",
         true);
   }
-  const MjcfElement tendon = model->defaults.Of(element, "", "tendon");
-  AddSpring(tendon, *ends, LengthOf(*ends, free_poses), model);
+  const XmlElement tendon = model->defaults.Of(element, "", "tendon");
+  AddSpring(tendon, *ends, LengthOf(*ends, model->where_springs_are_free), model);
   model->NoteLimits(tendon, "tendons do not end");
   model->DropNonzero(tendon, "frictionloss", "there is no dry friction");
   model->DropNonzero(tendon, "armature", "tendons have no inertia");
   if (!is_held) return;
-  const MjcfElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
-  equality.own().Attribute("name");  // the rod has the name of the tendon
+  const XmlElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
+  equality.Attribute("name");  // the rod has the name of the tendon
   const double length = LengthOf(*ends, model->draft->at_rest) + PolynomialOf(equality)[0];
   if (!(length > 0.0)) element.Fail("a length that is not > 0", "one that is");
   ImportDraft* draft = model->draft;
@@ -254,30 +226,13 @@ void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElemen
   const std::string rod = draft->NameLater(name->Name() + model->Suffix());
   draft->AddJoint(rod, JointType::kRod, {a.body, Placement(a.at)}, {b.body, Placement(b.at)})
       .parameter = length;
-  draft->Note(equality.own(), "a rod here, exactly of its length");
+  draft->Note(equality, "a rod here, exactly of its length");
 }
 
 // <keyframe>: conversion of coordinates and speeds from MuJoCo's joints.
 
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-/// Returns the coordinates in the drawn position: qpos0 of MuJoCo.
-std::vector<double> DrawnCoordinates(const MjcfModel& model) {
-  std::vector<double> qpos;
-  for (const MjcfStep& step : model.steps) {
-    if (step.joint < 0) continue;
-    const MjcfJoint& joint = model.joints[step.joint];
-    const Vector3d& p = step.X_PB.p;
-    const Quaterniond& q = step.X_PB.q;
-    if (joint.num_q() == 1) qpos.push_back(joint.reference);
-    if (joint.kind == SerialKind::kBall) qpos.insert(qpos.end(), {1.0, 0.0, 0.0, 0.0});
-    if (joint.kind == SerialKind::kFree) {
-      qpos.insert(qpos.end(), {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()});
-    }
-  }
-  return qpos;
-}
 
 /// Sets coordinates, and speeds if given, of the Loopbench joints from MuJoCo's.
 void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<double>& qpos,
@@ -291,10 +246,10 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
     const JointDescription& ours = model->draft->description.joints[joint.joint];
     std::vector<double> coordinates, speeds;
     if (positions && joint.num_q() > 1) {
-      const double* turn = q + (joint.kind == SerialKind::kFree ? 3 : 0);
+      const double* turn = q + (joint.type == JointType::kFree ? 3 : 0);
       UnitQuaternion(*positions, {turn[0], turn[1], turn[2], turn[3]});  // rejects zero
     }
-    if (joint.kind == SerialKind::kFree) {
+    if (joint.type == JointType::kFree) {
       // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
       const Vector3d w =
@@ -327,7 +282,6 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
 void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
   const std::map<std::string, XmlElement> held = HeldTendons(root, *model);
   ReadEquality(root, model);
-  const std::vector<Placement> free_poses = model->WhereSpringsAreFree();
   for (const XmlElement& element : root.InSections("tendon")) {
     MjcfModel::References parts;
     for (const char* kind : {"site", "joint"}) {
@@ -335,19 +289,8 @@ void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
         parts.emplace_back(kind, part.Attribute(kind));
       }
     }
-    model->ForReplicas(parts, [&] { ReadTendon(element, held, free_poses, model); });
+    model->ForReplicas(parts, [&] { ReadTendon(element, held, model); });
   }
-}
-
-std::vector<Placement> MjcfModel::WhereSpringsAreFree() const {
-  std::vector<Placement> poses(draft->at_rest.size());
-  for (const MjcfStep& step : steps) {
-    Placement X = poses[step.parent] * step.X_PB;
-    const MjcfJoint* joint = step.joint < 0 ? nullptr : &joints[step.joint];
-    if (joint != nullptr && joint->num_q() == 1) X = X * MotionOf(*joint, &joint->spring_reference);
-    poses[step.child] = X;
-  }
-  return poses;
 }
 
 void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
@@ -355,8 +298,9 @@ void ReadMjcfKeys(const XmlElement& root, MjcfModel* model) {
   std::optional<XmlValue> controls;
   const bool has_start = !keys.empty() && model->replicates.empty();
   if (has_start) {
-    std::vector<double> qpos = DrawnCoordinates(*model), qvel;
+    std::vector<double> qpos, qvel;
     for (const MjcfJoint& joint : model->joints) {
+      qpos.insert(qpos.end(), joint.drawn.begin(), joint.drawn.end());
       qvel.insert(qvel.end(), static_cast<std::size_t>(joint.num_u()), 0.0);
     }
     const auto positions = keys[0].Attribute("qpos");

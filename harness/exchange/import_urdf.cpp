@@ -45,7 +45,7 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
   const Eigen::Matrix3d I = InertiaOf([&](const char* name, bool is_moment) {
     return is_moment ? inertia.Required(name, "a number [kg m^2]").Number()
-                     : NumberOr(inertia.Attribute(name), 0.0);
+                     : inertia.Number(name, 0.0);
   });
   draft->SetMass(body, kg, X.p, InTurnedAxes(X.q, I));
 }
@@ -143,13 +143,13 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
   ReadAxis(element, &joint, draft);
   const auto dynamics = element.Child("dynamics");
   if (!dynamics) return;
-  const double c = NumberOr(dynamics->Attribute("damping"), 0.0, kNotNegative);
+  const double c = dynamics->Number("damping", 0.0, kNotNegative);
   if (NumValues(read.type, SpaceKind::kSpatial, true) == 1) {
     draft->AddSpringAndDamper(0.0, 0.0, c);
   } else if (c > 0.0) {
     draft->Drop(*dynamics, "damping", "only joints with one coordinate have dampers");
   }
-  if (NumberOr(dynamics->Attribute("friction"), 0.0) != 0.0) {
+  if (dynamics->Number("friction", 0.0) != 0.0) {
     draft->Drop(*dynamics, "friction", kDryFriction);
   }
 }
@@ -159,8 +159,8 @@ void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
   const auto mimic = read.element.Child("mimic");
   if (!mimic) return;
   const int leader = draft->JointNamed(mimic->Required("joint", "the name of a joint"));
-  const double multiplier = NumberOr(mimic->Attribute("multiplier"), 1.0);
-  const double offset = NumberOr(mimic->Attribute("offset"), 0.0);
+  const double multiplier = mimic->Number("multiplier", 1.0);
+  const double offset = mimic->Number("offset", 0.0);
   draft->AddMimic(*mimic, follower, {leader, multiplier}, offset);
 }
 

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <cstring>
-#include <fstream>
 #include <tuple>
 
 #include "harness/text/files.h"
@@ -54,11 +53,10 @@ std::vector<int> SpanningPoints(const std::vector<Vector3d>& points, double negl
   return chosen;
 }
 
+/// Fails at a line of a file, or without a line.
 [[noreturn]] void Fail(const std::filesystem::path& path, std::size_t line, std::string_view found,
                        std::string_view expected) {
-  const std::string place = line == 0 ? "" : fmt::format(":{}", line);
-  throw ConfigError(
-      fmt::format("{}{}: found {}, expected {}", path.string(), place, found, expected));
+  xml::FailIn(path.string(), static_cast<std::ptrdiff_t>(line), found, expected);
 }
 
 std::string ReadBytes(const std::filesystem::path& path) {
@@ -67,12 +65,7 @@ std::string ReadBytes(const std::filesystem::path& path) {
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error || !std::filesystem::is_regular_file(path)) Fail(path, 0, "no such file", "a mesh");
   if (size > kMost) Fail(path, 0, fmt::format("{} bytes", size), "at most 64 MiB");
-  std::string bytes(size, '\0');
-  std::ifstream in(path, std::ios::binary);
-  if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) {
-    Fail(path, 0, "a file that cannot be read", "a mesh");
-  }
-  return bytes;
+  return ReadFile(path);
 }
 
 /// Returns a mesh from the corners of its triangles, three for each; equal points become one.

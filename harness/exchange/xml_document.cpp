@@ -24,11 +24,6 @@ std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '
 /// which would garble messages and cannot be written as JSON.
 bool IsText(std::string_view text) { return EncodingFault(text).empty(); }
 
-[[noreturn]] void FailParsing(const std::string& file, std::ptrdiff_t line, std::string_view found,
-                              std::string_view expected) {
-  throw ConfigError(fmt::format("{}:{}: found {}, expected {}", file, line, found, expected));
-}
-
 /// Limits attributes before parsing, since the parser compares all attributes of an element.
 void RefuseManyAttributes(std::string_view text, const std::string& file) {
   constexpr int kMost = 1000;
@@ -48,7 +43,7 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
       if (quote == '\0' || quote == c) quote = quote == c ? '\0' : c;
     }
     if (count <= kMost) continue;
-    FailParsing(file, 1 + std::ranges::count(text.substr(0, at), '\n'),
+    xml::FailIn(file, 1 + std::ranges::count(text.substr(0, at), '\n'),
                 fmt::format("an element with {} attributes", count),
                 fmt::format("at most {}", kMost));
   }
@@ -62,16 +57,13 @@ std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const Element& element) 
   return attributes;
 }
 
-Element* FirstWithin(const XmlDocument& document, Element* element,
-                     const std::vector<std::string_view>& tags) {
-  for (Element* child : document.ChildrenOf(element)) {
-    if (std::ranges::find(tags, child->Name()) != tags.end()) return child;
-    if (Element* within = FirstWithin(document, child, tags)) return within;
-  }
-  return nullptr;
-}
-
 }  // namespace
+
+void xml::FailIn(const std::string& file, std::ptrdiff_t line, std::string_view found,
+                 std::string_view expected) {
+  const std::string place = line == 0 ? file : fmt::format("{}:{}", file, line);
+  throw ConfigError(fmt::format("{}: found {}, expected {}", place, found, expected));
+}
 
 std::string_view xml::Trimmed(std::string_view text) {
   const std::size_t start = text.find_first_not_of(kBlanks);
@@ -182,8 +174,10 @@ std::vector<XmlElement> XmlElement::InSections(const char* section,
 }
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
-  Element* found = FirstWithin(*document_, element_, tags);
-  return found != nullptr ? std::optional(XmlElement(document_, found)) : std::nullopt;
+  for (Element* one : document_->Within(element_)) {
+    if (std::ranges::find(tags, one->Name()) != tags.end()) return XmlElement(document_, one);
+  }
+  return std::nullopt;
 }
 
 std::optional<XmlElement> XmlElement::Child(const char* tag) const {
@@ -202,10 +196,17 @@ XmlElement XmlElement::RequiredChild(const char* tag) const {
 }
 
 std::optional<XmlValue> XmlElement::Attribute(const std::string& name) const {
-  const tinyxml2::XMLAttribute* attribute = element_->FindAttribute(name.c_str());
-  if (attribute == nullptr) return std::nullopt;
-  document_->read.insert(attribute);
-  return XmlValue(*this, name, attribute->Value());
+  std::optional<XmlValue> found;
+  if (const auto* own = element_->FindAttribute(name.c_str()); own != nullptr) {
+    document_->read.insert(own);
+    found = XmlValue(XmlElement(document_, element_), name, own->Value());
+  }
+  if (name == "name") return found;
+  for (const XmlElement& element : defaults_) {
+    auto value = element.Attribute(name);
+    if (!found) found = std::move(value);
+  }
+  return found;
 }
 
 std::optional<XmlValue> XmlElement::Filled(const std::string& name) const {
@@ -235,12 +236,41 @@ std::optional<XmlValue> XmlElement::Content(const char* tag) const {
 void XmlElement::Ignore() const {
   for (const auto* attribute : AttributesIn(*element_)) document_->read.insert(attribute);
   for (const XmlElement& child : Children()) child.Ignore();
+  for (const XmlElement& element : defaults_) element.Ignore();
 }
 
-Element* xml::Parse(std::string_view text, const std::string& file, XmlDocument* document) {
+XmlElement XmlDocument::root() { return XmlElement(this, files.front().xml.RootElement()); }
+
+std::vector<Element*> XmlDocument::ChildrenOf(Element* element) const {
+  std::vector<Element*> children = xml::ChildrenIn(element);
+  if (included.empty() && added.empty()) return children;
+  std::vector<Element*> all;
+  for (Element* child : children) {
+    const auto found = included.find(child);
+    if (found == included.end()) {
+      all.push_back(child);
+    } else {
+      std::ranges::copy(ChildrenOf(found->second), std::back_inserter(all));
+    }
+  }
+  const auto more = added.find(element);
+  if (more != added.end()) std::ranges::copy(more->second, std::back_inserter(all));
+  return all;
+}
+
+void XmlDocument::AddWithin(Element* element, std::string_view tag,
+                            std::vector<Element*>* found) const {
+  for (Element* child : ChildrenOf(element)) {
+    const bool fits = tag.empty() || child->Name() == tag;
+    if (fits) found->push_back(child);
+    if (!fits || tag.empty()) AddWithin(child, tag, found);
+  }
+}
+
+Element* XmlDocument::Parse(std::string_view text, const std::string& file) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  auto& [xml, name] = document->files.emplace_back();
+  auto& [xml, name] = files.emplace_back();
   name = file;
   xml.SetUserData(&name);
   if (const std::string fault = EncodingFault(text); !fault.empty()) {
@@ -249,39 +279,39 @@ Element* xml::Parse(std::string_view text, const std::string& file, XmlDocument*
   RefuseManyAttributes(text, file);
   const auto error = xml.Parse(text.data(), text.size());
   if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
-    FailParsing(file, xml.ErrorLineNum(),
+    xml::FailIn(file, xml.ErrorLineNum(),
                 fmt::format("more than {} elements within each other", TINYXML2_MAX_ELEMENT_DEPTH),
                 "fewer");
   }
   if (error != tinyxml2::XML_SUCCESS) {
-    FailParsing(file, std::max(1, xml.ErrorLineNum()),
+    xml::FailIn(file, std::max(1, xml.ErrorLineNum()),
                 fmt::format("a fault of syntax ({})", xml.ErrorIDToName(error)), "well-formed XML");
   }
   for (const auto* node = xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
     if (node->ToUnknown() == nullptr) continue;
-    FailParsing(file, node->GetLineNum(), "a document type or declaration of entities",
+    xml::FailIn(file, node->GetLineNum(), "a document type or declaration of entities",
                 "none: they are not read");
   }
   if (xml.RootElement() == nullptr) {
-    FailParsing(file, 1, "no element", "<mujoco>, <robot> or <sdf>");
+    xml::FailIn(file, 1, "no element", "<mujoco>, <robot> or <sdf>");
   }
   return xml.RootElement();
 }
 
-std::vector<std::pair<XmlElement, std::string>> XmlFile::Unread() const {
+std::vector<std::pair<XmlElement, std::string>> XmlDocument::Unread() {
   std::vector<std::pair<XmlElement, std::string>> parts;
   const std::function<void(Element*)> add = [&](Element* element) {
-    if (!document_->read.contains(element)) {
-      parts.emplace_back(XmlElement(document_, element), "");
+    if (!read.contains(element)) {
+      parts.emplace_back(XmlElement(this, element), "");
       return;
     }
     for (const auto* one : AttributesIn(*element)) {
-      if (document_->read.contains(one)) continue;
-      parts.emplace_back(XmlElement(document_, element), IsText(one->Name()) ? one->Name() : "?");
+      if (read.contains(one)) continue;
+      parts.emplace_back(XmlElement(this, element), IsText(one->Name()) ? one->Name() : "?");
     }
-    for (Element* child : document_->ChildrenOf(element)) add(child);
+    for (Element* child : ChildrenOf(element)) add(child);
   };
-  add(document_->root());
+  add(files.front().xml.RootElement());
   return parts;
 }
 

@@ -1,10 +1,10 @@
 // XML files for the importers: elements and values with their location, strict parsing, and a
 // record of the parts that were read.
 //
-// XmlFile::Unread lists all unread parts at the end, so that none is lost silently. All errors are
-// ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...". Rejected files: larger
-// than kMaxConfigBytes, nested deeper than the parser's limit, invalid UTF-8, or with a document
-// type, the only place for entity declarations (no entity is expanded).
+// XmlDocument::Unread lists all unread parts at the end, so that none is lost silently. All errors
+// are ConfigError, "FILE:LINE: <element name="...">: found ..., expected ...". Rejected files:
+// larger than kMaxConfigBytes, nested deeper than the parser's limit, invalid UTF-8, or with a
+// document type, the only place for entity declarations (no entity is expanded).
 //
 // A file may contain others (Include()): their elements are read in place of <include> or <attach>,
 // with their own file names and lines in messages.
@@ -17,7 +17,6 @@
 #include <charconv>
 #include <deque>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,7 +29,7 @@
 
 namespace loopbench::harness {
 
-struct XmlDocument;
+class XmlElement;
 
 namespace xml {
 
@@ -52,8 +51,9 @@ inline Element* OriginalOf(Element* element) {
   return original != nullptr ? static_cast<Element*>(original) : element;
 }
 
-/// Adds a parsed file and returns its root element. Throws ConfigError.
-Element* Parse(std::string_view text, const std::string& file, XmlDocument* document);
+/// Throws ConfigError: FILE:LINE: found ..., expected ...; without the line if it is 0.
+[[noreturn]] void FailIn(const std::string& file, std::ptrdiff_t line, std::string_view found,
+                         std::string_view expected);
 /// Returns "" for files that do not exist.
 inline std::filesystem::path CanonicalOf(const std::filesystem::path& path) {
   std::error_code error;
@@ -74,8 +74,41 @@ bool ReadNumber(std::string_view word, Number* number) {
 
 }  // namespace xml
 
-/// Parsed files; `read` contains elements and attributes.
-struct XmlDocument {
+/// A file with the files that it contains. Its elements are valid as long as the document.
+class XmlDocument {
+ public:
+  /// `file` is the name in messages; `place` its path, without which it has no other files.
+  XmlDocument(std::string_view text, const std::string& file,
+              const std::optional<std::filesystem::path>& place = {})
+      : path(place) {
+    Parse(text, file);
+  }
+
+  /// Adds a parsed file and returns its root element. Throws ConfigError.
+  xml::Element* Parse(std::string_view text, const std::string& file);
+  /// Resolves the elements of MJCF that stand for other files, at most kMaxConfigBytes in all, or
+  /// for copies.
+  ///   <include file="...">: the children of the root element of that file, which is read once.
+  ///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
+  ///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.
+  ///   Without `model`: a copy of a body of the file itself, then of tendons and so on.
+  void Include();
+
+  XmlElement root();
+  const std::string& name() const { return files.front().name; }
+  /// Returns the children of an element, including children from other files.
+  std::vector<xml::Element*> ChildrenOf(xml::Element* element) const;
+  /// Returns its descendants in file order; with `tag`, those with this tag that are not within
+  /// each other.
+  std::vector<xml::Element*> Within(xml::Element* element, std::string_view tag = "") const {
+    std::vector<xml::Element*> found;
+    AddWithin(element, tag, &found);
+    return found;
+  }
+  /// Returns all unread parts in file order: an element with its contents (attribute ""), or an
+  /// attribute of an element that was read.
+  std::vector<std::pair<XmlElement, std::string>> Unread();
+
   struct File {
     tinyxml2::XMLDocument xml;  ///< its user data points to `name`
     std::string name;           ///< in messages
@@ -86,34 +119,19 @@ struct XmlDocument {
   std::unordered_map<const xml::Element*, xml::Element*> included;
   std::unordered_map<const xml::Element*, std::vector<xml::Element*>> added;  ///< further children
   std::unordered_set<const xml::Element*> attached_defaults;
-  std::unordered_set<const void*> read;
+  std::unordered_set<const void*> read;  ///< elements and attributes
 
-  xml::Element* root() { return files.front().xml.RootElement(); }
-  /// Returns the children of an element, including children from other files.
-  std::vector<xml::Element*> ChildrenOf(xml::Element* element) const {
-    std::vector<xml::Element*> children = xml::ChildrenIn(element);
-    if (included.empty() && added.empty()) return children;
-    std::vector<xml::Element*> all;
-    for (xml::Element* child : children) {
-      const auto found = included.find(child);
-      if (found == included.end()) {
-        all.push_back(child);
-      } else {
-        std::ranges::copy(ChildrenOf(found->second), std::back_inserter(all));
-      }
-    }
-    const auto more = added.find(element);
-    if (more != added.end()) std::ranges::copy(more->second, std::back_inserter(all));
-    return all;
-  }
+ private:
+  void AddWithin(xml::Element* element, std::string_view tag,
+                 std::vector<xml::Element*>* found) const;
 };
 
 class XmlValue;
 
 class XmlElement {
  public:
-  XmlElement(std::shared_ptr<XmlDocument> document, xml::Element* element)
-      : document_(std::move(document)), element_(element) {
+  XmlElement(XmlDocument* document, xml::Element* element)
+      : document_(document), element_(element) {
     document_->read.insert(element_);
   }
 
@@ -138,7 +156,11 @@ class XmlElement {
   /// Returns the only child with this tag; throws if it is absent.
   XmlElement RequiredChild(const char* tag) const;
 
+  /// Returns an attribute of the element or, if absent, of the nearest default that has it; names
+  /// have no default.
   std::optional<XmlValue> Attribute(const std::string& name) const;
+  /// Returns the number of an attribute; `otherwise` if absent.
+  double Number(const std::string& name, double otherwise, const Range& range = {}) const;
   /// Returns an attribute that is not empty.
   std::optional<XmlValue> Filled(const std::string& name) const;
   /// Returns an attribute; if absent, throws with `expected`.
@@ -153,10 +175,19 @@ class XmlElement {
   /// Returns the first descendant with one of these tags; marks only that element as read.
   std::optional<XmlElement> Within(const std::vector<std::string_view>& tags) const;
 
+  /// Adds an element whose attributes are defaults, after the nearer ones.
+  void AddDefault(const XmlElement& element) { defaults_.push_back(element); }
+  /// Returns the element alone, then its defaults alone, nearest first.
+  std::vector<XmlElement> Layers() const {
+    std::vector<XmlElement> layers = {XmlElement(document_, element_)};
+    std::ranges::copy(defaults_, std::back_inserter(layers));
+    return layers;
+  }
+
   /// Returns true for the outermost <default> of an attached model.
   bool is_attached_default() const { return document_->attached_defaults.contains(element_); }
 
-  /// Marks the element and all its contents as read.
+  /// Marks the element, all its contents and its defaults as read.
   void Ignore() const;
 
   [[noreturn]] void Fail(std::string_view found, std::string_view expected,
@@ -167,8 +198,9 @@ class XmlElement {
  private:
   friend class XmlValue;
 
-  std::shared_ptr<XmlDocument> document_;
+  XmlDocument* document_;
   xml::Element* element_;
+  std::vector<XmlElement> defaults_;  ///< nearest first
 };
 
 /// A word and its value.
@@ -222,6 +254,10 @@ inline double NumberOr(const std::optional<XmlValue>& value, double otherwise,
                        const Range& range = {}) {
   return value ? value->Number(range) : otherwise;
 }
+inline double XmlElement::Number(const std::string& name, double otherwise,
+                                 const Range& range) const {
+  return NumberOr(Attribute(name), otherwise, range);
+}
 inline bool BoolOr(const std::optional<XmlValue>& value, bool otherwise = false) {
   return value ? value->Bool() : otherwise;
 }
@@ -229,33 +265,5 @@ inline Eigen::Vector3d VectorOr(const std::optional<XmlValue>& value,
                                 const Eigen::Vector3d& otherwise = Eigen::Vector3d::Zero()) {
   return value ? value->Vector() : otherwise;
 }
-
-class XmlFile {
- public:
-  /// `file` is the name in messages; `path` its place, without which it has no other files.
-  XmlFile(std::string_view text, const std::string& file,
-          const std::optional<std::filesystem::path>& path = {}) {
-    document_->path = path;
-    xml::Parse(text, file, document_.get());
-  }
-
-  /// Resolves the elements of MJCF that stand for other files, at most kMaxConfigBytes in all, or
-  /// for copies.
-  ///   <include file="...">: the children of the root element of that file, which is read once.
-  ///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
-  ///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.
-  ///   Without `model`: a copy of a body of the file itself, then of tendons and so on.
-  void Include();
-
-  XmlElement root() const { return XmlElement(document_, document_->root()); }
-  const std::string& name() const { return document_->files.front().name; }
-
-  /// Returns all unread parts in file order: an element with its contents (attribute ""), or an
-  /// attribute of an element that was read.
-  std::vector<std::pair<XmlElement, std::string>> Unread() const;
-
- private:
-  std::shared_ptr<XmlDocument> document_ = std::make_shared<XmlDocument>();
-};
 
 }  // namespace loopbench::harness

@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3685,  18,   6},  2700},
     {"harness/figures",         { 3045,  12,   7},  1900},
     {"harness/view",            { 2399,   7,   8},  2050},
-    {"harness/exchange",        { 9090,  35,  10},  5000},
+    {"harness/exchange",        { 8892,  35,  10},  5000},
     {"harness/report",          { 1092,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
-    {"harness/cli",             { 7797,  24,  29},  3600},
+    {"harness/cli",             { 7750,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92992, 506, 242}, 62000}
+    {"",                        {92747, 506, 242}, 62000}
 };
 // clang-format on
 

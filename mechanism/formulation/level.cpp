@@ -15,10 +15,9 @@ namespace loopbench {
 
 namespace {
 
-// Level velocity: speeds of the state are projected inside the right-hand side, or completed where
-// the state carries independent ones only. A state that carries all speeds gets the projected ones
-// after each accepted step: the difference of the two would grow exponentially.
-
+/// Level velocity: speeds of the state are projected inside the right-hand side, or completed where
+/// the state carries independent ones only. A state that carries all speeds gets the projected ones
+/// after each accepted step: the difference of the two would grow exponentially.
 template <class Space, class S>
 class VelocityLevel final : public Level<Space, S> {
  public:

@@ -11,10 +11,9 @@
 // Dense: for analyses before a run.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <vector>
 
-#include "mechanism/algebra/factors.h"
-#include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench {
@@ -44,8 +43,6 @@ LoopSpectrum SpectrumOfLoops(const Kinematics<Space, double>& kinematics);
 /// Positions of `kinematics`, in joint coordinates, must be current, for both.
 template <class Space>
 ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics);
-
-// Constraint rows of all cut joints, scaled so that lengths and angles compare: geometry alone.
 
 /// Constraints of all cut joints as rows that compare: J L^-T with L L^T the geometric mass matrix,
 /// each row over the square root of its own free response. Rows are by joint and direction in the

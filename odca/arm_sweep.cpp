@@ -237,7 +237,7 @@ std::optional<Correction<double>> ArmSweep::Gap() {
   return largest;
 }
 
-/// As level_position.cpp does it by parts.
+/// As level.cpp does it by parts.
 std::optional<Correction<double>> ArmSweep::Project(std::span<double> q, std::span<double> u,
                                                     double goal) {
   const auto size = [&](const Correction<double>& gap) {

@@ -1,4 +1,4 @@
-// Level projection of accepted steps for mechanisms of pins; level_position.cpp does it by parts.
+// Level projection of accepted steps for mechanisms of pins; level.cpp does it by parts.
 // `Sweep` stands for PathSweep and AssemblySweep.
 #pragma once
 

@@ -14,8 +14,8 @@
 #include "harness/config/options.h"
 #include "harness/json/fields.h"
 #include "harness/text/files.h"
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {

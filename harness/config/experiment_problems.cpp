@@ -15,7 +15,7 @@
 #include "harness/text/files.h"
 #include "harness/text/words.h"
 #include "mechanism/description/library.h"
-#include "mechanism/description/similarity.h"
+#include "mechanism/description/transforms.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,7 +7,7 @@
 #include "harness/exchange/import_draft.h"
 #include "harness/text/files.h"
 #include "mechanism/algebra/symmetric_eigen.h"
-#include "mechanism/description/islands.h"
+#include "mechanism/description/topology.h"
 
 namespace loopbench::harness {
 

@@ -342,11 +342,7 @@ class Checker {
     const auto index = static_cast<int>(c);
     const double open = kinematics.CouplingMismatch(index);
     if (check_.rows == 1) {
-      double without = open;
-      for (const double turn : mechanism_.mechanism().couplings()[c].measured_turns) {
-        without = std::remainder(without, turn);
-      }
-      turns_[c] = open - without;
+      turns_[c] = open - mechanism_.mechanism().couplings()[c].WithoutTurns(open);
     }
     JointCheck& check = check_.joints[user_.joints.size() + c];
     const bool turns = kinematics.FirstTurns(index);

@@ -8,7 +8,6 @@
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/singular_values.h"
-#include "mechanism/loops/direction_rows.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench::harness {

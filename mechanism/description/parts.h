@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mechanism/description/islands.h"
+#include "mechanism/description/topology.h"
 
 namespace loopbench {
 

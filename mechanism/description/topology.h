@@ -43,4 +43,21 @@ Topology BuildTopology(const MechanismDescription& description, Coordinates coor
 /// coordinates.
 std::vector<bool> OnLoops(const MechanismDescription& description, const Topology& topology);
 
+// Connected components: the graph of bodies and joints without Ground.
+
+/// A set of bodies that are connected with each other, paths through Ground left out.
+struct Island {
+  std::vector<int> bodies;  ///< ascending, without Ground
+  bool grounded = false;    ///< a joint leads to Ground; otherwise the part floats
+};
+
+/// Connections that put two bodies into one island. Couplings of joints count as forces.
+enum class Connection { kJoints, kJointsAndForces };
+
+/// Returns the islands in the order of their first bodies; each body except Ground is in just one.
+///
+/// User-defined forces are assumed to connect all bodies.
+std::vector<Island> FindIslands(const MechanismDescription& description,
+                                Connection connection = Connection::kJointsAndForces);
+
 }  // namespace loopbench

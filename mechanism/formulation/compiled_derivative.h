@@ -7,7 +7,7 @@
 
 namespace loopbench {
 
-/// Functions of level projection at positions and speeds (level_position.cpp).
+/// Functions of level projection at positions and speeds (level.cpp).
 enum class ProjectionStep {
   kMismatch,   ///< largest violations of rotations [rad] and of points [m]
   kPositions,  ///< positions after one Newton step

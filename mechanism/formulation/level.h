@@ -1,10 +1,10 @@
 // Enforcement levels: treatment of constraints in right-hand side and accepted steps beyond
 // accelerations (docs/decisions/003). They are written over any ConstraintSolver.
 //
-//   acceleration   nothing                                         this class as it is
-//   velocity       speeds of the right-hand side satisfy J u = -b  level_velocity.cpp
-//   position       Newton's method after each accepted step        level_position.cpp
-//   baumgarte      J udot = gamma - feedback                       level_baumgarte.cpp
+//   acceleration   nothing: this class as it is
+//   velocity       speeds of the right-hand side satisfy J u = -b
+//   position       Newton's method after each accepted step
+//   baumgarte      J udot = gamma - feedback
 //
 // A program registers a user-defined level before it calls loopbench::Main(); its name is then
 // valid wherever "velocity" is:

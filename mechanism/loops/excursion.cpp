@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "mechanism/loops/direction_weights.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench {

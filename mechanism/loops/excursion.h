@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "mechanism/algebra/decompositions.h"
-#include "mechanism/loops/direction_rows.h"
+#include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench {
 

@@ -1,4 +1,4 @@
-// The forces of a description compiled for one space and scalar.
+// The forces of a description compiled for one space and scalar: kinds, and the list of all.
 #pragma once
 
 #include <algorithm>
@@ -6,12 +6,212 @@
 #include <variant>
 #include <vector>
 
-#include "mechanism/model/force_joint.h"
+#include "mechanism/description/time_function.h"
+#include "mechanism/model/force_element.h"
 #include "mechanism/model/force_other.h"
-#include "mechanism/model/force_point.h"
-#include "mechanism/model/force_spring.h"
 
 namespace loopbench {
+
+// Forces along the coordinate of a joint: torque, spring, damper.
+
+/// tau = value(t). A constant one has the potential -value q, another supplies value u.
+template <class Space, class S>
+class ForceElement<Space, S, JointTorque> : public ForceDefaults<Space, S> {
+ public:
+  ForceElement(const JointTorque& torque, const MechanismDescription&)
+      : joint_(torque.joint), value_(torque.value) {
+    const auto* polynomial = std::get_if<Polynomial>(&torque.value);
+    is_constant_ = polynomial != nullptr && polynomial->coefficients.size() == 1;
+    if (is_constant_) constant_ = S(polynomial->coefficients[0]);
+  }
+
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const {
+    AddJointForce<Space, S>(kinematics, joint_, At(kinematics), wrenches);
+  }
+  S Potential(const Kinematics<Space, S>& kinematics) const {
+    return is_constant_ ? S(-constant_ * kinematics.JointCoordinate(joint_)) : S(0);
+  }
+  void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const {
+    power.supplied += At(kinematics) * kinematics.JointSpeed(joint_);
+  }
+  bool has_power() const { return !is_constant_; }
+  const std::vector<double>& knots() const { return value_.knots(); }
+
+ private:
+  S At(const Kinematics<Space, S>& kinematics) const {
+    return is_constant_ ? constant_ : S(value_.At(kinematics.time()).value);
+  }
+
+  int joint_;
+  TimeFunction value_;
+  bool is_constant_ = false;
+  S constant_ = S(0);
+};
+
+/// tau = preload - stiffness (q - rest), with the potential stiffness (q - rest)^2 / 2 - preload q.
+template <class Space, class S>
+class ForceElement<Space, S, JointSpring> : public ForceDefaults<Space, S> {
+ public:
+  ForceElement(const JointSpring& spring, const MechanismDescription&)
+      : joint_(spring.joint),
+        stiffness_(S(spring.stiffness)),
+        rest_(S(spring.rest)),
+        preload_(S(spring.preload)) {}
+
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const {
+    const S tau = preload_ - stiffness_ * (kinematics.JointCoordinate(joint_) - rest_);
+    AddJointForce<Space, S>(kinematics, joint_, tau, wrenches);
+  }
+  S Potential(const Kinematics<Space, S>& kinematics) const {
+    const S q = kinematics.JointCoordinate(joint_), half = S(1) / S(2);
+    return half * stiffness_ * (q - rest_) * (q - rest_) - preload_ * q;
+  }
+
+ private:
+  int joint_;
+  S stiffness_, rest_, preload_;
+};
+
+/// tau = -damping u, which dissipates damping u^2.
+template <class Space, class S>
+class ForceElement<Space, S, JointDamper> : public ForceDefaults<Space, S> {
+ public:
+  ForceElement(const JointDamper& damper, const MechanismDescription&)
+      : joint_(damper.joint), damping_(S(damper.damping)) {}
+
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const {
+    AddJointForce<Space, S>(kinematics, joint_, -damping_ * kinematics.JointSpeed(joint_),
+                            wrenches);
+  }
+  void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const {
+    const S u = kinematics.JointSpeed(joint_);
+    power.dissipated += damping_ * u * u;
+  }
+  bool has_power() const { return damping_ != S(0); }
+
+ private:
+  int joint_;
+  S damping_;
+};
+
+// Forces at one point of a body: a constant one, drag.
+
+/// f in ground axes, with the potential -f . p; or R_WB f, turning with its body, which supplies
+/// R_WB f . v.
+template <class Space, class S>
+class ForceElement<Space, S, PointForce> : public ForceDefaults<Space, S> {
+ public:
+  ForceElement(const PointForce& force, const MechanismDescription& description)
+      : point_(force.point, description),
+        force_(ToLinear<Space, S>(force.force)),
+        in_body_axes_(force.in_body_axes) {}
+
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const {
+    point_.AddForce(InGround(kinematics), point_.StateIn(kinematics), wrenches);
+  }
+  S Potential(const Kinematics<Space, S>& kinematics) const {
+    return in_body_axes_ ? S(0) : S(-force_.dot(point_.StateIn(kinematics).p));
+  }
+  void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const {
+    power.supplied += InGround(kinematics).dot(point_.StateIn(kinematics).v);
+  }
+  bool has_power() const { return in_body_axes_; }
+
+ private:
+  Linear<Space, S> InGround(const Kinematics<Space, S>& kinematics) const {
+    if (!in_body_axes_) return force_;
+    return kinematics.poses()[point_.body].R * force_;
+  }
+
+  PointOfBody<Space, S> point_;
+  Linear<Space, S> force_;
+  bool in_body_axes_;
+};
+
+/// -(linear + quadratic |v|) v, which dissipates its size times |v|.
+template <class Space, class S>
+class ForceElement<Space, S, Drag> : public ForceDefaults<Space, S> {
+ public:
+  ForceElement(const Drag& drag, const MechanismDescription& description)
+      : point_(drag.point, description), linear_(S(drag.linear)), quadratic_(S(drag.quadratic)) {}
+
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const {
+    const PointState<Space, S> state = point_.StateIn(kinematics);
+    point_.AddForce(-Resistance(state.v) * state.v, state, wrenches);
+  }
+  void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const {
+    const Linear<Space, S> v = point_.StateIn(kinematics).v;
+    power.dissipated += Resistance(v) * v.squaredNorm();
+  }
+  bool has_power() const { return linear_ != S(0) || quadratic_ != S(0); }
+
+ private:
+  S Resistance(const Linear<Space, S>& v) const { return linear_ + quadratic_ * v.norm(); }
+
+  PointOfBody<Space, S> point_;
+  S linear_, quadratic_;
+};
+
+// A spring and damper between points of two bodies.
+
+/// The tension preload + stiffness s + damping s', s the stretch, pulls `from` along the direction
+/// to `to`, and `to` the other way. Its potential is stiffness s^2 / 2 + preload s; damping
+/// dissipates damping s'^2.
+template <class Space, class S>
+class ForceElement<Space, S, SpringDamper> : public ForceDefaults<Space, S> {
+ public:
+  ForceElement(const SpringDamper& spring, const MechanismDescription& description)
+      : from_(spring.from, description),
+        to_(spring.to, description),
+        stiffness_(S(spring.stiffness)),
+        damping_(S(spring.damping)),
+        length_(S(spring.length)),
+        preload_(S(spring.preload)) {}
+
+  void AddWrenches(const Kinematics<Space, S>& kinematics,
+                   std::span<Wrench<Space, S>> wrenches) const {
+    const State state = StateIn(kinematics);
+    const S tension = preload_ + stiffness_ * (state.distance - length_) + damping_ * state.rate;
+    const Linear<Space, S> f = tension * state.direction;
+    from_.AddForce(f, state.from, wrenches);
+    to_.AddForce(-f, state.to, wrenches);
+  }
+  S Potential(const Kinematics<Space, S>& kinematics) const {
+    const S stretch = StateIn(kinematics).distance - length_, half = S(1) / S(2);
+    return (half * stiffness_ * stretch + preload_) * stretch;
+  }
+  void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const {
+    const S rate = StateIn(kinematics).rate;
+    power.dissipated += damping_ * rate * rate;
+  }
+  bool has_power() const { return damping_ != S(0); }
+
+ private:
+  /// If the points coincide, the direction is zero, and with it all forces.
+  struct State {
+    PointState<Space, S> from, to;
+    S distance, rate;
+    Linear<Space, S> direction;  ///< of unit length, from `from` to `to`
+  };
+
+  State StateIn(const Kinematics<Space, S>& kinematics) const {
+    State state{from_.StateIn(kinematics), to_.StateIn(kinematics), {}, {}, {}};
+    const Linear<Space, S> apart = state.to.p - state.from.p;
+    state.distance = apart.norm();
+    state.direction.setZero();
+    if (state.distance > S(0)) state.direction = apart / state.distance;
+    state.rate = state.direction.dot(state.to.v - state.from.v);
+    return state;
+  }
+
+  PointOfBody<Space, S> from_, to_;
+  S stiffness_, damping_, length_, preload_;
+};
 
 /// A force of any kind.
 template <class Space, class S, class Descriptions = ForceDescription>

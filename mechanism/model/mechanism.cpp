@@ -9,8 +9,8 @@
 #include <stdexcept>
 
 #include "mechanism/algebra/instantiate.h"
-#include "mechanism/description/islands.h"
 #include "mechanism/description/joint_frames.h"
+#include "mechanism/description/topology.h"
 
 namespace loopbench {
 

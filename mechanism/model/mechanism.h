@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -70,6 +71,11 @@ struct Coupling {
   /// Changes of the sum by a turn of each angle of a cut joint, which is measured modulo a turn;
   /// largest first.
   std::vector<S> measured_turns;
+  /// Returns a mismatch without whole turns of these angles: at most half of the smallest.
+  S WithoutTurns(S open) const {
+    for (const S& turn : measured_turns) open = std::remainder(open, turn);
+    return open;
+  }
   bool is_moving_row = false;  ///< imposes a released direction instead (MovingRow); no parts
 };
 
@@ -176,7 +182,7 @@ class Mechanism {
   /// with several; without such, of joints from centres of mass; 1 when all are zero.
   S length() const { return length_; }
 
-  /// kGeometric: unit masses whose radius of gyration is length() of their own island (islands.h),
+  /// kGeometric: unit masses whose radius of gyration is length() of their own island (topology.h),
   /// about geometric_centre(): sizes of other parts and far centres of mass have no effect.
   const std::vector<Inertia<Space, S>>& bodies(Masses masses) const {
     return masses == Masses::kPhysical ? bodies_ : geometric_bodies_;

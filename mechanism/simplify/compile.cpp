@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "mechanism/description/number_text.h"
 #include "mechanism/description/parts.h"
 #include "mechanism/description/topology.h"
-#include "mechanism/simplify/immovable.h"
+#include "mechanism/simplify/attach.h"
 #include "mechanism/simplify/plane.h"
 #include "mechanism/simplify/redundancy.h"
-#include "mechanism/simplify/welds.h"
 
 namespace loopbench {
 

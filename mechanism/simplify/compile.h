@@ -2,15 +2,16 @@
 // compiled into a Mechanism, and maps results back to the user's bodies and joints.
 //
 // Simplifications, in this order, each with a switch:
-//   welds      bodies joined by welds become one (welds.h);
-//   immovable  bodies that certainly cannot move become part of Ground (immovable.h);
-//   islands    parts connected through Ground at most become descriptions of their own (islands.h);
-//   planar     a spatial part that moves in parallel planes becomes planar (plane.h);
+//   welds      bodies joined by welds become one (attach.h);
+//   immovable  bodies that certainly cannot move become part of Ground (attach.h);
+//   islands    parts connected through Ground at most become descriptions of their own
+//   (topology.h); planar     a spatial part that moves in parallel planes becomes planar (plane.h);
 //   redundancy constraints redundant at every position are released (redundancy.h).
 // The motion is the same except for rounding. An unknown kind of joint or force prevents a
 // simplification.
 #pragma once
 
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,13 @@
 #include "mechanism/simplify/attach.h"
 
 namespace loopbench {
+
+/// Returns the number with so many significant digits, as "%.*g" prints it.
+inline std::string NumberText(double value, int digits) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return text;
+}
 
 struct CompileOptions {
   bool planar = true;

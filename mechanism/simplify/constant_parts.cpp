@@ -6,7 +6,7 @@
 #include "mechanism/model/mechanism.h"
 #include "mechanism/simplify/attach.h"
 #include "mechanism/simplify/freedom.h"
-#include "mechanism/simplify/ideas.h"
+#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 
 namespace loopbench {

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <set>
 
-#include "mechanism/description/number_text.h"
 #include "mechanism/simplify/attach.h"
+#include "mechanism/simplify/compile.h"
 #include "mechanism/simplify/freedom.h"
-#include "mechanism/simplify/ideas.h"
+#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 
 namespace loopbench {

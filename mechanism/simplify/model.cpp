@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "mechanism/simplify/compile.h"
-#include "mechanism/simplify/ideas.h"
 #include "mechanism/simplify/restart.h"
 
 namespace loopbench {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "mechanism/description/number_text.h"
-#include "mechanism/simplify/ideas.h"
+#include "mechanism/simplify/compile.h"
+#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/plane.h"
 #include "mechanism/simplify/restart.h"
 

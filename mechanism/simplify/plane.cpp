@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/description/islands.h"
 #include "mechanism/description/joint_frames.h"
+#include "mechanism/description/topology.h"
 
 namespace loopbench {
 

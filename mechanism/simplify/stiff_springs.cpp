@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/description/number_text.h"
 #include "mechanism/model/joint.h"
 #include "mechanism/simplify/attach.h"
+#include "mechanism/simplify/compile.h"
 #include "mechanism/simplify/freedom.h"
-#include "mechanism/simplify/ideas.h"
+#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
-#include "mechanism/simplify/welds.h"
 
 namespace loopbench {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mechanism/description/islands.h"
+#include "mechanism/description/topology.h"
 #include "mechanism/simplify/redundancy.h"
 #include "mechanism/start/assembly.h"
 

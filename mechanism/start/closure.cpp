@@ -195,14 +195,9 @@ class Closure {
     return e;
   }
 
-  /// Without whole turns of angles of cut joints, which System::Start() counts. At most half of the
-  /// smallest turn.
+  /// Without whole turns of angles of cut joints, which System::Start() counts.
   double CouplingMismatch(int index) const {
-    double open = kinematics_.CouplingMismatch(index);
-    for (const double turn : mechanism_.couplings()[index].measured_turns) {
-      open = std::remainder(open, turn);
-    }
-    return open;
+    return mechanism_.couplings()[index].WithoutTurns(kinematics_.CouplingMismatch(index));
   }
 
   /// q moved by the speeds d, in units, for unit time (quaternions renormalised).

@@ -5,9 +5,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
-#include "mechanism/description/similarity.h"
+#include "mechanism/description/transforms.h"
 #include "mechanism/formulation/forward_jacobian.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/assembly.h"

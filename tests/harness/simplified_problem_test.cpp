@@ -6,8 +6,8 @@
 #include "harness/run/case_identity.h"
 #include "harness/run/ensemble.h"
 #include "harness/run/run_case.h"
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

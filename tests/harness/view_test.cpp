@@ -11,7 +11,7 @@
 #include "harness/view/picture.h"
 #include "harness/view/writers.h"
 #include "mechanism/description/library.h"
-#include "mechanism/description/similarity.h"
+#include "mechanism/description/transforms.h"
 #include "mechanism/simplify/structure.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "tests/mechanism/compiled_motion.h"
 
 namespace loopbench::testing {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "mechanism/description/in_space.h"
+#include "mechanism/description/transforms.h"
 #include "mechanism/simplify/attach.h"
 #include "tests/contract/generators.h"
 

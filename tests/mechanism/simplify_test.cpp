@@ -6,7 +6,7 @@
 
 #include "mechanism/description/library.h"
 #include "mechanism/simplify/freedom.h"
-#include "mechanism/simplify/ideas.h"
+#include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"

@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <limits>
 
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::arms {

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "mechanism/algebra/decompositions.h"
-#include "mechanism/description/similarity.h"
+#include "mechanism/description/transforms.h"
 #include "reduction/dense_reduction.h"
 #include "tests/contract/generators.h"
 #include "tests/mechanism/shipped.h"

@@ -5,8 +5,8 @@
 #include <iostream>
 #include <numbers>
 
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 

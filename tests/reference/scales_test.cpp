@@ -8,8 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "mechanism/description/in_space.h"
-#include "mechanism/description/similarity.h"
+#include "mechanism/description/transforms.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"

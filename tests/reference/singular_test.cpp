@@ -12,8 +12,8 @@
 
 #include "harness/config/formulations.h"
 #include "harness/run/ensemble.h"
-#include "mechanism/description/in_space.h"
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "tests/harness/integrator_problems.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"

@@ -1,9 +1,16 @@
-// A mechanism scaled to another size.
+// Descriptions of the same mechanism in space or at another size.
 #pragma once
 
 #include "mechanism/description/description.h"
 
 namespace loopbench {
+
+/// Returns a planar description as a spatial one whose plane is turned by `turn` (rotation vector
+/// [rad]) against the ground's axes. Bodies keep their axes, so their normal is z. Parts not
+/// connected to ground start in ground's axes for any turn.
+MechanismDescription InSpace(const MechanismDescription& planar, const Eigen::Vector3d& turn);
+
+// A mechanism scaled to another size.
 
 /// Scales all lengths by `factor` > 0, with gravity, forces and springs such that every angle keeps
 /// its motion in time. Masses stay, accelerations and forces scale with the factor, moments and

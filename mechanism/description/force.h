@@ -30,7 +30,7 @@ struct BodyPoint {
 
 /// Dimension of a number of a force: its unit at a rotating joint, its unit elsewhere, and its
 /// power of length, a force counting as one. Numbers scale by this power when all lengths scale and
-/// angles move as before (similarity.h).
+/// angles move as before (transforms.h).
 struct Quantity {
   std::string_view of_angle, of_length;
   int power_of_angle = 0, power_of_length = 0;

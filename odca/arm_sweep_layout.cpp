@@ -56,26 +56,21 @@ std::unique_ptr<ArmSweep> ArmSweep::Make(const Mechanism<Spatial, double>& mecha
   if (arms.arms.empty()) return nullptr;
   std::unique_ptr<ArmSweep> sweep(new ArmSweep);
   sweep->num_u_ = mechanism.num_u();
-  sweep->size_ = mechanism.length();
+  sweep->SetSize(mechanism);
   sweep->Lay(arms, bodies_of_group);
   const int useful = static_cast<int>(sweep->groups_.size());
   sweep->pool_ = std::make_unique<WorkerPool>(std::clamp(useful, 1, std::max(1, threads)));
-  return sweep->IsUsable() ? std::move(sweep) : nullptr;
+  return sweep->IsUsableSomewhere() ? std::move(sweep) : nullptr;
 }
 
-bool ArmSweep::IsUsable() {
+bool ArmSweep::IsUsableSomewhere() {
   constexpr int kTrials = 3;
   constexpr double kGoldenAngle = 2.399963229728653;
   if (closings_.empty()) return true;
+  std::vector<double> q(num_u()), u(num_u()), qdot(num_u()), udot(num_u());
   for (int trial = 1; trial <= kTrials; ++trial) {
-    for (int i = 0; i < num_u_; ++i) {
-      moved_[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
-    }
-    if (Evaluate(SpeedsUsed::kGiven, nullptr, {moved_.data(), moved_.data() + num_u_},
-                 {speeds_.data(), speeds_.data() + num_u_}, {back_.data(), back_.data() + num_u_},
-                 {step_.data(), step_.data() + num_u_})) {
-      return true;
-    }
+    for (int i = 0; i < num_u_; ++i) q[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
+    if (Evaluate(SpeedsUsed::kGiven, nullptr, q, u, qdot, udot)) return true;
   }
   return false;
 }
@@ -86,7 +81,7 @@ void ArmSweep::Lay(const Arms& arms, int bodies_of_group) {
   num_pieces_ = pieces.groups * kLanes;
   packed_ = num_pieces_ * length_;
   sign_.setZero(num_u_);
-  angle_ = speed_ = sine_ = cosine_ = rate_ = moved_ = back_ = speeds_ = step_ = sign_;
+  angle_ = speed_ = sine_ = cosine_ = rate_ = sign_;
   index_.assign(num_u_, 0);
   std::vector<Link<Lanes>> packs(packed_ / kLanes);
   int piece = 0;
@@ -184,12 +179,15 @@ bool ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u) {
   return in_range;
 }
 
-void ArmSweep::PutOut(const VectorX<double>& of_places, std::span<double> to) {
+void ArmSweep::PutOut(const VectorX<double>& of_places, std::span<const double> base,
+                      std::span<double> to) {
   constexpr int kPart = 4096;
   pool_->ForEach((num_u_ + kPart - 1) / kPart, [&](int part) {
     const int last = std::min(num_u_, (part + 1) * kPart);
     for (int place = part * kPart; place < last; ++place) {
-      to[index_[place]] = sign_[place] * of_places[place];
+      const int i = index_[place];
+      const double own = sign_[place] * of_places[place];
+      to[i] = base.empty() ? own : base[i] + own;
     }
   });
 }

@@ -15,7 +15,7 @@ bool Says(const Lanes& truth) { return truth[0] > 0.0; }
 }  // namespace
 
 template <class T>
-template <bool kLoops, typename PathSweepOf<T>::GapKind kGap>
+template <bool kLoops, GapKind kGap>
 void PathSweepOf<T>::TurnPacks(Group& group) {
   const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
@@ -88,7 +88,7 @@ void PathSweepOf<T>::Set(const PathPlaces& path, int k, const TurnedLink<T>& tur
 }
 
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& gap) {
   const int P = here ? k : k - 1;
   At at_P = Body(path, P);
@@ -127,7 +127,7 @@ T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
 /// Closes loops like TurnPacks() in between, except that the body before each first one is one lane
 /// before it, in the last pack, or ends the previous group.
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
   const Closure<Lanes>& starts = group.starts;
   TurnedLink<Lanes>& turned = turned_packs_[group.pack];
@@ -177,7 +177,7 @@ void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
 }
 
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
   Point<T> at_2 = {};
   const auto start = [&](int k, const Closure<T>& closure) {
@@ -207,7 +207,7 @@ void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
 }
 
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 TruthOf<T> PathSweepOf<T>::Turn() {
   if constexpr (kIsOne) {
     pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
@@ -231,8 +231,8 @@ TruthOf<T> PathSweepOf<T>::Turn() {
   return good;
 }
 
-template bool PathSweep::Turn<PathSweep::GapKind::kSpeeds>();
-template bool PathSweep::Turn<PathSweep::GapKind::kPositions>();
-template LaneBits PathSweepOf<Lanes>::Turn<PathSweepOf<Lanes>::GapKind::kSpeeds>();
+template bool PathSweep::Turn<GapKind::kSpeeds>();
+template bool PathSweep::Turn<GapKind::kPositions>();
+template LaneBits PathSweepOf<Lanes>::Turn<GapKind::kSpeeds>();
 
 }  // namespace loopbench::odca::pins

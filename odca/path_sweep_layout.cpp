@@ -74,12 +74,10 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int lengt
 }  // namespace
 
 template <class T>
-void PathSweepOf<T>::Resize(int num_u, int threads) {
+void PathSweepOf<T>::Resize(int threads) {
   turned_singles_.resize(singles_.size());
   angle_.assign(num_places_ + 1, T{});
   speed_ = alpha_ = angle_;
-  moved_.assign(num_u, T{});
-  back_ = speeds_ = moved_;
   pool_ = std::make_unique<WorkerPool>(threads);
 }
 
@@ -102,7 +100,8 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, dou
   if (sweep->paths_.empty()) return nullptr;
   sweep->tree_ = TreeAngles<T>(mechanism, place_of, axes);
   const int useful = std::max(1, sweep->num_places_ / bodies_of_group);
-  sweep->Resize(mechanism.num_u(), std::min(threads, useful));
+  sweep->SetSize(mechanism);
+  sweep->Resize(std::min(threads, useful));
   return sweep;
 }
 
@@ -126,7 +125,7 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::InLanes(const PathSweepOf<double
   sweep->end_cuts_.resize(one.end_cuts_.size());
   sweep->num_places_ = one.num_places_;
   sweep->tree_ = TreeAngles<T>::Like(one.tree_);
-  sweep->Resize(static_cast<int>(one.moved_.size()), 1);
+  sweep->Resize(1);
   for (int lane = 0; lane < kLanes; ++lane) sweep->SetConstants(lane, one);
   return sweep;
 }

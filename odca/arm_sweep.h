@@ -54,7 +54,6 @@ class ArmSweep final : public ShortCut<Spatial> {
     Lanes F1[kRows], F2[kRows];  ///< on these
     Lanes about2;                ///< of their last bodies
     double slack = 0.0;
-    bool in_range = true;
   };
   /// An arm's places in the lists. Pieces, then single bodies, then the tip of a closed one are
   /// its nodes.
@@ -90,7 +89,6 @@ class ArmSweep final : public ShortCut<Spatial> {
 
   /// Angles and speeds by place. False for angles beyond kLargestAngle.
   bool TakeIn(std::span<const double> q, std::span<const double> u);
-  void TakeIn(std::span<const double> q, std::span<const double> u, int first, int last);
   /// sign times these numbers by place, in the order of u, plus `base` if it is not empty.
   void PutOut(const VectorX<double>& of_places, std::span<const double> base, std::span<double> to);
 
@@ -143,8 +141,9 @@ class ArmSweep final : public ShortCut<Spatial> {
   std::vector<double> end_about2_;  ///< about axis 2 of the last body, of pieces, then of singles
   std::vector<TipState> tips_;
   std::vector<PlacedClosing> closings_;
-  std::vector<int> index_;                                       ///< of a place's joint in u
+  std::vector<int> index_;  ///< of a place's joint in u; these lists end with padding of lanes
   VectorX<double> sign_, angle_, speed_, sine_, cosine_, rate_;  ///< by place
+  std::vector<char> in_range_;                                   ///< by part of the places
   Correction<double> largest_;
   std::unique_ptr<WorkerPool> pool_;
 };

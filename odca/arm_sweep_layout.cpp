@@ -15,6 +15,10 @@ namespace {
 /// Shorter pieces are no faster than one body after another.
 constexpr int kShortestPiece = 2;
 
+/// Places that a thread takes at once.
+constexpr int kPart = 1024;
+static_assert(kPart % kLanes == 0);
+
 /// Bodies of an arm that may be in pieces: the tip of a closed one is asked for more.
 int Inner(const Arm& arm) {
   return static_cast<int>(arm.bodies.size()) - (arm.closing >= 0 ? 1 : 0);
@@ -80,9 +84,10 @@ void ArmSweep::Lay(const Arms& arms, int bodies_of_group) {
   length_ = pieces.length;
   num_pieces_ = pieces.groups * kLanes;
   packed_ = num_pieces_ * length_;
-  sign_.setZero(num_u_);
+  sign_.setZero((num_u_ + kLanes - 1) / kLanes * kLanes);
   angle_ = speed_ = sine_ = cosine_ = rate_ = sign_;
-  index_.assign(num_u_, 0);
+  index_.assign(static_cast<std::size_t>(sign_.size()), 0);
+  in_range_.resize((index_.size() + kPart - 1) / kPart);
   std::vector<Link<Lanes>> packs(packed_ / kLanes);
   int piece = 0;
   for (const Arm& arm : arms.arms) {
@@ -156,33 +161,21 @@ void ArmSweep::LayClosings(const Arms& arms) {
   }
 }
 
-void ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u, int first, int last) {
-  for (int place = first; place < last; ++place) {
-    angle_[place] = sign_[place] * q[index_[place]];
-    speed_[place] = sign_[place] * u[index_[place]];
-  }
-}
-
 bool ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u) {
-  const int places = length_ * kLanes;
-  pool_->ForEach(static_cast<int>(groups_.size()), [&](int g) {
-    const int first = g * places;
-    TakeIn(q, u, first, first + places);
-    groups_[g].in_range = SinesAndCosines(&angle_[first], places, &sine_[first], &cosine_[first]);
+  pool_->ForEach(static_cast<int>(in_range_.size()), [&](int part) {
+    const int first = part * kPart, last = std::min(static_cast<int>(index_.size()), first + kPart);
+    for (int place = first; place < last; ++place) {
+      angle_[place] = sign_[place] * q[index_[place]];
+      speed_[place] = sign_[place] * u[index_[place]];
+    }
+    in_range_[part] = SinesAndCosines(&angle_[first], last - first, &sine_[first], &cosine_[first]);
   });
-  bool in_range = std::ranges::all_of(groups_, &Group::in_range);
-  TakeIn(q, u, packed_, num_u_);
-  for (int place = packed_; place < num_u_; ++place) {
-    in_range = in_range && kLargestAngle - Magnitude(angle_[place]) >= 0.0;
-    SinCos(angle_[place], sine_[place], cosine_[place]);
-  }
-  return in_range;
+  return std::ranges::find(in_range_, 0) == in_range_.end();
 }
 
 void ArmSweep::PutOut(const VectorX<double>& of_places, std::span<const double> base,
                       std::span<double> to) {
-  constexpr int kPart = 4096;
-  pool_->ForEach((num_u_ + kPart - 1) / kPart, [&](int part) {
+  pool_->ForEach(static_cast<int>(in_range_.size()), [&](int part) {
     const int last = std::min(num_u_, (part + 1) * kPart);
     for (int place = part * kPart; place < last; ++place) {
       const int i = index_[place];

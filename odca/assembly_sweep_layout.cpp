@@ -135,11 +135,9 @@ AssemblySweep::Pin AssemblySweep::Layout::MakePin(const PlanNode& planned,
 
 /// Keeps the remaining handles, the first child's first.
 void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& all) {
-  std::vector<int> closed;
-  for (const NodeJoint& joint : planned.joints) {
-    closed.insert(closed.end(), {2 * joint.index, 2 * joint.index + 1});
-  }
-  std::ranges::sort(closed);
+  const auto closes = [&](int pin) {
+    return std::ranges::find(planned.joints, pin / 2, &NodeJoint::index) != planned.joints.end();
+  };
   all.bodies = 0;
   for (const int c : {0, 1}) {
     if (planned.children[c] < 0) continue;
@@ -149,7 +147,7 @@ void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& 
     node.blocks[c] = child.first_block;
     node.handles[c] = child.handles;
     for (int place = 0; place < child.handles; ++place) {
-      if (std::ranges::binary_search(closed, child.pins[place])) continue;
+      if (closes(child.pins[place])) continue;
       all.pins.push_back(child.pins[place]);
       sweep.kept_.push_back({c, place, handle_of[child.pins[place]]});
     }

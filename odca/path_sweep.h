@@ -41,6 +41,30 @@ struct NoShortCut {
   long operations_ = 0;
 };
 
+/// Slots of a path in the lists. Its body k is in lane k / packs of pack k % packs of its group;
+/// the last ones, which fill no pack, follow the packs.
+struct PathShape {
+  int bodies = 0, groups = 0;
+  int packs = 0;                ///< of a group
+  int packed = 0;               ///< bodies in packs
+  int first = 0;                ///< place of its first body
+  int first_group = 0;          ///< in groups_
+  int first_pack = 0;           ///< in lists by pack
+  int first_single = 0;         ///< in lists by single body
+  int first_cut = 0;            ///< in end_cuts_: one for each piece and for each single body
+  bool has_loops = false;       ///< points are followed along it
+  bool loops_in_lanes = false;  ///< so that closures of packs are asked for
+  bool ends_at_ground = false, ground_is_P = false;  ///< as in PathLinks
+
+  bool operator==(const PathShape&) const = default;
+  int pieces() const { return groups * kLanes; }
+  int singles() const { return bodies - packed; }
+  /// Returns the pack of body k < packed.
+  int pack(int k) const { return k / (packs * kLanes) * packs + k % packs; }
+  int lane(int k) const { return k / packs % kLanes; }
+  int place(int k) const { return first + (k < packed ? pack(k) * kLanes + lane(k) : k); }
+};
+
 template <class T>
 class PathSweepOf final
     : public std::conditional_t<std::is_same_v<T, double>, ShortCut<Planar>, NoShortCut> {
@@ -68,30 +92,11 @@ class PathSweepOf final
   int threads() const { return pool_->threads(); }
 
  private:
-  /// Slots of a path in the lists. Its body k is in lane k / packs of pack k % packs of its group;
-  /// the last ones, which fill no pack, follow the packs.
-  struct PathPlaces {
-    int bodies = 0, groups = 0;
-    int packs = 0;                ///< of a group
-    int packed = 0;               ///< bodies in packs
-    int first = 0;                ///< place of its first body
-    int first_group = 0;          ///< in groups_
-    int first_pack = 0;           ///< in lists by pack
-    int first_single = 0;         ///< in lists by single body
-    int first_cut = 0;            ///< in end_cuts_: one for each piece and for each single body
-    bool has_loops = false;       ///< points are followed along it
-    bool loops_in_lanes = false;  ///< so that closures of packs are asked for
-    bool ends_at_ground = false, ground_is_P = false;  ///< as in PathLinks
-    Vector2<T> end, end_force;
+  /// Numbers of a path that depend on the mechanism or on the state.
+  struct PathPlaces : PathShape {
+    Vector2<T> end = {}, end_force = {};
     Vector2<T> gap_v = {};  ///< as of TurnedLink, at that joint
     T gap_w = {}, end_limit = {};
-
-    int pieces() const { return groups * kLanes; }
-    int singles() const { return bodies - packed; }
-    /// Returns the pack of body k < packed.
-    int pack(int k) const { return k / (packs * kLanes) * packs + k % packs; }
-    int lane(int k) const { return k / packs % kLanes; }
-    int place(int k) const { return first + (k < packed ? pack(k) * kLanes + lane(k) : k); }
   };
   /// kLanes pieces of a path side by side.
   struct Group {
@@ -130,12 +135,7 @@ class PathSweepOf final
   /// before the group to its last one.
   template <GapKind kGap>
   void CloseStarts(Group& group, Point<double>& at_2);
-  struct At;
-  At Body(const PathPlaces& path, int k) const;
-  void Set(const PathPlaces& path, int k, const TurnedLink<T>& turned);
-  /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
-  template <GapKind kGap>
-  void Close(PathPlaces& path, int k, bool here, const Point<T>& gap);
+  void MoveEnd(const PathPlaces& path, int k, const Vector2<T>& shift);
   /// As in ShortCut, for one mechanism.
   bool Place(GapKind kind, std::span<const double> q, std::span<const double> u);
   Correction<double> LargestGap() const;

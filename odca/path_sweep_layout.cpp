@@ -1,5 +1,6 @@
 // Layout of a PathSweep: slots of bodies in its lists, and their constants.
 #include <algorithm>
+#include <functional>
 
 #include "mechanism/loops/loop_solver.h"
 #include "odca/odca.h"
@@ -109,17 +110,7 @@ template <class T>
 std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::InLanes(const PathSweepOf<double>& one) {
   if (!one.groups_.empty()) return nullptr;
   std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
-  for (const auto& path : one.paths_) {
-    PathPlaces like;
-    like.bodies = path.bodies;
-    like.first = path.first;
-    like.first_single = path.first_single;
-    like.first_cut = path.first_cut;
-    like.has_loops = path.has_loops;
-    like.ends_at_ground = path.ends_at_ground;
-    like.ground_is_P = path.ground_is_P;
-    sweep->paths_.push_back(like);
-  }
+  for (const PathShape& path : one.paths_) sweep->paths_.push_back({path});
   sweep->singles_.resize(one.singles_.size());
   sweep->single_closures_.resize(one.single_closures_.size());
   sweep->end_cuts_.resize(one.end_cuts_.size());
@@ -132,15 +123,11 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::InLanes(const PathSweepOf<double
 
 template <class T>
 bool PathSweepOf<T>::SetMechanism(int lane, const PathSweepOf<double>& one) {
-  const auto same_path = [](const PathPlaces& a, const auto& b) {
-    return a.bodies == b.bodies && a.first == b.first && a.has_loops == b.has_loops &&
-           a.ends_at_ground == b.ends_at_ground && a.ground_is_P == b.ground_is_P;
-  };
   const auto same_closure = [](const Closure<T>& a, const Closure<double>& b) {
     return a.follows[0] == b.follows && a.cut_here[0] == b.cut_here &&
            a.cut_before[0] == b.cut_before;
   };
-  if (!one.groups_.empty() || !std::ranges::equal(paths_, one.paths_, same_path) ||
+  if (!one.groups_.empty() || !std::ranges::equal(paths_, one.paths_, std::equal_to<PathShape>()) ||
       !std::ranges::equal(single_closures_, one.single_closures_, same_closure) ||
       !tree_.SetOffsets(lane, one.tree_)) {
     return false;

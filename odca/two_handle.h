@@ -53,13 +53,6 @@ struct Symmetric2 {
   friend Symmetric2 operator+(const Symmetric2& A, const Symmetric2& B) {
     return {A.xx + B.xx, A.xy + B.xy, A.yy + B.yy};
   }
-  friend Vector2<T> operator*(const Symmetric2& A, const Vector2<T>& b) {
-    return {A.xx * b.x + A.xy * b.y, A.xy * b.x + A.yy * b.y};
-  }
-  friend Matrix2<T> operator*(const Symmetric2& A, const Matrix2<T>& B) {
-    return {A.xx * B.xx + A.xy * B.yx, A.xx * B.xy + A.xy * B.yy, A.xy * B.xx + A.yy * B.yx,
-            A.xy * B.xy + A.yy * B.yy};
-  }
 };
 
 /// A B^T, the second factor being symmetric to it: Z - A^T B of a symmetric result.

@@ -4,14 +4,6 @@
 
 namespace loopbench::odca::arms {
 
-namespace {
-
-std::span<double> In(VectorX<double>& numbers) {
-  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
-}
-
-}  // namespace
-
 template <Follow kFollow>
 void ArmSweep::Travel(Group& group) const {
   Passage<Lanes> along = NoPassage<Lanes>();
@@ -174,14 +166,16 @@ void ArmSweep::MoveFollowing() {
 }
 
 template <Sought kSought>
-void ArmSweep::Move(Correction<double>* largest) {
+void ArmSweep::Move() {
   if (closings_.empty()) return MoveFollowing<kSought, Follow::kSpeeds>();
   MoveFollowing<kSought, Follow::kPoints>();
+  Correction<double>* largest = kSought == Sought::kPositions ? &(largest_ = {}) : nullptr;
   for (PlacedClosing& at : closings_) {
     at.closing.Place(Side(at, at.tip_P), Side(at, at.tip_Q), largest);
   }
 }
 
+/// As in the general sweep, without kinematics and zeta_i3.
 long ArmSweep::OperationsOfSweep() const {
   constexpr int kBoth = 2 * Operations::About(kRows) + Operations::kOpposite;
   constexpr int kInner = Operations::kJoin + Operations::kForceIn + kBoth;
@@ -220,55 +214,29 @@ bool ArmSweep::Evaluate(SpeedsUsed speeds, Kinematics<Spatial, double>*, std::sp
     Move<Sought::kSpeeds>();
     if (!Solve<Sought::kSpeeds>()) return false;
     speed_ += rate_;
-    PutOut(speed_, qdot);
+    PutOut(speed_, {}, qdot);
   } else {
     std::ranges::copy(u, qdot.begin());
   }
   Move<Sought::kAccelerations>();
   if (!Solve<Sought::kAccelerations>()) return false;
-  PutOut(rate_, udot);
+  PutOut(rate_, {}, udot);
   return IsFinite();
 }
 
-std::optional<Correction<double>> ArmSweep::Gap() {
-  if (!TakeIn(In(moved_), In(speeds_))) return std::nullopt;
-  Correction<double> largest;
-  Move<Sought::kPositions>(&largest);
-  return largest;
+bool ArmSweep::Place(GapKind kind, std::span<const double> q, std::span<const double> u) {
+  if (!TakeIn(q, u)) return false;
+  kind == GapKind::kSpeeds ? Move<Sought::kSpeeds>() : Move<Sought::kPositions>();
+  return true;
 }
 
-/// As level.cpp does it by parts.
-std::optional<Correction<double>> ArmSweep::Project(std::span<double> q, std::span<double> u,
-                                                    double goal) {
-  const auto size = [&](const Correction<double>& gap) {
-    return std::max(gap.rotation * size_, gap.shift);
-  };
-  std::ranges::copy(q, moved_.begin());
-  std::ranges::copy(u, speeds_.begin());
-  std::optional<Correction<double>> now = Gap();
-  if (!now) return std::nullopt;
-  Correction<double> correction = *now;
-  for (int i = 0; i < kMaxProjections && size(*now) > goal; ++i) {
-    if (!Solve<Sought::kPositions>() || !IsFinite()) return std::nullopt;
-    const double before = size(*now);
-    back_ = moved_;
-    PutOut(rate_, In(step_));
-    moved_ += step_;
-    now = Gap();
-    if (!now) return std::nullopt;
-    ++correction.iterations;
-    if (size(*now) < before) continue;
-    moved_ = back_;  // round-off: as it was
-    break;
-  }
-  if (!TakeIn(In(moved_), In(speeds_))) return std::nullopt;
-  Move<Sought::kSpeeds>();
-  if (!Solve<Sought::kSpeeds>() || !IsFinite()) return std::nullopt;
-  PutOut(rate_, In(step_));
-  speeds_ += step_;
-  std::ranges::copy(moved_, q.begin());
-  std::ranges::copy(speeds_, u.begin());
-  return correction;
+bool ArmSweep::FindChange(GapKind kind) {
+  return kind == GapKind::kSpeeds ? Solve<Sought::kSpeeds>() : Solve<Sought::kPositions>();
+}
+
+bool ArmSweep::AddChange(std::span<const double> base, std::span<double> sum) {
+  PutOut(rate_, base, sum);
+  return IsFinite();
 }
 
 }  // namespace loopbench::odca::arms

@@ -42,10 +42,6 @@ class ArmSweep final : public ShortCut<Spatial> {
 
   bool Evaluate(SpeedsUsed speeds, Kinematics<Spatial, double>*, std::span<const double> q,
                 std::span<const double> u, std::span<double> qdot, std::span<double> udot) override;
-  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
-                                            double goal) override;
-  /// As in the general sweep, without kinematics and zeta_i3.
-  long operations() const override { return operations_; }
   int threads() const { return pool_->threads(); }
 
  private:
@@ -58,7 +54,6 @@ class ArmSweep final : public ShortCut<Spatial> {
     Lanes F1[kRows], F2[kRows];  ///< on these
     Lanes about2;                ///< of their last bodies
     double slack = 0.0;
-    bool in_range = true;
   };
   /// An arm's places in the lists. Pieces, then single bodies, then the tip of a closed one are
   /// its nodes.
@@ -90,24 +85,25 @@ class ArmSweep final : public ShortCut<Spatial> {
   void LayClosings(const Arms& arms);
   /// Returns true if Evaluate() accepts some position, even one far from closed. It accepts none if
   /// axes of loops are parallel or meet in a point, which reduces rank everywhere.
-  bool IsUsable();
+  bool IsUsableSomewhere();
 
   /// Angles and speeds by place. False for angles beyond kLargestAngle.
   bool TakeIn(std::span<const double> q, std::span<const double> u);
-  void TakeIn(std::span<const double> q, std::span<const double> u, int first, int last);
-  /// sign times these numbers by place, in the order of u.
-  void PutOut(const VectorX<double>& of_places, std::span<double> to);
+  /// sign times these numbers by place, in the order of u, plus `base` if it is not empty.
+  void PutOut(const VectorX<double>& of_places, std::span<const double> base, std::span<double> to);
 
-  /// Computes poses of bodies, and the largest violation of a cut joint if requested.
+  /// Computes poses of bodies and violations of cut joints, of positions if these are sought.
   template <Sought kSought>
-  void Move(Correction<double>* largest = nullptr);
+  void Move();
   template <Sought kSought, Follow kFollow>
   void MoveFollowing();
   /// Computes rate_ afterwards. Returns false near a degenerate position.
   template <Sought kSought>
   bool Solve();
-  /// The largest mismatch at moved_, or nothing.
-  std::optional<Correction<double>> Gap();
+  bool Place(GapKind kind, std::span<const double> q, std::span<const double> u) override;
+  Correction<double> LargestGap() const override { return largest_; }
+  bool FindChange(GapKind kind) override;
+  bool AddChange(std::span<const double> base, std::span<double> sum) override;
   /// Passages of the group's pieces.
   template <Follow kFollow>
   void Travel(Group& group) const;
@@ -145,12 +141,11 @@ class ArmSweep final : public ShortCut<Spatial> {
   std::vector<double> end_about2_;  ///< about axis 2 of the last body, of pieces, then of singles
   std::vector<TipState> tips_;
   std::vector<PlacedClosing> closings_;
-  std::vector<int> index_;                                       ///< of a place's joint in u
+  std::vector<int> index_;  ///< of a place's joint in u; these lists end with padding of lanes
   VectorX<double> sign_, angle_, speed_, sine_, cosine_, rate_;  ///< by place
-  VectorX<double> moved_, back_, speeds_, step_;  ///< of Project(), in the order of u
-  double size_ = 1.0;                             ///< Mechanism::length(), for rotations
+  std::vector<char> in_range_;                                   ///< by part of the places
+  Correction<double> largest_;
   std::unique_ptr<WorkerPool> pool_;
-  long operations_ = 0;
 };
 
 }  // namespace loopbench::odca::arms

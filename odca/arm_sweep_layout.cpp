@@ -15,6 +15,10 @@ namespace {
 /// Shorter pieces are no faster than one body after another.
 constexpr int kShortestPiece = 2;
 
+/// Places that a thread takes at once.
+constexpr int kPart = 1024;
+static_assert(kPart % kLanes == 0);
+
 /// Bodies of an arm that may be in pieces: the tip of a closed one is asked for more.
 int Inner(const Arm& arm) {
   return static_cast<int>(arm.bodies.size()) - (arm.closing >= 0 ? 1 : 0);
@@ -56,26 +60,21 @@ std::unique_ptr<ArmSweep> ArmSweep::Make(const Mechanism<Spatial, double>& mecha
   if (arms.arms.empty()) return nullptr;
   std::unique_ptr<ArmSweep> sweep(new ArmSweep);
   sweep->num_u_ = mechanism.num_u();
-  sweep->size_ = mechanism.length();
+  sweep->SetSize(mechanism);
   sweep->Lay(arms, bodies_of_group);
   const int useful = static_cast<int>(sweep->groups_.size());
   sweep->pool_ = std::make_unique<WorkerPool>(std::clamp(useful, 1, std::max(1, threads)));
-  return sweep->IsUsable() ? std::move(sweep) : nullptr;
+  return sweep->IsUsableSomewhere() ? std::move(sweep) : nullptr;
 }
 
-bool ArmSweep::IsUsable() {
+bool ArmSweep::IsUsableSomewhere() {
   constexpr int kTrials = 3;
   constexpr double kGoldenAngle = 2.399963229728653;
   if (closings_.empty()) return true;
+  std::vector<double> q(num_u()), u(num_u()), qdot(num_u()), udot(num_u());
   for (int trial = 1; trial <= kTrials; ++trial) {
-    for (int i = 0; i < num_u_; ++i) {
-      moved_[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
-    }
-    if (Evaluate(SpeedsUsed::kGiven, nullptr, {moved_.data(), moved_.data() + num_u_},
-                 {speeds_.data(), speeds_.data() + num_u_}, {back_.data(), back_.data() + num_u_},
-                 {step_.data(), step_.data() + num_u_})) {
-      return true;
-    }
+    for (int i = 0; i < num_u_; ++i) q[i] = std::remainder(kGoldenAngle * trial * (i + 1), 6.0);
+    if (Evaluate(SpeedsUsed::kGiven, nullptr, q, u, qdot, udot)) return true;
   }
   return false;
 }
@@ -85,9 +84,10 @@ void ArmSweep::Lay(const Arms& arms, int bodies_of_group) {
   length_ = pieces.length;
   num_pieces_ = pieces.groups * kLanes;
   packed_ = num_pieces_ * length_;
-  sign_.setZero(num_u_);
-  angle_ = speed_ = sine_ = cosine_ = rate_ = moved_ = back_ = speeds_ = step_ = sign_;
-  index_.assign(num_u_, 0);
+  sign_.setZero((num_u_ + kLanes - 1) / kLanes * kLanes);
+  angle_ = speed_ = sine_ = cosine_ = rate_ = sign_;
+  index_.assign(static_cast<std::size_t>(sign_.size()), 0);
+  in_range_.resize((index_.size() + kPart - 1) / kPart);
   std::vector<Link<Lanes>> packs(packed_ / kLanes);
   int piece = 0;
   for (const Arm& arm : arms.arms) {
@@ -161,35 +161,26 @@ void ArmSweep::LayClosings(const Arms& arms) {
   }
 }
 
-void ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u, int first, int last) {
-  for (int place = first; place < last; ++place) {
-    angle_[place] = sign_[place] * q[index_[place]];
-    speed_[place] = sign_[place] * u[index_[place]];
-  }
-}
-
 bool ArmSweep::TakeIn(std::span<const double> q, std::span<const double> u) {
-  const int places = length_ * kLanes;
-  pool_->ForEach(static_cast<int>(groups_.size()), [&](int g) {
-    const int first = g * places;
-    TakeIn(q, u, first, first + places);
-    groups_[g].in_range = SinesAndCosines(&angle_[first], places, &sine_[first], &cosine_[first]);
+  pool_->ForEach(static_cast<int>(in_range_.size()), [&](int part) {
+    const int first = part * kPart, last = std::min(static_cast<int>(index_.size()), first + kPart);
+    for (int place = first; place < last; ++place) {
+      angle_[place] = sign_[place] * q[index_[place]];
+      speed_[place] = sign_[place] * u[index_[place]];
+    }
+    in_range_[part] = SinesAndCosines(&angle_[first], last - first, &sine_[first], &cosine_[first]);
   });
-  bool in_range = std::ranges::all_of(groups_, &Group::in_range);
-  TakeIn(q, u, packed_, num_u_);
-  for (int place = packed_; place < num_u_; ++place) {
-    in_range = in_range && kLargestAngle - Magnitude(angle_[place]) >= 0.0;
-    SinCos(angle_[place], sine_[place], cosine_[place]);
-  }
-  return in_range;
+  return std::ranges::find(in_range_, 0) == in_range_.end();
 }
 
-void ArmSweep::PutOut(const VectorX<double>& of_places, std::span<double> to) {
-  constexpr int kPart = 4096;
-  pool_->ForEach((num_u_ + kPart - 1) / kPart, [&](int part) {
+void ArmSweep::PutOut(const VectorX<double>& of_places, std::span<const double> base,
+                      std::span<double> to) {
+  pool_->ForEach(static_cast<int>(in_range_.size()), [&](int part) {
     const int last = std::min(num_u_, (part + 1) * kPart);
     for (int place = part * kPart; place < last; ++place) {
-      to[index_[place]] = sign_[place] * of_places[place];
+      const int i = index_[place];
+      const double own = sign_[place] * of_places[place];
+      to[i] = base.empty() ? own : base[i] + own;
     }
   });
 }

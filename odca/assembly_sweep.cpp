@@ -3,34 +3,46 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/algebra/known_size.h"
 #include "odca/sines.h"
+
+/// Behind the parameters of a lambda: its captures must not go through memory.
+#define LOOPBENCH_INLINED __attribute__((always_inline))
 
 namespace loopbench::odca::pins {
 
 namespace {
-
-using Map = Eigen::Map<MatrixX<double>>;
 
 /// A moment of F about the point that the arm leads from.
 double Moment(const Vector2<double>& arm, const Vector2<double>& F) {
   return arm.x * F.y - arm.y * F.x;
 }
 
-/// No product of Eigen's: this file compiles them with fused multiply-add, and the linker could use
-/// them elsewhere.
-double Dot(const double* a, const double* b, int n) {
-  Lanes sums = {};
-  int i = 0;
-  for (; i + kLanes <= n; i += kLanes) sums += Load<Lanes>(a + i) * Load<Lanes>(b + i);
-  double sum = 0.0;
-  for (int lane = 0; lane < (i > 0 ? kLanes : 0); ++lane) sum += sums[lane];
-  for (; i < n; ++i) sum += a[i] * b[i];
-  return sum;
+template <class Size>
+LOOPBENCH_INLINE double Dot(const double* a, const double* b, Size size) {
+  if constexpr (kKnownSize<Size> == 2) {
+    return a[0] * b[0] + a[1] * b[1];
+  } else {
+    const int n = size;
+    Lanes sums = {};
+    int i = 0;
+    for (; i + kLanes <= n; i += kLanes) sums += Load<Lanes>(a + i) * Load<Lanes>(b + i);
+    double sum = 0.0;
+    for (int lane = 0; lane < (i > 0 ? kLanes : 0); ++lane) sum += sums[lane];
+    for (; i < n; ++i) sum += a[i] * b[i];
+    return sum;
+  }
+}
+
+/// Calls `call` with the rows of a join, as a constant for one pin or two.
+template <class Call>
+LOOPBENCH_INLINE auto WithRows(int pins, const Call& call) {
+  return WithSize<double, 2, 4>(2 * pins, call);
 }
 
 }  // namespace
 
-template <AssemblySweep::GapKind kGap>
+template <GapKind kGap>
 bool AssemblySweep::Turn() {
   const int places = static_cast<int>(angle_.size());
   if (!SinesAndCosines(angle_.data(), places, sine_.data(), cosine_.data())) return false;
@@ -47,7 +59,7 @@ bool AssemblySweep::Turn() {
 }
 
 /// A cut joint is imposed at a point of Q; there the arm of P ends (two_handle.h).
-template <AssemblySweep::GapKind kGap>
+template <GapKind kGap>
 void AssemblySweep::Close() {
   const auto leads = [&](int body, int handle) {
     const Vector r = Scaled(bodies_[body].link.radius, arm_[handle]);
@@ -70,12 +82,12 @@ void AssemblySweep::Close() {
   }
 }
 
-double AssemblySweep::LargestGap() const {
+Correction<double> AssemblySweep::LargestGap() const {
   double largest = 0.0;
   for (const CutJoint& cut : cuts_) {
     largest = std::max(largest, cut.v.x * cut.v.x + cut.v.y * cut.v.y);
   }
-  return std::sqrt(largest);
+  return {.shift = std::sqrt(largest)};
 }
 
 bool AssemblySweep::Assemble() {
@@ -92,25 +104,106 @@ bool AssemblySweep::Assemble() {
     }
   }
   for (const Node& node : nodes_) {
-    if (!(node.pins == 1 ? JoinOne(node) : JoinSeveral(node))) return false;
+    if (!WithRows(node.pins, [&](auto rows) { return Join(node, rows); })) return false;
   }
   return true;
 }
 
-/// Computes zeta of the remaining handles: the old value less product(e, f).
-template <class Product>
-void AssemblySweep::Eliminate(const Node& node, const Product& product) {
+/// Y = C zeta of a pin at a handle of a child (67).
+LOOPBENCH_INLINE AssemblySweep::Matrix AssemblySweep::ResponseAt(const Node& node, const Pin& pin,
+                                                                 const Side& at) const {
+  const Matrix* zeta = zeta_.data() + node.blocks[at.child] + node.handles[at.child] * at.place;
+  Matrix Y = {0.0, 0.0, 0.0, 0.0};
+  if (pin.Q.place >= 0 && pin.Q.child == at.child) Y = zeta[pin.Q.place];
+  if (pin.P.place >= 0 && pin.P.child == at.child) Y = Y - zeta[pin.P.place];
+  return Y;
+}
+
+/// X = Y C^T of one pin (16). Both sides may be on one assembly.
+LOOPBENCH_INLINE Symmetric2<double> AssemblySweep::Across(const Node& node, const Pin& pin) const {
+  const auto block = [&](const Side& row, const Side& column) -> const Matrix& {
+    const int child = row.child;
+    return zeta_[node.blocks[child] + row.place + node.handles[child] * column.place];
+  };
+  Symmetric2<double> X = {0.0, 0.0, 0.0};
+  for (const Side* side : {&pin.Q, &pin.P}) {
+    if (side->place < 0) continue;
+    const Matrix& own = block(*side, *side);
+    X = X + Symmetric2<double>{own.xx, own.xy, own.yy};
+  }
+  if (pin.P.place < 0 || pin.Q.place < 0 || pin.P.child != pin.Q.child) return X;
+  const Matrix& QP = block(pin.Q, pin.P);
+  return X + Symmetric2<double>{-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy)};
+}
+
+/// X = Y C^T (16, 66) is factored pin by pin. Rows of L are columns of W of the pins.
+template <class Rows>
+bool AssemblySweep::Join(const Node& node, Rows rows) {
+  const int n = rows;
+  const Pin* pins = pins_.data() + node.first_pin;
+  const Side* kept = kept_.data() + node.first_kept;
+  Factored2<double>* factors = factors_.data() + node.first_pin;
+  double *U = U_.data(), *W = W_.data() + node.matrix;
+  const double* L = W + 2 * n * node.kept;
+  // two columns of U and W in the rows of the first pins, from those of X or Y
+  const auto reduce = [&](int place, int num_pins, const auto& block) LOOPBENCH_INLINED {
+    double *ux = U + 2 * n * place, *uy = ux + n;
+    double *wx = W + 2 * n * place, *wy = wx + n;
+    for (int i = 0; i < num_pins; ++i) {
+      const Matrix Y = block(pins[i]);
+      const double *Lx = L + 2 * n * i, *Ly = Lx + n;
+      const auto column = [&](double* u, double* w, double x, double y) LOOPBENCH_INLINED {
+        u[2 * i] = x - Dot(Lx, u, 2 * i);
+        u[2 * i + 1] = y - Dot(Ly, u, 2 * i);
+        const Vector solved = factors[i].Solve(u[2 * i], u[2 * i + 1]);
+        w[2 * i] = solved.x;
+        w[2 * i + 1] = solved.y;
+      };
+      column(ux, wx, Y.xx, Y.yx);
+      column(uy, wy, Y.xy, Y.yy);
+    }
+  };
+  double slack = 0.0;
+  for (int i = 0; i < n / 2; ++i) {
+    reduce(node.kept + i, i, [&](const Pin& row) LOOPBENCH_INLINED {
+      Matrix X = {0.0, 0.0, 0.0, 0.0};
+      if (pins[i].Q.place >= 0) X = ResponseAt(node, row, pins[i].Q);
+      return pins[i].P.place < 0 ? X : X - ResponseAt(node, row, pins[i].P);
+    });
+    const double *Lx = L + 2 * n * i, *Ly = Lx + n;
+    const double *ux = U + 2 * n * (node.kept + i), *uy = ux + n;
+    Symmetric2<double> rest = Across(node, pins[i]);
+    rest.xx -= Dot(Lx, ux, 2 * i);
+    rest.xy -= Dot(Ly, ux, 2 * i);
+    rest.yy -= Dot(Ly, uy, 2 * i);
+    factors[i] = FactorsOf(rest, pins[i].limit, slack);
+    if (!(slack >= 0.0) || !(rest.xx + rest.yy > 0.0)) return false;
+  }
+  for (int e = 0; e < node.kept; ++e) {
+    reduce(e, n / 2,
+           [&](const Pin& row) LOOPBENCH_INLINED { return ResponseAt(node, row, kept[e]); });
+  }
+  Eliminate(node, rows);
+  return true;
+}
+
+/// Computes zeta of the remaining handles (26-28, 71).
+template <class Rows>
+LOOPBENCH_INLINE void AssemblySweep::Eliminate(const Node& node, Rows rows) {
+  const int n = rows;
   const Side* kept = kept_.data() + node.first_kept;
   Matrix* zeta = zeta_.data() + node.first_block;
+  const double *U = U_.data(), *W = W_.data() + node.matrix;
   for (int f = 0; f < node.kept; ++f) {
+    const double *wx = W + 2 * n * f, *wy = wx + n;
     for (int e = f; e < node.kept; ++e) {
+      const double *ux = U + 2 * n * e, *uy = ux + n;
       Matrix Z = {0.0, 0.0, 0.0, 0.0};
       const int child = kept[e].child;
       if (child == kept[f].child) {
         Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
       }
-      const Matrix less = product(e, f);
-      Z = {Z.xx - less.xx, Z.xy - less.xy, Z.yx - less.yx, Z.yy - less.yy};
+      Z = Z - Matrix{Dot(ux, wx, rows), Dot(ux, wy, rows), Dot(uy, wx, rows), Dot(uy, wy, rows)};
       if (e == f) {
         Z.yx = Z.xy;
       } else {
@@ -121,115 +214,14 @@ void AssemblySweep::Eliminate(const Node& node, const Product& product) {
   }
 }
 
-/// X = zeta_QQ + zeta_PP (16), and Y a block of zeta for each handle that stays (67); where both
-/// sides are on one assembly, with their cross responses.
-bool AssemblySweep::JoinOne(const Node& node) {
-  const Pin& pin = pins_[node.first_pin];
-  const auto block = [&](const Side& row, int child, int column) -> const Matrix& {
-    return zeta_[node.blocks[child] + row.place + node.handles[child] * column];
-  };
-  const bool P = pin.P.place >= 0, Q = pin.Q.place >= 0;
-  Symmetric2<double> X = {0.0, 0.0, 0.0};
-  if (Q) {
-    const Matrix& QQ = block(pin.Q, pin.Q.child, pin.Q.place);
-    X = {QQ.xx, QQ.xy, QQ.yy};
-  }
-  if (P) {
-    const Matrix& PP = block(pin.P, pin.P.child, pin.P.place);
-    X = X + Symmetric2<double>{PP.xx, PP.xy, PP.yy};
-  }
-  if (P && Q && pin.P.child == pin.Q.child) {
-    const Matrix& QP = block(pin.Q, pin.P.child, pin.P.place);
-    X = X + Symmetric2<double>{-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy)};
-  }
-  double slack = 0.0;
-  const Factored2<double> factors = FactorsOf(X, node.limit, slack);
-  if (!(slack >= 0.0)) return false;
-  factors_[node.factors] = factors;
+/// L^-1 (C b + c0) of all pins (68), b of the remaining handles, and s = D^-1 of the former (21).
+template <Pass kPass, class Rows>
+LOOPBENCH_INLINE void AssemblySweep::Up(const Node& node, Rows rows) {
+  const int n = rows;
   const Side* kept = kept_.data() + node.first_kept;
-  Matrix* W = W_.data() + node.matrix;
-  for (int e = 0; e < node.kept; ++e) {
-    Matrix Y = {0.0, 0.0, 0.0, 0.0};
-    if (Q && pin.Q.child == kept[e].child) Y = block(pin.Q, kept[e].child, kept[e].place);
-    if (P && pin.P.child == kept[e].child) {
-      const Matrix& PE = block(pin.P, kept[e].child, kept[e].place);
-      Y = {Y.xx - PE.xx, Y.xy - PE.xy, Y.yx - PE.yx, Y.yy - PE.yy};
-    }
-    Y_[e] = Y;
-    W[e] = factors * Y;
-  }
-  Eliminate(node, [&](int e, int f) { return TransposeTimes(Y_[e], W[f]); });  // (26-28)
-  return true;
-}
-
-/// Returns the free response of the two bodies of a pin.
-JointMatrix<double> AssemblySweep::FreeResponse(const FreeBody* bodies) const {
-  JointMatrix<double> X = JointMatrix<double>::Zero(2, 2);
-  for (const FreeBody* free = bodies; free != bodies + 2; ++free) {
-    if (free->body < 0) continue;
-    const double s = sine_[free->body], c = cosine_[free->body];
-    const Vector r = {free->arm.x * c - free->arm.y * s, free->arm.x * s + free->arm.y * c};
-    X(0, 0) += free->mobility + free->inverse_inertia * (r.y * r.y);
-    X(1, 0) -= free->inverse_inertia * (r.x * r.y);
-    X(1, 1) += free->mobility + free->inverse_inertia * (r.x * r.x);
-  }
-  X(0, 1) = X(1, 0);
-  return X;
-}
-
-/// X of several pins (66), and V = T Y.
-bool AssemblySweep::JoinSeveral(const Node& node) {
-  const int n = 2 * node.pins;
-  const Pin* pins = pins_.data() + node.first_pin;
-  const Side* kept = kept_.data() + node.first_kept;
-  LoopSolver<double>& loop = loops_[node.factors];
-  Map V(V_.data() + node.matrix, n, 2 * node.kept);
-  auto X = X_.topLeftCorner(n, n);
-  X.setZero();
-  V.setZero();
-  const auto add = [](auto&& to, double sign, const Matrix& block) {
-    to(0, 0) += sign * block.xx;
-    to(0, 1) += sign * block.xy;
-    to(1, 0) += sign * block.yx;
-    to(1, 1) += sign * block.yy;
-  };
-  for (int i = 0; i < node.pins; ++i) {
-    loop.SetScale(i, FreeResponse(free_.data() + (node.first_free + 2 * i)));
-    for (const bool at_Q : {true, false}) {
-      const Side& row = at_Q ? pins[i].Q : pins[i].P;
-      if (row.place < 0) continue;
-      const auto block = [&](int place) -> const Matrix& {
-        return zeta_[node.blocks[row.child] + row.place + node.handles[row.child] * place];
-      };
-      for (int j = 0; j < node.pins; ++j) {
-        for (const bool to_Q : {true, false}) {
-          const Side& column = to_Q ? pins[j].Q : pins[j].P;
-          if (column.place < 0 || column.child != row.child) continue;
-          add(X.block<2, 2>(2 * i, 2 * j), at_Q == to_Q ? 1.0 : -1.0, block(column.place));
-        }
-      }
-      for (int e = 0; e < node.kept; ++e) {
-        if (kept[e].child != row.child) continue;
-        add(V.block<2, 2>(2 * i, 2 * e), at_Q ? 1.0 : -1.0, block(kept[e].place));
-      }
-    }
-  }
-  if (!loop.FactorScaled(X) && !(loop.rcond() >= node.limit)) return false;
-  if (node.kept == 0) return true;
-  loop.Apply(V);
-  Eliminate(node, [&](int e, int f) {  // (71)
-    const double *ex = V.col(2 * e).data(), *ey = ex + n;
-    const double *fx = V.col(2 * f).data(), *fy = fx + n;
-    return Matrix{Dot(ex, fx, n), Dot(ex, fy, n), Dot(ey, fx, n), Dot(ey, fy, n)};
-  });
-  return true;
-}
-
-/// C b + c0 of each pin; for one of them then X^-1 of it, for several T of it (21, 68).
-template <Pass kPass>
-void AssemblySweep::Up(const Node& node) {
-  double* s = s_.data() + node.first_row;
-  for (int i = 0; i < node.pins; ++i) {
+  const double *W = W_.data() + node.matrix, *L = W + 2 * n * node.kept;
+  double* s = s_.data() + 2 * node.first_pin;
+  for (int i = 0; i < n / 2; ++i) {
     const Pin& pin = pins_[node.first_pin + i];
     Vector sum = {0.0, 0.0};
     if (pin.cut >= 0) {
@@ -237,64 +229,40 @@ void AssemblySweep::Up(const Node& node) {
       if constexpr (kPass == Pass::kSpeeds) sum = cut.v;
       if constexpr (kPass == Pass::kAccelerations) sum = -Cross(cut.w_P + cut.w_P, cut.v);  // (7)
     }
-    if (pin.Q.place >= 0) sum = sum + b_[pin.Q.slot];
-    if (pin.P.place >= 0) sum = sum - b_[pin.P.slot];
-    s[2 * i] = sum.x;
-    s[2 * i + 1] = sum.y;
+    if (pin.Q.place >= 0) sum = sum + b_[pin.Q.handle];
+    if (pin.P.place >= 0) sum = sum - b_[pin.P.handle];
+    s[2 * i] = sum.x - Dot(L + 2 * n * i, s, 2 * i);
+    s[2 * i + 1] = sum.y - Dot(L + 2 * n * i + n, s, 2 * i);
   }
-  const Side* kept = kept_.data() + node.first_kept;
-  Vector* b = b_.data() + node.first_slot;
-  if (node.pins == 1) {
-    const Vector sum = {s[0], s[1]};
-    const Matrix* W = W_.data() + node.matrix;
-    for (int e = 0; e < node.kept; ++e) {  // (29-30)
-      b[e] = b_[kept[e].slot] - TransposeTimes(W[e], sum);
-    }
-    const Vector y = factors_[node.factors] * sum;
-    s[0] = y.x;
-    s[1] = y.y;
-    return;
+  for (int e = 0; e < node.kept; ++e, W += 2 * n) {
+    Vector& b = b_[kept[e].handle];
+    b = b - Vector{Dot(W, s, rows), Dot(W + n, s, rows)};  // (29-30, 72)
   }
-  const int n = 2 * node.pins;
-  loops_[node.factors].Apply(Map(s, n, 1));
-  const double* V = V_.data() + node.matrix;
-  for (int e = 0; e < node.kept; ++e, V += 2 * n) {  // (72)
-    Vector sum = b_[kept[e].slot];
-    for (int i = 0; i < n; ++i) {
-      sum.x -= V[i] * s[i];
-      sum.y -= V[n + i] * s[i];
-    }
-    b[e] = sum;
+  for (int i = 0; i < n / 2; ++i) {
+    const Vector solved = factors_[node.first_pin + i].Solve(s[2 * i], s[2 * i + 1]);
+    s[2 * i] = solved.x;
+    s[2 * i + 1] = solved.y;
   }
 }
 
-/// phi (17, 64), and forces on the handles of the children.
-void AssemblySweep::Down(const Node& node) {
-  const double* s = s_.data() + node.first_row;
-  const Vector* F = F_.data() + node.first_slot;
+/// phi = -L^-T (s + W F) (17, 64), and forces on the handles of the pins.
+template <class Rows>
+LOOPBENCH_INLINE void AssemblySweep::Down(const Node& node, Rows rows) {
+  const int n = rows;
   const Side* kept = kept_.data() + node.first_kept;
-  double* phi = phi_.data();
-  const int n = 2 * node.pins;
-  for (int i = 0; i < n; ++i) phi[i] = -s[i];
-  if (node.pins == 1) {
-    const Matrix* W = W_.data() + node.matrix;
-    Vector sum = {phi[0], phi[1]};
-    for (int e = 0; e < node.kept; ++e) sum = sum - W[e] * F[e];
-    phi[0] = sum.x;
-    phi[1] = sum.y;
-  } else {
-    const double* V = V_.data() + node.matrix;
-    for (int e = 0; e < node.kept; ++e, V += 2 * n) {
-      for (int i = 0; i < n; ++i) phi[i] -= V[i] * F[e].x + V[n + i] * F[e].y;
-    }
-    loops_[node.factors].ApplyTransposed(Eigen::Map<VectorX<double>>(phi, n));
-  }
-  for (int e = 0; e < node.kept; ++e) F_[kept[e].slot] = F[e];
-  for (int i = 0; i < node.pins; ++i) {
+  const double *W = W_.data() + node.matrix, *L = W + 2 * n * node.kept;
+  double* phi = s_.data() + 2 * node.first_pin;
+  const auto subtract = [&](const double* columns, auto size, const Vector& F) {
+    Repeat(size, [&](int r) { phi[r] -= columns[r] * F.x + columns[n + r] * F.y; });
+  };
+  for (int r = 0; r < n; ++r) phi[r] = -phi[r];
+  for (int e = 0; e < node.kept; ++e) subtract(W + 2 * n * e, rows, F_[kept[e].handle]);
+  for (int i = n / 2 - 1; i >= 0; --i) {
     const Pin& pin = pins_[node.first_pin + i];
     const Vector force = {phi[2 * i], phi[2 * i + 1]};
-    if (pin.Q.place >= 0) F_[pin.Q.slot] = force;
-    if (pin.P.place >= 0) F_[pin.P.slot] = -force;
+    subtract(L + 2 * n * i, 2 * i, force);
+    if (pin.Q.place >= 0) F_[pin.Q.handle] = force;
+    if (pin.P.place >= 0) F_[pin.P.handle] = -force;
   }
 }
 
@@ -326,8 +294,12 @@ void AssemblySweep::Solve() {
                                      : Vector{gx - a * r.y - w2 * r.x, gy + a * r.x - w2 * r.y};
     }
   }
-  for (const Node& node : nodes_) Up<kPass>(node);
-  for (std::size_t n = nodes_.size(); n-- > 0;) Down(nodes_[n]);
+  for (const Node& node : nodes_) {
+    WithRows(node.pins, [&](auto rows) { Up<kPass>(node, rows); });
+  }
+  for (std::size_t n = nodes_.size(); n-- > 0;) {
+    WithRows(nodes_[n].pins, [&](auto rows) { Down(nodes_[n], rows); });
+  }
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const Body& body = bodies_[i];
     double alpha = alpha_[i];
@@ -343,8 +315,7 @@ bool AssemblySweep::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kine
                              std::span<double> qdot, std::span<double> udot) {
   using Numbers = Eigen::Map<const VectorX<double>>;
   operations_ = 0;
-  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  if (!Turn<GapKind::kSpeeds>() || !Assemble()) return false;
+  if (!Place(GapKind::kSpeeds, q, u) || !Assemble()) return false;
   const auto take_forces = [&] {
     if (applied_.empty()) return;
     kinematics->UpdatePosition(Numbers(q.data(), std::ssize(q)));
@@ -373,15 +344,19 @@ bool AssemblySweep::IsUsable(const Kinematics<Planar, double>& kinematics) {
   return Turn<GapKind::kSpeeds>() && Assemble();
 }
 
-bool AssemblySweep::FindChange() {
+bool AssemblySweep::Place(GapKind kind, std::span<const double> q, std::span<const double> u) {
+  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
+  return kind == GapKind::kSpeeds ? Turn<GapKind::kSpeeds>() : Turn<GapKind::kPositions>();
+}
+
+bool AssemblySweep::FindChange(GapKind) {
   if (!Assemble()) return false;
   Solve<Pass::kSpeeds>();
   return true;
 }
 
-std::optional<Correction<double>> AssemblySweep::Project(std::span<double> q, std::span<double> u,
-                                                         double goal) {
-  return PinProjection::Of(*this, q, u, goal);
+bool AssemblySweep::AddChange(std::span<const double> base, std::span<double> sum) {
+  return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
 }
 
 }  // namespace loopbench::odca::pins

@@ -4,16 +4,16 @@
 //
 //   angles and speeds of bodies   along the spanning tree (tree_angles.h)
 //   violations of cut joints      along the same tree
-//   up, matrices                  zeta of each body, then X, W or V and zeta of each join
+//   up, matrices                  zeta of each body, then X, W and zeta of each join
 //   up and down, vectors          zeta_i3, then forces: once, or twice where speeds are completed
 //
 // A handle is a joint side that is still open, with the two rows of a pin's D (two_handle.h). A
 // body has as many handles as pins, and Y (67) is a row of blocks of zeta. A tree pin on Ground is
 // a property of its body, not a joint of an assembly, as in two_handle.h.
 //
-// A join of one pin keeps W = X^-1 Y; its rank is uncertain under the condition for paths.
-// loop_solver.h solves joins of several pins; their rank is uncertain if the general pass (joins.h)
-// finds it so. Evaluate() then stops, and the general pass decides.
+// A join factors X = L D L^T, two rows of one pin at a time. It keeps L and W = D^-1 L^-1 Y. The
+// rank of a pin that closes a loop is uncertain under the condition for paths. Evaluate() then
+// stops, and the general pass decides.
 #pragma once
 
 #include <memory>
@@ -21,9 +21,7 @@
 #include <span>
 #include <vector>
 
-#include "mechanism/loops/loop_solver.h"
 #include "mechanism/model/mechanism.h"
-#include "odca/pin_projection.h"
 #include "odca/plan.h"
 #include "odca/short_cut.h"
 #include "odca/tree_angles.h"
@@ -41,10 +39,7 @@ class AssemblySweep final : public ShortCut<Planar> {
   bool Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kinematics,
                 std::span<const double> q, std::span<const double> u, std::span<double> qdot,
                 std::span<double> udot) override;
-  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u,
-                                            double goal) override;
   bool IsUsable(const Kinematics<Planar, double>& kinematics) override;
-  long operations() const override { return operations_; }
 
  private:
   using Vector = Vector2<double>;
@@ -78,35 +73,22 @@ class AssemblySweep final : public ShortCut<Planar> {
   /// One of a node's joints on one of its children.
   struct Side {
     int child = 0;
-    int place = -1;  ///< among its handles; -1: Ground
-    int slot = -1;   ///< of b_ and F_
+    int place = -1;   ///< among its handles; -1: Ground
+    int handle = -1;  ///< in handles_
   };
   struct Pin {
     Side P, Q;
-    int cut = -1;  ///< in cuts_
-  };
-  /// A body of a pin alone, for X_free (loop_solver.h) of joins of several; -1: Ground.
-  struct FreeBody {
-    int body = -1;
-    Vector arm = {};  ///< from the centre of mass, in axes of the body
-    double mobility = 0.0, inverse_inertia = 0.0;
+    int cut = -1;        ///< in cuts_
+    double limit = 0.0;  ///< least response; 0 if it closes no loop
   };
   /// A join. Children's zeta are blocks by columns.
   struct Node {
     int blocks[2] = {0, 0}, handles[2] = {0, 0};  ///< first block and number of handles of each
     int first_pin = 0, pins = 0;
     int first_kept = 0, kept = 0;  ///< in kept_
-    int first_slot = 0;            ///< of its own handles
     int first_block = 0;           ///< of its own zeta
-    int first_row = 0;             ///< of s_, two for each pin
-    int matrix = 0;                ///< of one pin: first of W_; else first number of V_
-    int factors = 0;               ///< of one pin: in factors_; else in loops_
-    int first_free = 0;            ///< of several: in free_, two for each pin
-    double limit = 0.0;            ///< least response of one pin, or pivot; 0 if no loop closes
+    int matrix = 0;                ///< first number of W_
   };
-
-  /// Type of the violation in CutJoint::v, as in path_sweep.h.
-  enum class GapKind { kSpeeds, kPositions };
 
   AssemblySweep() = default;
   struct Layout;
@@ -118,22 +100,25 @@ class AssemblySweep final : public ShortCut<Planar> {
   void Close();
   /// Matrices of all assemblies. False near a degenerate position.
   bool Assemble();
-  bool JoinOne(const Node& node);
-  bool JoinSeveral(const Node& node);
-  template <class Product>
-  void Eliminate(const Node& node, const Product& product);
-  JointMatrix<double> FreeResponse(const FreeBody* bodies) const;
+  Symmetric2<double> Across(const Node& node, const Pin& pin) const;
+  Matrix ResponseAt(const Node& node, const Pin& pin, const Side& at) const;
+  template <class Rows>
+  bool Join(const Node& node, Rows rows);
+  template <class Rows>
+  void Eliminate(const Node& node, Rows rows);
   /// applied_ at the positions and speeds of `kinematics`.
   void SetApplied(const Kinematics<Planar, double>& kinematics);
   /// Computes alpha_, or corrections of speeds.
   template <Pass kPass>
   void Solve();
-  template <Pass kPass>
-  void Up(const Node& node);
-  void Down(const Node& node);
-  friend PinProjection;
-  bool FindChange();
-  double LargestGap() const;
+  template <Pass kPass, class Rows>
+  void Up(const Node& node, Rows rows);
+  template <class Rows>
+  void Down(const Node& node, Rows rows);
+  bool Place(GapKind kind, std::span<const double> q, std::span<const double> u) override;
+  Correction<double> LargestGap() const override;
+  bool FindChange(GapKind kind) override;
+  bool AddChange(std::span<const double> base, std::span<double> sum) override;
 
   std::vector<Body> bodies_;
   std::vector<Vector> handles_;  ///< arms by radius in axes of the body, body after body
@@ -141,7 +126,6 @@ class AssemblySweep final : public ShortCut<Planar> {
   std::vector<CutJoint> cuts_;
   std::vector<Node> nodes_;
   std::vector<Pin> pins_;
-  std::vector<FreeBody> free_;
   std::vector<Side> kept_;
 
   std::vector<double> angle_, speed_, alpha_;  ///< by body, Ground's last, then padding of lanes
@@ -150,17 +134,16 @@ class AssemblySweep final : public ShortCut<Planar> {
   std::vector<Applied> applied_;               ///< by body; empty if only gravity acts
   std::vector<Wrench<Planar, double>> wrenches_;
   std::vector<Point<double>> reference_;  ///< of bodies
-  std::vector<Matrix> zeta_, W_, Y_;
-  std::vector<double> V_;
-  std::vector<Factored2<double>> factors_;
-  std::vector<LoopSolver<double>> loops_;
-  MatrixX<double> X_;
-  std::vector<Vector> b_, F_;  ///< by slot: handles of bodies first, then of nodes
-  std::vector<double> s_, phi_;
-  std::vector<double> moved_, back_, speeds_;  ///< as in path_sweep.h
+  std::vector<Matrix> zeta_;
+  /// Two columns for each handle that stays, then of L^T for each pin if there are several. A
+  /// column has two numbers for each pin. U_ = L^-1 Y of one join has the same columns.
+  std::vector<double> W_, U_;
+  std::vector<Factored2<double>> factors_;  ///< D, by pin
+  std::vector<Vector> b_, F_;               ///< by handle: a join changes those that stay
+  std::vector<double> s_;                   ///< two for each pin; in the downward pass phi
   TreeAngles<double> tree_;
   std::unique_ptr<WorkerPool> pool_ = std::make_unique<WorkerPool>(1);
-  long of_matrices_ = 0, of_vectors_ = 0, operations_ = 0;
+  long of_matrices_ = 0, of_vectors_ = 0;
 };
 
 }  // namespace loopbench::odca::pins

@@ -1,6 +1,7 @@
 // Layout of an AssemblySweep: slots of handles, zeta and joins in its lists, and their constants.
 #include <algorithm>
 
+#include "mechanism/loops/loop_solver.h"
 #include "odca/assembly_sweep.h"
 #include "odca/path_links.h"
 
@@ -24,7 +25,7 @@ Vector2<double> ArmOf(const Joint<Planar, double>& joint, bool at_Q) {
 struct AssemblySweep::Layout {
   /// A body or an assembly during the layout of joins.
   struct Assembly {
-    int handles = 0, first_slot = 0, first_block = 0, bodies = 1;
+    int handles = 0, first_block = 0, bodies = 1;
     bool held = false;      ///< by Ground
     std::vector<int> pins;  ///< of each handle the joint, twice its index, and one more at its Q
   };
@@ -35,13 +36,12 @@ struct AssemblySweep::Layout {
   std::vector<int> handle_of = std::vector<int>(2 * mechanism.joints().size(), -1);  ///< as pins
   std::vector<int> cut_of = std::vector<int>(mechanism.joints().size(), -1);
   std::vector<Assembly> assemblies = std::vector<Assembly>(plan.num_nodes());
-  std::vector<int> several = {};  ///< pins of joins of more than one
-  double most_work = static_cast<double>(plan.operations(Planar::kDim));
-  int slots = 0, rows = 0, W = 0, most_rows = 0, most_kept = 0;
-  double blocks = 0.0, V = 0.0, work = 0.0, vectors = 0.0;
+  double most_work = static_cast<double>(plan.operations());
+  int handles = 0;
+  double blocks = 0.0, W = 0.0, most_U = 0.0, work = 0.0, vectors = 0.0;
 
-  /// Returns false if the general pass is less work, or slots exceed an int.
-  bool Fits() const { return work + vectors <= most_work && blocks < 5e8 && V < 5e8; }
+  /// Returns false if the general pass is less work, or places exceed an int.
+  bool Fits() const { return work + vectors <= most_work && blocks < 5e8 && W < 5e8; }
   bool AddBodies();
   bool AddBody(int index, const std::vector<int>& joints);
   void AddSteps();
@@ -49,8 +49,7 @@ struct AssemblySweep::Layout {
   bool AddNode(const PlanNode& planned, Assembly& all);
   Pin MakePin(const PlanNode& planned, const NodeJoint& closed) const;
   void Keep(const PlanNode& planned, Node& node, Assembly& all);
-  void SetLimit(const PlanNode& planned, int joint, Node& node) const;
-  void AddFree(const Joint<Planar, double>& joint);
+  void SetLimits(const PlanNode& planned, std::span<const int> joints, int bodies);
   void Count(const Node& node);
   void Resize();
 };
@@ -84,17 +83,16 @@ bool AssemblySweep::Layout::AddBody(int index, const std::vector<int>& joints) {
   }
   body.link = MeasureLink(mechanism.bodies()[index], mechanism.gravity(),
                           assembly.held ? &origin : nullptr);
-  body.first_handle = slots;
+  body.first_handle = handles;
   body.first_block = static_cast<int>(blocks);
   for (const int side : joints) {
     if (HoldsBody(joint(side))) continue;
-    handle_of[side] = slots++;
+    handle_of[side] = handles++;
     assembly.pins.push_back(side);
     sweep.handles_.push_back(
         Scaled(1.0 / body.link.radius, ArmOf(joint(side), side % 2 == 1) - origin));
   }
-  body.handles = assembly.handles = slots - body.first_handle;
-  assembly.first_slot = body.first_handle;
+  body.handles = assembly.handles = handles - body.first_handle;
   assembly.first_block = body.first_block;
   blocks += static_cast<double>(body.handles) * body.handles;
   work += 4.0 * body.handles * body.handles;
@@ -129,7 +127,7 @@ AssemblySweep::Pin AssemblySweep::Layout::MakePin(const PlanNode& planned,
     const int child = planned.handles[handle].child;
     const Assembly& assembly = assemblies[planned.children[child]];
     const auto place = std::ranges::find(assembly.pins, pin) - assembly.pins.begin();
-    return Side{child, static_cast<int>(place), assembly.first_slot + static_cast<int>(place)};
+    return Side{child, static_cast<int>(place), handle_of[pin]};
   };
   return {side(closed.from, 2 * closed.index), side(closed.to, 2 * closed.index + 1),
           cut_of[closed.index]};
@@ -137,11 +135,9 @@ AssemblySweep::Pin AssemblySweep::Layout::MakePin(const PlanNode& planned,
 
 /// Keeps the remaining handles, the first child's first.
 void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& all) {
-  std::vector<int> closed;
-  for (const NodeJoint& joint : planned.joints) {
-    closed.insert(closed.end(), {2 * joint.index, 2 * joint.index + 1});
-  }
-  std::ranges::sort(closed);
+  const auto closes = [&](int pin) {
+    return std::ranges::find(planned.joints, pin / 2, &NodeJoint::index) != planned.joints.end();
+  };
   all.bodies = 0;
   for (const int c : {0, 1}) {
     if (planned.children[c] < 0) continue;
@@ -151,9 +147,9 @@ void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& 
     node.blocks[c] = child.first_block;
     node.handles[c] = child.handles;
     for (int place = 0; place < child.handles; ++place) {
-      if (std::ranges::binary_search(closed, child.pins[place])) continue;
+      if (closes(child.pins[place])) continue;
       all.pins.push_back(child.pins[place]);
-      sweep.kept_.push_back({c, place, child.first_slot + place});
+      sweep.kept_.push_back({c, place, handle_of[child.pins[place]]});
     }
   }
   const auto on_ground = [](const Pin& pin) { return pin.P.place < 0 || pin.Q.place < 0; };
@@ -165,40 +161,20 @@ void AssemblySweep::Layout::Keep(const PlanNode& planned, Node& node, Assembly& 
 /// Multiply-adds and room of a join.
 void AssemblySweep::Layout::Count(const Node& node) {
   const double n = 2.0 * node.pins, d = 2.0 * node.kept;
-  slots += node.kept;
-  rows += 2 * node.pins;
   blocks += static_cast<double>(node.kept) * node.kept;
   work += n * n * n / 6.0 + n * n * d / 2.0 + n * d * d / 2.0;
   vectors += 2.0 * n * (n + d);
-  most_kept = std::max(most_kept, node.kept);
-  if (node.pins == 1) {
-    W += node.kept;
-    return;
-  }
-  V += n * d;
-  several.push_back(node.pins);
-  most_rows = std::max(most_rows, 2 * node.pins);
+  W += n * (node.pins > 1 ? n + d : d);
+  most_U = std::max(most_U, n * (n + d));
 }
 
-void AssemblySweep::Layout::AddFree(const Joint<Planar, double>& joint) {
-  for (const bool at_Q : {false, true}) {
-    FreeBody& free = sweep.free_.emplace_back();
-    const int body = at_Q ? joint.to : joint.from;
-    if (body == kGround) continue;
-    const Inertia<Planar, double>& inertia = mechanism.bodies()[body];
-    free = {.body = body - 1,
-            .arm = ArmOf(joint, at_Q),
-            .mobility = 1.0 / inertia.mass,
-            .inverse_inertia = inertia.rotational_inverse(0, 0)};
-  }
-}
-
-/// A pin closes a loop if Ground holds both its sides, or both are on one assembly. The lighter
-/// side determines the response.
-void AssemblySweep::Layout::SetLimit(const PlanNode& planned, int joint, Node& node) const {
+/// A pin closes a loop if Ground holds both its sides, both are on one assembly, or the join has
+/// several pins. The lighter side determines the response of one pin, all `bodies` of several.
+void AssemblySweep::Layout::SetLimits(const PlanNode& planned, std::span<const int> joints,
+                                      int bodies) {
   const Assembly& one = assemblies[planned.children[0]];
-  const Pin& pin = sweep.pins_[node.first_pin];
-  const bool on_ground = pin.P.place < 0 || pin.Q.place < 0;
+  Pin* pin = &sweep.pins_.back() + 1 - joints.size();
+  const bool on_ground = pin->P.place < 0 || pin->Q.place < 0;
   bool closes = on_ground ? one.held : true;
   int lighter = one.bodies;
   if (planned.children[1] >= 0) {
@@ -206,14 +182,16 @@ void AssemblySweep::Layout::SetLimit(const PlanNode& planned, int joint, Node& n
     closes = one.held && other.held;
     lighter = std::min(lighter, other.bodies);
   }
-  if (closes) node.limit = ShareOfLimit(lighter) * LimitOf(mechanism, joint);
+  const bool several = joints.size() > 1;
+  if (!closes && !several) return;
+  const double share = ShareOfLimit(several ? bodies : lighter);
+  for (const int joint : joints) (pin++)->limit = share * LimitOf(mechanism, joint);
 }
 
 bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
   Node node;
   node.first_pin = static_cast<int>(sweep.pins_.size());
   node.first_kept = static_cast<int>(sweep.kept_.size());
-  node.first_free = static_cast<int>(sweep.free_.size());
   std::vector<int> joints;
   for (const NodeJoint& closed : planned.joints) {
     if (HoldsBody(mechanism.joints()[closed.index])) continue;
@@ -226,20 +204,9 @@ bool AssemblySweep::Layout::AddNode(const PlanNode& planned, Assembly& all) {
     return true;
   }
   Keep(planned, node, all);
-  node.first_slot = all.first_slot = slots;
   node.first_block = all.first_block = static_cast<int>(blocks);
-  node.first_row = rows;
-  if (node.pins == 1) {
-    node.matrix = W;
-    node.factors = static_cast<int>(sweep.factors_.size());
-    sweep.factors_.emplace_back();
-    SetLimit(planned, joints.front(), node);
-  } else {
-    node.matrix = static_cast<int>(V);
-    node.factors = static_cast<int>(several.size());
-    node.limit = LoopSolver<double>::kSuspicious * ShareOfLimit(all.bodies);
-    for (const int joint : joints) AddFree(mechanism.joints()[joint]);
-  }
+  node.matrix = static_cast<int>(W);
+  SetLimits(planned, joints, all.bodies);
   Count(node);
   sweep.nodes_.push_back(node);
   return Fits();
@@ -276,20 +243,14 @@ void AssemblySweep::Layout::Resize() {
     sweep.applied_.resize(sweep.bodies_.size());
     sweep.wrenches_.resize(mechanism.num_bodies());
   }
-  sweep.moved_.assign(static_cast<std::size_t>(mechanism.num_u()), 0.0);
-  sweep.back_ = sweep.speeds_ = sweep.moved_;
-  const auto scratch = std::make_shared<LoopScratch<double>>(most_rows);
-  sweep.loops_.reserve(several.size());
-  for (const int pins : several) sweep.loops_.emplace_back(std::vector<int>(pins, 2), scratch);
+  sweep.SetSize(mechanism);
   sweep.zeta_.resize(static_cast<std::size_t>(blocks));
   sweep.W_.resize(static_cast<std::size_t>(W));
-  sweep.Y_.resize(static_cast<std::size_t>(most_kept));
-  sweep.V_.resize(static_cast<std::size_t>(V));
-  sweep.X_.setZero(most_rows, most_rows);
-  sweep.b_.assign(static_cast<std::size_t>(slots), {0.0, 0.0});
+  sweep.U_.resize(static_cast<std::size_t>(most_U));
+  sweep.factors_.resize(sweep.pins_.size());
+  sweep.s_.assign(2 * sweep.pins_.size(), 0.0);
+  sweep.b_.assign(sweep.handles_.size(), {0.0, 0.0});
   sweep.F_ = sweep.b_;
-  sweep.s_.assign(static_cast<std::size_t>(rows), 0.0);
-  sweep.phi_.assign(static_cast<std::size_t>(std::max(most_rows, 2)), 0.0);
   sweep.of_matrices_ = static_cast<long>(work);
   sweep.of_vectors_ = static_cast<long>(vectors + 8.0 * static_cast<double>(sweep.handles_.size()));
 }

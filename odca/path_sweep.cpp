@@ -161,22 +161,28 @@ TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double
 }
 
 template <class T>
-double PathSweepOf<T>::LargestGap() const {
-  double largest = largest_;
-  for (const Group& group : groups_) largest = std::max(largest, group.largest);
-  return std::sqrt(largest);
+bool PathSweepOf<T>::Place(GapKind kind, std::span<const double> q, std::span<const double> u) {
+  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
+  return kind == GapKind::kSpeeds ? Turn<GapKind::kSpeeds>() : Turn<GapKind::kPositions>();
 }
 
 template <class T>
-std::optional<Correction<double>> PathSweepOf<T>::Project(std::span<double> q, std::span<double> u,
-                                                          double goal) {
-  return PinProjection::Of(*this, q, u, goal);
+Correction<double> PathSweepOf<T>::LargestGap() const {
+  double largest = largest_;
+  for (const Group& group : groups_) largest = std::max(largest, group.largest);
+  return {.shift = std::sqrt(largest)};
+}
+
+template <class T>
+bool PathSweepOf<T>::AddChange(std::span<const double> base, std::span<double> sum) {
+  return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
 }
 
 template bool PathSweep::Evaluate(SpeedsUsed, Kinematics<Planar, double>*, std::span<const double>,
                                   std::span<const double>, std::span<double>, std::span<double>);
-template std::optional<Correction<double>> PathSweep::Project(std::span<double>, std::span<double>,
-                                                              double);
+template bool PathSweep::Place(GapKind, std::span<const double>, std::span<const double>);
+template Correction<double> PathSweep::LargestGap() const;
+template bool PathSweep::AddChange(std::span<const double>, std::span<double>);
 template LaneBits PathSweepOf<Lanes>::Evaluate(SpeedsUsed, Kinematics<Planar, double>*,
                                                std::span<const Lanes>, std::span<const Lanes>,
                                                std::span<Lanes>, std::span<Lanes>);

@@ -32,13 +32,38 @@
 #include "mechanism/formulation/side_by_side.h"
 #include "odca/pack_kinds.h"
 #include "odca/path_links.h"
-#include "odca/pin_projection.h"
 #include "odca/short_cut.h"
 #include "odca/tree_angles.h"
 
 namespace loopbench::odca::pins {
 
-struct NoShortCut {};
+struct NoShortCut {
+  long operations_ = 0;
+};
+
+/// Slots of a path in the lists. Its body k is in lane k / packs of pack k % packs of its group;
+/// the last ones, which fill no pack, follow the packs.
+struct PathShape {
+  int bodies = 0, groups = 0;
+  int packs = 0;                ///< of a group
+  int packed = 0;               ///< bodies in packs
+  int first = 0;                ///< place of its first body
+  int first_group = 0;          ///< in groups_
+  int first_pack = 0;           ///< in lists by pack
+  int first_single = 0;         ///< in lists by single body
+  int first_cut = 0;            ///< in end_cuts_: one for each piece and for each single body
+  bool has_loops = false;       ///< points are followed along it
+  bool loops_in_lanes = false;  ///< so that closures of packs are asked for
+  bool ends_at_ground = false, ground_is_P = false;  ///< as in PathLinks
+
+  bool operator==(const PathShape&) const = default;
+  int pieces() const { return groups * kLanes; }
+  int singles() const { return bodies - packed; }
+  /// Returns the pack of body k < packed.
+  int pack(int k) const { return k / (packs * kLanes) * packs + k % packs; }
+  int lane(int k) const { return k / packs % kLanes; }
+  int place(int k) const { return first + (k < packed ? pack(k) * kLanes + lane(k) : k); }
+};
 
 template <class T>
 class PathSweepOf final
@@ -64,38 +89,14 @@ class PathSweepOf final
   /// As ShortCut::Evaluate(), for each lane.
   TruthOf<T> Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>*, std::span<const T> q,
                       std::span<const T> u, std::span<T> qdot, std::span<T> udot);
-  /// For one mechanism.
-  std::optional<Correction<double>> Project(std::span<double> q, std::span<double> u, double goal);
-  /// Angles are not counted.
-  long operations() const { return operations_; }
   int threads() const { return pool_->threads(); }
-  std::size_t num_u() const { return moved_.size(); }
 
  private:
-  /// Slots of a path in the lists. Its body k is in lane k / packs of pack k % packs of its group;
-  /// the last ones, which fill no pack, follow the packs.
-  struct PathPlaces {
-    int bodies = 0, groups = 0;
-    int packs = 0;                ///< of a group
-    int packed = 0;               ///< bodies in packs
-    int first = 0;                ///< place of its first body
-    int first_group = 0;          ///< in groups_
-    int first_pack = 0;           ///< in lists by pack
-    int first_single = 0;         ///< in lists by single body
-    int first_cut = 0;            ///< in end_cuts_: one for each piece and for each single body
-    bool has_loops = false;       ///< points are followed along it
-    bool loops_in_lanes = false;  ///< so that closures of packs are asked for
-    bool ends_at_ground = false, ground_is_P = false;  ///< as in PathLinks
-    Vector2<T> end, end_force;
+  /// Numbers of a path that depend on the mechanism or on the state.
+  struct PathPlaces : PathShape {
+    Vector2<T> end = {}, end_force = {};
     Vector2<T> gap_v = {};  ///< as of TurnedLink, at that joint
     T gap_w = {}, end_limit = {};
-
-    int pieces() const { return groups * kLanes; }
-    int singles() const { return bodies - packed; }
-    /// Returns the pack of body k < packed.
-    int pack(int k) const { return k / (packs * kLanes) * packs + k % packs; }
-    int lane(int k) const { return k / packs % kLanes; }
-    int place(int k) const { return first + (k < packed ? pack(k) * kLanes + lane(k) : k); }
   };
   /// kLanes pieces of a path side by side.
   struct Group {
@@ -114,14 +115,10 @@ class PathSweepOf final
   template <class>
   friend class PathSweepOf;
   PathSweepOf() = default;
-  void Resize(int num_u, int threads);
+  void Resize(int threads);
   void SetConstants(int lane, const PathSweepOf<double>& one);
   void Add(const Mechanism<Planar, double>& mechanism, PathLinks path, int bodies_of_group);
   void AddPacks(const PathPlaces& path, const PathLinks& links);
-
-  /// Type of the violation of cut joints in gap_v, which Pass::kSpeeds removes: in each case J
-  /// belongs to the current poses.
-  enum class GapKind { kSpeeds, kPositions };
 
   /// Computes the bodies at their angles, with the terms from violations of cut joints. Returns
   /// false for angles beyond kLargestAngle.
@@ -138,15 +135,12 @@ class PathSweepOf final
   /// before the group to its last one.
   template <GapKind kGap>
   void CloseStarts(Group& group, Point<double>& at_2);
-  struct At;
-  At Body(const PathPlaces& path, int k) const;
-  void Set(const PathPlaces& path, int k, const TurnedLink<T>& turned);
-  /// The joint before body k, or to Ground after the last one, being cut: `here` if its P is k.
-  template <GapKind kGap>
-  void Close(PathPlaces& path, int k, bool here, const Point<T>& gap);
-  friend PinProjection;
-  bool FindChange() { return Sweep<Pass::kSpeeds>(); }
-  double LargestGap() const;
+  void MoveEnd(const PathPlaces& path, int k, const Vector2<T>& shift);
+  /// As in ShortCut, for one mechanism.
+  bool Place(GapKind kind, std::span<const double> q, std::span<const double> u);
+  Correction<double> LargestGap() const;
+  bool FindChange(GapKind) { return Any(Sweep<Pass::kSpeeds>()); }
+  bool AddChange(std::span<const double> base, std::span<double> sum);
   /// Computes alpha_, or corrections of speeds. False near a degenerate position.
   template <Pass kPass>
   TruthOf<T> Sweep();
@@ -171,12 +165,11 @@ class PathSweepOf final
   std::vector<TurnedLink<T>> turned_singles_;
   std::vector<EndCut<T>> end_cuts_;
   std::vector<T> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
-  std::vector<T> moved_, back_, speeds_;  ///< of Project(): positions, those before, speeds
   T largest_ = {};                        ///< as Group::largest, of all joints outside of groups
   int num_places_ = 0;
   TreeAngles<T> tree_;
   std::unique_ptr<WorkerPool> pool_;
-  long operations_ = 0;
+  using std::conditional_t<kIsOne, ShortCut<Planar>, NoShortCut>::operations_;  ///< without angles
 };
 
 using PathSweep = PathSweepOf<double>;

@@ -12,10 +12,26 @@ namespace {
 bool Says(double truth) { return truth > 0.0; }
 bool Says(const Lanes& truth) { return truth[0] > 0.0; }
 
+/// Imposes a cut joint before a body at its point on Q (two_handle.h), seen from the body: moves
+/// its handle 1 if it is P, and sets the violation. `gap` leads from there to the body before it.
+template <GapKind kGap, class T>
+LOOPBENCH_INLINE void SetGap(const Closure<T>& closure, const Point<T>& gap, const T& speed,
+                             const T& speed_before, TurnedLink<T>& at, T& largest) {
+  const T is_cut = closure.cut_here + closure.cut_before;
+  at.r1 = at.r1 + Scaled<T>(closure.cut_here * closure.inverse_radius, gap.p);
+  if constexpr (kGap == GapKind::kSpeeds) {
+    at.gap_w = closure.cut_here * speed + closure.cut_before * speed_before;
+    at.gap_v = Scaled(is_cut, RelativeVelocity(at.gap_w, gap));
+  } else {
+    at.gap_v = Scaled(is_cut, gap.p);
+    largest = -Min<T>(-largest, -(at.gap_v.x * at.gap_v.x + at.gap_v.y * at.gap_v.y));
+  }
+}
+
 }  // namespace
 
 template <class T>
-template <bool kLoops, typename PathSweepOf<T>::GapKind kGap>
+template <bool kLoops, GapKind kGap>
 void PathSweepOf<T>::TurnPacks(Group& group) {
   const PathPlaces& path = paths_[group.path];
   Point<Lanes> at_2 = {};
@@ -35,14 +51,7 @@ void PathSweepOf<T>::TurnPacks(Group& group) {
       const Point<Lanes> at_1 = {at_pin.p + Scaled(closure.follows, gap.p),
                                  at_pin.v + Scaled(closure.follows, gap.v)};
       at_2 = Across(link, at, speed, at_1);
-      at.r1 = at.r1 + Scaled(closure.cut_here * closure.inverse_radius, gap.p);
-      if constexpr (kGap == GapKind::kSpeeds) {
-        at.gap_w = closure.cut_here * speed + closure.cut_before * speed_before;
-        at.gap_v = Scaled(closure.cut_here + closure.cut_before, RelativeVelocity(at.gap_w, gap));
-      } else {
-        at.gap_v = Scaled(closure.cut_here + closure.cut_before, gap.p);
-        largest = -Min(-largest, -(at.gap_v.x * at.gap_v.x + at.gap_v.y * at.gap_v.y));
-      }
+      SetGap<kGap>(closure, gap, speed, speed_before, at, largest);
       if (i > 0) {
         Vector2<Lanes>& r2 = turned_packs_[pack - 1].r2;
         r2 = r2 - Scaled(closure.cut_before * inverse_before, gap.p);
@@ -59,57 +68,22 @@ void PathSweepOf<T>::TurnPacks(Group& group) {
   group.ends = at_2;
 }
 
-/// Constants and numbers of a body, independent of their storage.
+/// Subtracts `shift` [m] from handle 2 of body k, if that is P of a cut joint.
 template <class T>
-struct PathSweepOf<T>::At {
-  Link<T> link;
-  TurnedLink<T> turned;
-  T speed;
-};
-template <class T>
-typename PathSweepOf<T>::At PathSweepOf<T>::Body(const PathPlaces& path, int k) const {
+void PathSweepOf<T>::MoveEnd(const PathPlaces& path, int k, const Vector2<T>& shift) {
   if constexpr (kIsOne) {
     if (k < path.packed) {
       const int pack = path.first_pack + path.pack(k), lane = path.lane(k);
-      return {LaneOf(packs_[pack], lane), LaneOf(turned_packs_[pack], lane), speed_[path.place(k)]};
+      Vector2<Lanes>& r2 = turned_packs_[pack].r2;
+      const double inverse_radius = pack_closures_[pack].inverse_radius[lane];
+      r2.x[lane] -= inverse_radius * shift.x;
+      r2.y[lane] -= inverse_radius * shift.y;
+      return;
     }
   }
   const int single = path.first_single + k - path.packed;
-  return {singles_[single], turned_singles_[single], speed_[path.first + k]};
-}
-template <class T>
-void PathSweepOf<T>::Set(const PathPlaces& path, int k, const TurnedLink<T>& turned) {
-  if constexpr (kIsOne) {
-    if (k < path.packed) {
-      return SetLane(turned_packs_[path.first_pack + path.pack(k)], path.lane(k), turned);
-    }
-  }
-  turned_singles_[path.first_single + k - path.packed] = turned;
-}
-
-template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
-void PathSweepOf<T>::Close(PathPlaces& path, int k, bool here, const Point<T>& gap) {
-  const int P = here ? k : k - 1;
-  At at_P = Body(path, P);
-  const Vector2<T> to_Q = Scaled(1.0 / at_P.link.radius, gap.p);
-  if (here) {
-    at_P.turned.r1 = at_P.turned.r1 + to_Q;
-  } else {
-    at_P.turned.r2 = at_P.turned.r2 - to_Q;
-  }
-  Set(path, P, at_P.turned);
-  const Vector2<T> gap_v = kGap == GapKind::kSpeeds ? RelativeVelocity(at_P.speed, gap) : gap.p;
-  largest_ = Max<T>(largest_, gap_v.x * gap_v.x + gap_v.y * gap_v.y);
-  if (k == path.bodies) {
-    path.gap_v = gap_v;
-    path.gap_w = at_P.speed;
-    return;
-  }
-  At at = Body(path, k);
-  at.turned.gap_v = gap_v;
-  at.turned.gap_w = at_P.speed;
-  Set(path, k, at.turned);
+  Vector2<T>& r2 = turned_singles_[single].r2;
+  r2 = r2 - Scaled(single_closures_[single].inverse_radius, shift);
 }
 
 template <class T>
@@ -127,7 +101,7 @@ T PathSweepOf<T>::TurnSingles(const PathPlaces& path) {
 /// Closes loops like TurnPacks() in between, except that the body before each first one is one lane
 /// before it, in the last pack, or ends the previous group.
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
   const Closure<Lanes>& starts = group.starts;
   TurnedLink<Lanes>& turned = turned_packs_[group.pack];
@@ -153,61 +127,59 @@ void PathSweepOf<T>::CloseStarts(Group& group, Point<double>& at_2) {
   const bool is_first = group.pack == path.first_pack;
   const int last = group.pack + path.packs - 1;
   const Point<Lanes> gap = reached - at_pin;
-  turned.r1 = turned.r1 + Scaled(starts.cut_here * starts.inverse_radius, gap.p);
-  if constexpr (kGap == GapKind::kSpeeds) {
-    const Lanes speed_before =
-        LaneAfter(Load<Lanes>(&speed_[group.place + (path.packs - 1) * kLanes]),
-                  is_first ? 0.0 : speed_[group.place - 1]);
-    turned.gap_w = starts.cut_here * speed + starts.cut_before * speed_before;
-    turned.gap_v = Scaled(starts.cut_here + starts.cut_before, RelativeVelocity(turned.gap_w, gap));
-  } else {
-    turned.gap_v = Scaled(starts.cut_here + starts.cut_before, gap.p);
-    const Lanes squares = turned.gap_v.x * turned.gap_v.x + turned.gap_v.y * turned.gap_v.y;
-    group.largest = std::max(group.largest, -Smallest(-squares));
-  }
+  const Lanes speed_before =
+      LaneAfter(Load<Lanes>(&speed_[group.place + (path.packs - 1) * kLanes]),
+                is_first ? 0.0 : speed_[group.place - 1]);
+  Lanes largest = {};
+  SetGap<kGap>(starts, gap, speed, speed_before, turned, largest);
+  group.largest = std::max(group.largest, -Smallest(-largest));
   const Vector2<Lanes> to_Q = Scaled(starts.cut_before, gap.p);
   Vector2<Lanes>& r2 = turned_packs_[last].r2;
   r2 = r2 -
        Scaled<Lanes>(pack_closures_[last].inverse_radius, {LaneBefore(to_Q.x), LaneBefore(to_Q.y)});
   if (is_first) return;
-  const double inverse_radius = pack_closures_[group.pack - 1].inverse_radius[kLanes - 1];
-  Vector2<Lanes>& of_group_before = turned_packs_[group.pack - 1].r2;
-  of_group_before.x[kLanes - 1] -= inverse_radius * to_Q.x[0];
-  of_group_before.y[kLanes - 1] -= inverse_radius * to_Q.y[0];
+  const int first = (group.pack - path.first_pack) * kLanes;
+  MoveEnd(path, first - 1, LaneOf(to_Q, 0));
 }
 
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 void PathSweepOf<T>::CloseLoops(PathPlaces& path) {
   Point<T> at_2 = {};
-  const auto start = [&](int k, const Closure<T>& closure) {
-    if (Says(closure.follows)) return at_2;
-    const At at = Body(path, k);
-    const Point<T> at_pin = AtPin(at.link, at.turned, at.speed, closure);
-    const bool cut_here = Says(closure.cut_here);
-    if (cut_here || Says(closure.cut_before)) Close<kGap>(path, k, cut_here, at_2 - at_pin);
-    return at_pin;
-  };
   if constexpr (kIsOne) {
     for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
       CloseStarts<kGap>(groups_[g], at_2);
     }
   }
+  T speed_before = path.packed > 0 ? speed_[path.place(path.packed - 1)] : T{};
   for (int k = path.packed; k < path.bodies; ++k) {
     const int single = path.first_single + k - path.packed;
-    const TurnedLink<T> own = turned_singles_[single];  // before violations move its arms
-    const Point<T> at_1 = start(k, single_closures_[single]);
-    at_2 = Across(singles_[single], own, speed_[path.first + k], at_1);
+    const Closure<T>& closure = single_closures_[single];
+    TurnedLink<T>& at = turned_singles_[single];
+    const TurnedLink<T> own = at;  // before violations move its arms
+    const T speed = speed_[path.first + k];
+    Point<T> at_1 = at_2;
+    if (!Says(closure.follows)) {
+      at_1 = AtPin(singles_[single], at, speed, closure);
+      if (Says(closure.cut_here + closure.cut_before)) {
+        const Point<T> gap = at_2 - at_1;
+        SetGap<kGap>(closure, gap, speed, speed_before, at, largest_);
+        if (Says(closure.cut_before)) MoveEnd(path, k - 1, gap.p);
+      }
+    }
+    at_2 = Across(singles_[single], own, speed, at_1);
+    speed_before = speed;
   }
   if (!path.ends_at_ground) return;
   const Point<T> gap = {at_2.p - path.end, at_2.v};
-  if (!path.ground_is_P) return Close<kGap>(path, path.bodies, false, gap);
-  path.gap_v = kGap == GapKind::kSpeeds ? gap.v : gap.p;
+  path.gap_w = path.ground_is_P ? T{} : speed_before;
+  if (!path.ground_is_P) MoveEnd(path, path.bodies - 1, gap.p);
+  path.gap_v = kGap == GapKind::kSpeeds ? RelativeVelocity(path.gap_w, gap) : gap.p;
   largest_ = Max<T>(largest_, gap.p.x * gap.p.x + gap.p.y * gap.p.y);
 }
 
 template <class T>
-template <typename PathSweepOf<T>::GapKind kGap>
+template <GapKind kGap>
 TruthOf<T> PathSweepOf<T>::Turn() {
   if constexpr (kIsOne) {
     pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
@@ -231,8 +203,8 @@ TruthOf<T> PathSweepOf<T>::Turn() {
   return good;
 }
 
-template bool PathSweep::Turn<PathSweep::GapKind::kSpeeds>();
-template bool PathSweep::Turn<PathSweep::GapKind::kPositions>();
-template LaneBits PathSweepOf<Lanes>::Turn<PathSweepOf<Lanes>::GapKind::kSpeeds>();
+template bool PathSweep::Turn<GapKind::kSpeeds>();
+template bool PathSweep::Turn<GapKind::kPositions>();
+template LaneBits PathSweepOf<Lanes>::Turn<GapKind::kSpeeds>();
 
 }  // namespace loopbench::odca::pins

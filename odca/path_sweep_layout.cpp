@@ -1,5 +1,6 @@
 // Layout of a PathSweep: slots of bodies in its lists, and their constants.
 #include <algorithm>
+#include <functional>
 
 #include "mechanism/loops/loop_solver.h"
 #include "odca/odca.h"
@@ -74,12 +75,10 @@ void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int lengt
 }  // namespace
 
 template <class T>
-void PathSweepOf<T>::Resize(int num_u, int threads) {
+void PathSweepOf<T>::Resize(int threads) {
   turned_singles_.resize(singles_.size());
   angle_.assign(num_places_ + 1, T{});
   speed_ = alpha_ = angle_;
-  moved_.assign(num_u, T{});
-  back_ = speeds_ = moved_;
   pool_ = std::make_unique<WorkerPool>(threads);
 }
 
@@ -102,7 +101,8 @@ std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::Make(const Mechanism<Planar, dou
   if (sweep->paths_.empty()) return nullptr;
   sweep->tree_ = TreeAngles<T>(mechanism, place_of, axes);
   const int useful = std::max(1, sweep->num_places_ / bodies_of_group);
-  sweep->Resize(mechanism.num_u(), std::min(threads, useful));
+  sweep->SetSize(mechanism);
+  sweep->Resize(std::min(threads, useful));
   return sweep;
 }
 
@@ -110,38 +110,24 @@ template <class T>
 std::unique_ptr<PathSweepOf<T>> PathSweepOf<T>::InLanes(const PathSweepOf<double>& one) {
   if (!one.groups_.empty()) return nullptr;
   std::unique_ptr<PathSweepOf> sweep(new PathSweepOf);
-  for (const auto& path : one.paths_) {
-    PathPlaces like;
-    like.bodies = path.bodies;
-    like.first = path.first;
-    like.first_single = path.first_single;
-    like.first_cut = path.first_cut;
-    like.has_loops = path.has_loops;
-    like.ends_at_ground = path.ends_at_ground;
-    like.ground_is_P = path.ground_is_P;
-    sweep->paths_.push_back(like);
-  }
+  for (const PathShape& path : one.paths_) sweep->paths_.push_back({path});
   sweep->singles_.resize(one.singles_.size());
   sweep->single_closures_.resize(one.single_closures_.size());
   sweep->end_cuts_.resize(one.end_cuts_.size());
   sweep->num_places_ = one.num_places_;
   sweep->tree_ = TreeAngles<T>::Like(one.tree_);
-  sweep->Resize(static_cast<int>(one.moved_.size()), 1);
+  sweep->Resize(1);
   for (int lane = 0; lane < kLanes; ++lane) sweep->SetConstants(lane, one);
   return sweep;
 }
 
 template <class T>
 bool PathSweepOf<T>::SetMechanism(int lane, const PathSweepOf<double>& one) {
-  const auto same_path = [](const PathPlaces& a, const auto& b) {
-    return a.bodies == b.bodies && a.first == b.first && a.has_loops == b.has_loops &&
-           a.ends_at_ground == b.ends_at_ground && a.ground_is_P == b.ground_is_P;
-  };
   const auto same_closure = [](const Closure<T>& a, const Closure<double>& b) {
     return a.follows[0] == b.follows && a.cut_here[0] == b.cut_here &&
            a.cut_before[0] == b.cut_before;
   };
-  if (!one.groups_.empty() || !std::ranges::equal(paths_, one.paths_, same_path) ||
+  if (!one.groups_.empty() || !std::ranges::equal(paths_, one.paths_, std::equal_to<PathShape>()) ||
       !std::ranges::equal(single_closures_, one.single_closures_, same_closure) ||
       !tree_.SetOffsets(lane, one.tree_)) {
     return false;

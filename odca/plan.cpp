@@ -134,11 +134,7 @@ class Planner {
     Assembly a = std::move(assemblies_[left]), b = std::move(assemblies_[right]);
     std::vector<int> joints = std::move(into == left ? a.joints : b.joints);
     joints.insert(joints.end(), leaving.begin(), leaving.end());
-    const std::size_t at_once = options_.closing == Closing::kTogether ? between.size() : 1;
-    AddNode(a, &b, std::span(between).first(at_once));
-    for (std::size_t k = at_once; k < between.size(); ++k) {
-      AddNode(a, nullptr, std::span(between).subspan(k, 1));
-    }
+    AddNode(a, &b, between);
     a.joints = std::move(joints);
     assemblies_[into] = std::move(a);
     assemblies_[from] = {};
@@ -157,11 +153,7 @@ class Planner {
   void CloseLeafJoints(Assembly& assembly) {
     const std::vector<int> list = std::move(assembly.leaf_joints);
     assembly.leaf_joints.clear();
-    if (options_.closing == Closing::kTogether) {
-      AddNode(assembly, nullptr, list);
-    } else {
-      for (const int& j : list) AddNode(assembly, nullptr, std::span(&j, 1));
-    }
+    AddNode(assembly, nullptr, list);
   }
 
   /// Appends the node that closes `list` and turns `a` into the result.
@@ -274,6 +266,28 @@ long LeafWork(const Leaf& leaf, long rows, long paths, bool is_body, long dim) {
   return sum + 2 * dim * (held + 2 * path) + apply + project + (is_body ? 0 : free * rows);
 }
 
+/// Multiply-adds of a join whose bodies are known by all their directions, or by rows of joints.
+long DraftWork(const Draft& draft, std::span<const PlanJoint> joints,
+               const std::vector<bool>& is_body, int dim) {
+  const auto width = [&](int body, long open) { return open > 0 && is_body[body] ? dim : open; };
+  long numbers[2] = {0, 0}, kept = 0, above = 0;
+  for (const BoundaryBody& body : draft.bodies) {
+    numbers[body.child] += width(body.body, body.rows);
+    kept += width(body.body, body.open_rows);
+  }
+  long sum = JoinWork(draft.node.rows, kept);
+  for (int j : draft.joints) {
+    for (int body : {joints[j].from, joints[j].to}) {
+      if (body == 0) continue;
+      const int child = std::ranges::find(draft.bodies, body, &BoundaryBody::body)->child;
+      const bool is_leaf = draft.node.children[child] + 1 < static_cast<int>(is_body.size());
+      sum += JointWork(joints[j].rows, above, is_body[body], is_leaf ? 0 : numbers[child], dim);
+    }
+    above += joints[j].rows;
+  }
+  return sum;
+}
+
 /// Chooses for each body between its directions and the rows of its joints: whichever costs less
 /// over all joins with this body, given the choice of the others. Trees have the rows of their
 /// joints, unless all of these are on the last body.
@@ -297,25 +311,6 @@ std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const Pl
   for (int n = 0; n < static_cast<int>(drafts.size()); ++n) {
     for (const BoundaryBody& body : drafts[n].bodies) joins[body.body].push_back(n);
   }
-  const auto work = [&](const Draft& draft) {
-    const auto width = [&](int body, long open) { return open > 0 && is_body[body] ? dim : open; };
-    long numbers[2] = {0, 0}, kept = 0, above = 0;
-    for (const BoundaryBody& body : draft.bodies) {
-      numbers[body.child] += width(body.body, body.rows);
-      kept += width(body.body, body.open_rows);
-    }
-    long sum = JoinWork(draft.node.rows, kept);
-    for (int j : draft.joints) {
-      for (int body : {joints[j].from, joints[j].to}) {
-        if (body == 0) continue;
-        const int child = std::ranges::find(draft.bodies, body, &BoundaryBody::body)->child;
-        const bool is_leaf = draft.node.children[child] < num_leaves;
-        sum += JointWork(joints[j].rows, above, is_body[body], is_leaf ? 0 : numbers[child], dim);
-      }
-      above += joints[j].rows;
-    }
-    return sum;
-  };
   for (int body = 1; body < num_bodies; ++body) {
     if (!has_choice[body]) continue;
     const Leaf& leaf = leaves[body - 1];
@@ -323,7 +318,7 @@ std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const Pl
     for (int choice : {0, 1}) {
       is_body[body] = choice == 1;
       sums[choice] = LeafWork(leaf, rows[body], rows[body] * leaf.path, is_body[body], dim);
-      for (int n : joins[body]) sums[choice] += work(drafts[n]);
+      for (int n : joins[body]) sums[choice] += DraftWork(drafts[n], joints, is_body, dim);
     }
     is_body[body] = sums[1] < sums[0];
   }
@@ -348,7 +343,7 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
     each.branches = branches;
     for (int start = branches ? 0 : 1; start < num_bodies; ++start) {
       Plan other(num_bodies, joints, each, start);
-      if (other.operations(options.dim) < operations(options.dim)) *this = std::move(other);
+      if (other.operations() < operations()) *this = std::move(other);
     }
   }
 }
@@ -363,6 +358,7 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
   }
   AddLeaves(others, is_body, options.dim);
   AddNodes(others, drafts, options.dim);
+  CountOperations(others, drafts, is_body, options.dim);
 }
 
 /// A body with one joint to Ground is the first one of a tree. The other joints of a held body hold
@@ -578,36 +574,17 @@ int Plan::loop_joins() const {
   return static_cast<int>(std::ranges::count_if(nodes_, &PlanNode::closes_loop));
 }
 
-long Plan::operations(int dim) const {
-  const auto width = [dim](const Handle& handle) { return handle.is_body() ? dim : handle.width; };
-  long sum = 0;
+void Plan::CountOperations(std::span<const PlanJoint> joints, std::span<const Draft> drafts,
+                           const std::vector<bool>& is_body, int dim) {
   for (const Leaf& leaf : leaves_) {
     long rows = 0, paths = 0;
     for (const PlanSide& side : leaf.sides) {
       rows += side.rows;
       paths += side.rows * leaves_[side.leaf].path;
     }
-    sum += LeafWork(leaf, rows, paths, leaf.is_body, dim);
+    operations_ += LeafWork(leaf, rows, paths, leaf.is_body, dim);
   }
-  for (const PlanNode& node : nodes_) {
-    long numbers[2] = {0, 0}, kept = 0, above = 0;
-    for (const Handle& handle : node.handles) {
-      numbers[handle.child] += width(handle);
-      if (handle.kept) kept += width(handle);
-    }
-    sum += JoinWork(node.rows, kept);
-    for (const NodeJoint& joint : node.joints) {
-      for (int end : {joint.from, joint.to}) {
-        if (end < 0) continue;
-        const Handle& handle = node.handles[end];
-        const bool is_leaf = node.children[handle.child] < num_leaves_;
-        sum += JointWork(joint.rows, above, handle.is_body(), is_leaf ? 0 : numbers[handle.child],
-                         dim);
-      }
-      above += joint.rows;
-    }
-  }
-  return sum;
+  for (const Draft& draft : drafts) operations_ += DraftWork(draft, joints, is_body, dim);
 }
 
 }  // namespace loopbench::odca

@@ -44,12 +44,6 @@ enum class Grounding {
             ///< would grow
 };
 
-/// Number of joints that a node may close at once.
-enum class Closing {
-  kTogether,  ///< all joints between two assemblies in one node (the paper's section 3.2)
-  kOneByOne,  ///< the first joins, each further one is a self-join: smallest matrices
-};
-
 /// Numbers by which a body of a boundary is known.
 enum class BoundaryBasis {
   kBodies,    ///< all directions of the body, as the paper has it
@@ -58,7 +52,6 @@ enum class BoundaryBasis {
 
 struct PlanOptions {
   Grounding grounding = Grounding::kEager;
-  Closing closing = Closing::kTogether;
   BoundaryBasis basis = BoundaryBasis::kBodies;
   int dim = 6;            ///< directions of a body: 3 in the plane, 6 in space
   bool branches = false;  ///< several joints of a held body may hold further bodies
@@ -152,9 +145,9 @@ class Plan {
   int largest_join() const;  ///< rows of the largest X
   int most_handles() const;  ///< largest number of handles of any node before its join
   int loop_joins() const;    ///< nodes that close loops
-  /// Multiply-adds of one assembly and one vector pass with `dim` directions per body, as
-  /// Sweep::operations() counts them without regularized directions.
-  long operations(int dim) const;
+  /// Multiply-adds of one assembly and one vector pass, as Sweep::operations() counts them without
+  /// regularized directions.
+  long operations() const { return operations_; }
 
  private:
   /// With one order of joins: by the rules (`start` 0), or body after body from `start`.
@@ -163,9 +156,12 @@ class Plan {
   std::vector<PlanJoint> AddHolds(std::span<const PlanJoint> joints, const PlanOptions& options);
   void AddLeaves(std::span<const PlanJoint> joints, const std::vector<bool>& is_body, int dim);
   void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts, int dim);
+  void CountOperations(std::span<const PlanJoint> joints, std::span<const Draft> drafts,
+                       const std::vector<bool>& is_body, int dim);
 
   int num_leaves_;
   int num_rows_ = 0, num_slots_ = 0;
+  long operations_ = 0;
   std::vector<PlanNode> nodes_;
   std::vector<Leaf> leaves_;
   std::vector<int> leaf_order_;

@@ -31,6 +31,9 @@ template <class T>
 struct Matrix2 {
   T xx, xy, yx, yy;
 
+  friend Matrix2 operator-(const Matrix2& A, const Matrix2& B) {
+    return {A.xx - B.xx, A.xy - B.xy, A.yx - B.yx, A.yy - B.yy};
+  }
   friend Vector2<T> operator*(const Matrix2& A, const Vector2<T>& b) {
     return {A.xx * b.x + A.xy * b.y, A.yx * b.x + A.yy * b.y};
   }
@@ -49,13 +52,6 @@ struct Symmetric2 {
 
   friend Symmetric2 operator+(const Symmetric2& A, const Symmetric2& B) {
     return {A.xx + B.xx, A.xy + B.xy, A.yy + B.yy};
-  }
-  friend Vector2<T> operator*(const Symmetric2& A, const Vector2<T>& b) {
-    return {A.xx * b.x + A.xy * b.y, A.xy * b.x + A.yy * b.y};
-  }
-  friend Matrix2<T> operator*(const Symmetric2& A, const Matrix2<T>& B) {
-    return {A.xx * B.xx + A.xy * B.yx, A.xx * B.xy + A.xy * B.yy, A.xy * B.xx + A.yy * B.yx,
-            A.xy * B.xy + A.yy * B.yy};
   }
 };
 

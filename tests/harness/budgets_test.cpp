@@ -43,7 +43,7 @@ constexpr Budget kBudgets[] = {
     {"mechanism/start",         { 2144,  18,   4},   700},
     {"mechanism/formulation",   { 2811,  24,   4},  1500},
     {"mechanism/simplify",      { 3379,  25,   5},  2600},
-    {"odca",                    { 7218,  38,   5},  3900},
+    {"odca",                    { 7008,  37,   5},  3900},
     {"lagrange",                {  383,   4,   4},   350},
     {"reduction",               { 1630,  12,   4},  1350},
     {"harness/text",            { 1635,  13,   0},   900},

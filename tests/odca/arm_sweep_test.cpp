@@ -41,8 +41,7 @@ TEST_P(ArmSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
       shapes.push_back({.closed = n, .cut = cut});
     }
   }
-  int states = 0, refused = 0;
-  double worst = 0.0;
+  Tally tally;
   for (const Paths& shape : shapes) {
     const int bodies = shape.open + shape.closed + shape.also_closed;
     for (std::uint64_t seed = 1; seed <= (bodies < 1000 ? 12u : 2u); ++seed) {
@@ -54,22 +53,10 @@ TEST_P(ArmSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
       const Both both = seed % 2 == 0 ? Compare(mechanism, GetParam(), q, u, 4 * kLanes)
                                       : Compare(mechanism, GetParam(), q, u);
       ASSERT_EQ(both.outcome, Outcome::kFinished);
-      ++states;
-      EXPECT_TRUE(!both.evaluated || both.general.smallest_weight == 1.0) << arms.name;
-      if (!both.evaluated) {
-        // The bound on the least eigenvalue is at most six times smaller than that, and so is the
-        // smallest pivot at least: 1e-4 of six rows.
-        ++refused;
-        EXPECT_LT(both.general.rcond, 0.01) << arms.name;
-        continue;
-      }
-      const double of_bound = both.difference / Bound(bodies, both.general.rcond);
-      EXPECT_LE(of_bound, 1.0) << arms.name << " rcond " << both.general.rcond;
-      worst = std::max(worst, of_bound);
+      tally.Add(both, bodies, arms.name);
     }
   }
-  std::printf("%d states, %d refused, worst %.2g of the bound\n", states, refused, worst);
-  EXPECT_LE(20 * refused, states);
+  tally.Finish(0.05);
 }
 
 /// Two to five bodies between pins on Ground have no freedom, and one redundant row or more.
@@ -131,20 +118,8 @@ TEST_P(ArmSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
     Random random(1);
     const Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0);
     const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
-    const auto rates = [&](int threads) {
-      const auto sweep = ArmSweep::Make(mechanism, threads, 200);
-      EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
-      Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
-      for (int round = 0; round < 3; ++round) {
-        EXPECT_TRUE(sweep->Evaluate(GetParam(), nullptr, In(q), In(u), In(qdot), In(udot)));
-      }
-      Numbers moved = q, speeds = u;
-      sweep->Project(In(moved), In(speeds), 1e-12);
-      return std::array{qdot, udot, moved, speeds};
-    };
-    const auto alone = rates(1);
-    EXPECT_FALSE(alone[1].isZero(0.0));
-    for (const int threads : {2, 3, 7}) EXPECT_TRUE(rates(threads) == alone) << threads;
+    const auto make = [&](int threads) { return ArmSweep::Make(mechanism, threads, 200); };
+    ExpectTheSameBits(make, GetParam(), q, u, true);
   }
 }
 
@@ -160,20 +135,9 @@ MechanismDescription Branching() {
 }
 
 TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
-  const auto make = [](const MechanismDescription& description,
-                       Coordinates coordinates = Coordinates::kJoint) {
-    return ArmSweep::Make(Mechanism<Spatial, double>(description, coordinates));
+  const auto make = [](const MechanismDescription& description) {
+    return ArmSweep::Make(Mechanism<Spatial, double>(description, Coordinates::kJoint));
   };
-  const MechanismDescription loop = RandomArms({.closed = 9}, 1);
-  EXPECT_NE(make(loop), nullptr);
-  EXPECT_EQ(make(loop, Coordinates::kAbsolute), nullptr);
-  MechanismDescription sprung = loop;
-  sprung.forces.push_back(JointSpring{.joint = 1, .stiffness = 2.0});
-  EXPECT_EQ(make(sprung), nullptr);
-  MechanismDescription slides = RandomArms({.open = 5}, 1);
-  EXPECT_NE(make(slides), nullptr);
-  slides.joints[2].type = JointType::kPrismatic;
-  EXPECT_EQ(make(slides), nullptr);
   MechanismDescription cross = RandomArms({.closed = 9}, 1);
   for (JointDescription& joint : cross.joints) {
     if (joint.cut) joint.type = JointType::kUniversal;
@@ -185,12 +149,6 @@ TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
   EXPECT_EQ(make(InSpace(Chain(6), {0.1, 0.2, 0.3})), nullptr)
       << "parallel axes: three rows redundant everywhere";
   EXPECT_EQ(make(testing::SphericalChain(6, 1)), nullptr) << "axes through one point, likewise";
-  const Mechanism<Spatial, double> mechanism(loop, Coordinates::kJoint);
-  Kinematics<Spatial, double> kinematics(mechanism);
-  Odca<Spatial, double> published(mechanism, {.solver = SolverKind::kAsPublished});
-  Numbers q = Numbers::Zero(9), u = q, qdot = q, udot = q;
-  EXPECT_FALSE(
-      published.RightHandSide(SpeedsUsed::kGiven, kinematics, In(q), In(u), In(qdot), In(udot)));
 }
 
 TEST(RevoluteKernels, TakeAsManyOperationsAsTheySay) {

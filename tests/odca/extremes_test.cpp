@@ -77,7 +77,7 @@ Residuals ResidualsOf(const MechanismDescription& description) {
   std::printf("%-24s n %5d: joints %.1e bodies %.1e of their scales, rcond %.1e, %ld operations\n",
               description.name.c_str(), mechanism.num_bodies() - 1, result.joints, result.bodies,
               result.rcond, result.operations);
-  EXPECT_EQ(result.operations, odca.solver().plan().operations(Space::kDim));
+  EXPECT_EQ(result.operations, odca.solver().plan().operations());
   return result;
 }
 

@@ -23,20 +23,14 @@ using testing::RelativeError;
 using testing::State;
 using testing::ToReal;
 
-const std::vector<PlanOptions> kAllOptions = {{Grounding::kEager, Closing::kTogether},
-                                              {Grounding::kEager, Closing::kOneByOne},
-                                              {Grounding::kAtRoot, Closing::kTogether},
-                                              {Grounding::kAtRoot, Closing::kOneByOne}};
+const std::vector<PlanOptions> kAllOptions = {{Grounding::kEager}, {Grounding::kAtRoot}};
 
 /// All options, with bodies and with the cheapest basis on each boundary.
-std::vector<PlanOptions> OptionsOfBothBases() {
-  std::vector<PlanOptions> all = kAllOptions;
-  for (PlanOptions options : kAllOptions) {
-    options.basis = BoundaryBasis::kCheapest;
-    all.push_back(options);
-  }
-  return all;
-}
+const std::vector<PlanOptions> kOptionsOfBothBases = {
+    {Grounding::kEager},
+    {Grounding::kAtRoot},
+    {Grounding::kEager, BoundaryBasis::kCheapest},
+    {Grounding::kAtRoot, BoundaryBasis::kCheapest}};
 
 Plan PlanOf(const MechanismDescription& description, const PlanOptions& options = {}) {
   return MakePlan(Mechanism<Planar, double>(description, Coordinates::kJoint), options);
@@ -86,9 +80,9 @@ TEST(PlanTest, DepthOfChainsAndLaddersIsLogarithmic) {
     for (int n : {10, 100, 1000}) {
       const double rounds = std::log(n) / std::log(1.5);
       EXPECT_LE(PlanOf(Chain(n), options).depth(), rounds + 4) << "chain of " << n;
-      const int depth = PlanOf(Ladder(n, -1.0, 0.5), options).depth();
-      const int per_round = options.closing == Closing::kOneByOne ? 2 : 1;
-      EXPECT_LE(depth, per_round * (std::log(2 * n + 1) / std::log(1.5) + 4)) << "ladder of " << n;
+      EXPECT_LE(PlanOf(Ladder(n, -1.0, 0.5), options).depth(),
+                std::log(2 * n + 1) / std::log(1.5) + 4)
+          << "ladder of " << n;
     }
   }
 }
@@ -107,14 +101,7 @@ TEST(PlanTest, JoinsOfChainsAndLaddersStaySmall) {
 
 TEST(PlanTest, LoopsAreMarkedWhereTheyClose) {
   EXPECT_EQ(PlanOf(Chain(10)).loop_joins(), 1);
-  EXPECT_EQ(PlanOf(Ladder(10, -1.0, 0.5), {.closing = Closing::kOneByOne}).loop_joins(), 10);
   EXPECT_EQ(PlanOf(testing::RandomTree(20, SpaceKind::kPlanar, 1)).loop_joins(), 0);
-}
-
-TEST(PlanTest, OneByOneNeverJoinsSeveralJointsAtOnce) {
-  const Plan plan =
-      PlanOf(testing::RandomGraph(5, SpaceKind::kPlanar, 1), {.closing = Closing::kOneByOne});
-  for (const PlanNode& node : plan.nodes()) EXPECT_EQ(node.joints.size(), 1u);
 }
 
 TEST(PlanTest, PartsWithoutConnectionHaveTheirOwnRoots) {
@@ -219,7 +206,7 @@ TEST(PlanTest, AWheelKeepsFewBodiesOnItsBoundaries) {
   const Plan small(102, Spokes(100, true)), large(1002, Spokes(1000, true));
   EXPECT_LE(small.most_handles(), 8);
   EXPECT_LE(large.most_handles(), 8);
-  EXPECT_LE(large.operations(3), 11 * small.operations(3));
+  EXPECT_LE(large.operations(), 11 * small.operations());
 }
 
 TEST(PlanTest, BarsBetweenSeveralPlatesAreTakenOneByOne) {
@@ -237,7 +224,7 @@ TEST(PlanTest, BarsBetweenSeveralPlatesAreTakenOneByOne) {
     const Plan small = plan_of(100), large = plan_of(1000);
     // the plates, a bar, and while the plates are collected one bar more
     EXPECT_LE(large.most_handles(), plates + 2);
-    EXPECT_LE(large.operations(3), 11 * small.operations(3));
+    EXPECT_LE(large.operations(), 11 * small.operations());
   }
 }
 
@@ -248,11 +235,11 @@ TEST(PlanTest, GridsCostNoMoreThanNestedDissection) {
   for (int k : {5, 10, 15, 20, 30}) {
     const Plan plan = PlanOf(Grid(k, k, -1.0, 0.0));
     x.push_back(std::log(plan.num_leaves()));
-    y.push_back(std::log(static_cast<double>(plan.operations(3))));
+    y.push_back(std::log(static_cast<double>(plan.operations())));
     // twice a row of cranks and couplers: both sides of a straight cut
     EXPECT_LE(plan.most_handles(), 2 * (2 * k + 1));
     std::printf("grid %2d: %5d bodies, %9ld operations, %2d handles, depth %d\n", k,
-                plan.num_leaves(), plan.operations(3), plan.most_handles(), plan.depth());
+                plan.num_leaves(), plan.operations(), plan.most_handles(), plan.depth());
   }
   const Eigen::Map<Eigen::ArrayXd> X(x.data(), 5), Y(y.data(), 5);
   const Eigen::ArrayXd centred = X - X.mean();
@@ -265,7 +252,7 @@ TEST(PlanTest, DissectionCostsNoMoreThanAnyNumberingOfTheGrid) {
   // the plan may depend on the numbering, but not its quality
   const MechanismDescription grid = Grid(12, 12, -1.0, 0.0);
   const Mechanism<Planar, double> mechanism(grid, Coordinates::kJoint);
-  const long straight = MakePlan(mechanism).operations(3);
+  const long straight = MakePlan(mechanism).operations();
   testing::Random random(3);
   const int n = mechanism.num_bodies();
   for (int draw = 0; draw < 5; ++draw) {
@@ -278,7 +265,7 @@ TEST(PlanTest, DissectionCostsNoMoreThanAnyNumberingOfTheGrid) {
       joints.push_back({j, number[joint.from], number[joint.to], joint.kind->num_constraints()});
     }
     // ties are broken by number; that is worth a fifth at most on such a grid
-    EXPECT_LE(static_cast<double>(Plan(n, joints, {.dim = 3}).operations(3)),
+    EXPECT_LE(static_cast<double>(Plan(n, joints, {.dim = 3}).operations()),
               1.2 * static_cast<double>(straight));
   }
 }
@@ -288,12 +275,12 @@ TEST(PlanTest, OperationsAreThoseOfTheSweep) {
     const MechanismDescription graph = testing::RandomGraph(6, SpaceKind::kSpatial, seed);
     const Mechanism<Spatial, double> mechanism(graph, Coordinates::kJoint);
     const State state = ConsistentState(graph, mechanism, seed);
-    for (const PlanOptions& options : OptionsOfBothBases()) {
+    for (const PlanOptions& options : kOptionsOfBothBases) {
       testing::SystemWith<Odca, Spatial, double> odca(mechanism, {}, options);
       VectorX<double> udot;
       ASSERT_EQ(odca->Evaluate(0.0, state.q, state.u, udot), Outcome::kFinished);
       if (odca.solver().sweep().joins().regularized()) continue;
-      EXPECT_EQ(odca.solver().plan().operations(6), odca.solver().sweep().operations());
+      EXPECT_EQ(odca.solver().plan().operations(), odca.solver().sweep().operations());
     }
   }
 }
@@ -420,7 +407,7 @@ TEST(PlanTest, EveryOptionGivesTheSameAccelerations) {
       const auto run = [&]<class Space>(Space) {
         const testing::Sample<Space> sample(graph, seed);
         const State& state = sample.state(Coordinates::kJoint);
-        for (const PlanOptions& options : OptionsOfBothBases()) {
+        for (const PlanOptions& options : kOptionsOfBothBases) {
           for (SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
             testing::SystemWith<Odca, Space, double> odca(sample.mechanism(Coordinates::kJoint),
                                                           {.solver = solver}, options);

@@ -1,7 +1,11 @@
 // Short cuts of right-hand sides held against the general sweep.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <limits>
 #include <span>
 
@@ -68,6 +72,71 @@ Both Compare(const Mechanism<Space, double>& mechanism, Sweep* sweep, SpeedsUsed
   both.difference = std::max(largest(own.head(n) - general.head(n)) / speed,
                              largest(own.tail(n) - general.tail(n)) / acceleration);
   return both;
+}
+
+/// Comparisons of many states with the general sweep.
+struct Tally {
+  int states = 0, refused = 0, regularized = 0, answered_though_regularized = 0;
+  double worst = 0.0;  ///< difference over its bound
+
+  /// Adds a state of `n` bodies. A short cut may refuse states that the general sweep regularizes,
+  /// and states near them: bounds on eigenvalues are at most so many times their limit of 1e-4 that
+  /// rcond is below 0.01.
+  void Add(const Both& both, int n, const std::string& name) {
+    ++states;
+    if (both.outcome != Outcome::kFinished || both.general.smallest_weight < 1.0) {
+      ++regularized;
+      answered_though_regularized += both.evaluated;
+      return;
+    }
+    if (!both.evaluated) {
+      EXPECT_LT(both.general.rcond, 0.01) << name;
+      ++refused;
+      return;
+    }
+    const double of_bound = both.difference / Bound(n, both.general.rcond);
+    EXPECT_LE(of_bound, 1.0) << name << " rcond " << both.general.rcond;
+    worst = std::max(worst, of_bound);
+  }
+  /// Prints the counts, and expects at most `share` of the states to be refused near regularized
+  /// ones.
+  void Finish(double share) const {
+    std::printf("%d states, %d regularized, %d more refused, worst %.2g of the bound\n", states,
+                regularized, refused, worst);
+    EXPECT_EQ(answered_though_regularized, 0);
+    EXPECT_LE(refused, share * states);
+  }
+};
+
+/// The described coordinates, moved at random by up to `size`, and random speeds.
+template <class Space>
+std::pair<Numbers, Numbers> StateNear(const MechanismDescription& description,
+                                      const Mechanism<Space, double>& mechanism, double size,
+                                      testing::Random& random) {
+  Numbers q = RandomNumbers(random, mechanism.num_q(), size);
+  for (const JointValues& start : description.initial.coordinates) {
+    q[mechanism.joints()[start.joint].q_offset] += start.values[0];
+  }
+  return {q, RandomNumbers(random, mechanism.num_u(), 1.0)};
+}
+
+/// Evaluates and projects with 1, 2, 3 and 7 threads: the same bits. `make` takes threads and makes
+/// a sweep of four groups.
+void ExpectTheSameBits(const auto& make, SpeedsUsed speeds, const Numbers& q, const Numbers& u,
+                       bool evaluates) {
+  const auto rates = [&](int threads) {
+    const auto sweep = make(threads);
+    EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
+    Numbers qdot = Numbers::Zero(u.size()), udot = qdot, moved = q, changed = u;
+    for (int round = 0; round < 3; ++round) {
+      EXPECT_EQ(sweep->Evaluate(speeds, nullptr, In(q), In(u), In(qdot), In(udot)), evaluates);
+    }
+    EXPECT_EQ(sweep->Project(In(moved), In(changed), 1e-12).has_value(), evaluates);
+    return std::array{qdot, udot, moved, changed};
+  };
+  const auto alone = rates(1);
+  EXPECT_EQ(alone[1].isZero(0.0), !evaluates);
+  for (const int threads : {2, 3, 7}) EXPECT_TRUE(rates(threads) == alone) << threads;
 }
 
 /// A number that counts its products.

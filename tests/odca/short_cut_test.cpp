@@ -283,6 +283,23 @@ TYPED_TEST(ShortCutTest, WholeRunsAgreeWithMultipliers) {
   }
 }
 
+TYPED_TEST(ShortCutTest, LeavesOthersToTheGeneralSweep) {
+  const MechanismDescription chain = TestFixture::Chain(2 * TypeParam::kOneFreedom, 1);
+  const auto model = TestFixture::Make(chain);
+  EXPECT_NE(TypeParam::Make(model), nullptr);
+  EXPECT_EQ(TypeParam::Make(typename TestFixture::Model(chain, Coordinates::kAbsolute)), nullptr);
+  MechanismDescription sprung = chain, slides = chain;
+  sprung.forces.push_back(JointSpring{.joint = 1, .stiffness = 2.0});
+  EXPECT_EQ(TypeParam::Make(TestFixture::Make(sprung)) != nullptr, TypeParam::kTakesForces);
+  slides.joints[1].type = JointType::kPrismatic;
+  EXPECT_EQ(TypeParam::Make(TestFixture::Make(slides)), nullptr);
+  Kinematics<typename TypeParam::Space, double> kinematics(model);
+  Odca<typename TypeParam::Space, double> published(model, {.solver = SolverKind::kAsPublished});
+  Numbers q = Numbers::Zero(model.num_q()), u = q, qdot = q, udot = q;
+  EXPECT_FALSE(
+      published.RightHandSide(SpeedsUsed::kGiven, kinematics, In(q), In(u), In(qdot), In(udot)));
+}
+
 TYPED_TEST(ShortCutTest, RefusesWhatItCannotJudge) {
   const auto model = TestFixture::Make(TestFixture::Chain(2 * TypeParam::kOneFreedom, 1));
   const auto sweep = TypeParam::Make(model);

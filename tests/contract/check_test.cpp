@@ -59,15 +59,16 @@ class Planted final : public ConstraintSolver<Space, double> {
   int calls_ = 0;
 };
 
-/// The promises that a formulation with this flaw breaks.
-std::vector<std::string> Broken(const std::string& name, Flaw flaw) {
+/// The promises that a formulation with this flaw and these levels breaks; no levels: all.
+std::vector<std::string> Broken(const std::string& name, Flaw flaw,
+                                const std::vector<Enforcement>& levels = {}) {
   const auto make = [flaw]<class Space>(const Mechanism<Space, double>& mechanism,
                                         const FormulationOptions&) {
     return std::unique_ptr<ConstraintSolver<Space, double>>(
         std::make_unique<Planted<Space>>(mechanism, flaw));
   };
   harness::RegisterFormulation(
-      {.name = name, .sentence = "planted.", .planar = make, .spatial = make});
+      {.name = name, .sentence = "planted.", .planar = make, .spatial = make, .levels = levels});
   std::vector<std::string> promises;
   for (const std::string& violation : Check(name)) {
     const std::string promise = violation.substr(0, violation.find(':'));
@@ -87,13 +88,18 @@ TEST(ContractCheck, KnowsNoNameThatIsNotRegistered) {
   EXPECT_THROW(Check("nobody"), std::invalid_argument);
 }
 
+/// Each flaw at the levels that show it: most of them show at every level.
 TEST(ContractCheck, FindsWhatIsBroken) {
+  const std::vector<Enforcement> any = {Enforcement::kAcceleration};
   EXPECT_EQ(Broken("sound", Flaw::kNone), Promises());
-  EXPECT_EQ(Broken("without-speeds", Flaw::kNoSpeeds), (Promises{"projection", "speeds"}));
-  EXPECT_EQ(Broken("with-memory", Flaw::kMemory), (Promises{"determinism", "endings", "purity"}));
-  EXPECT_EQ(Broken("wrong-forces", Flaw::kForces), (Promises{"energy", "forces"}));
-  EXPECT_EQ(Broken("wrong-rank", Flaw::kRank), Promises{"rank"});
-  EXPECT_EQ(Broken("never-fails", Flaw::kNotFinite), Promises{"endings"});
+  EXPECT_EQ(
+      Broken("without-speeds", Flaw::kNoSpeeds, {Enforcement::kVelocity, Enforcement::kPosition}),
+      (Promises{"projection", "speeds"}));
+  EXPECT_EQ(Broken("with-memory", Flaw::kMemory, any),
+            (Promises{"determinism", "endings", "purity"}));
+  EXPECT_EQ(Broken("wrong-forces", Flaw::kForces, any), (Promises{"energy", "forces"}));
+  EXPECT_EQ(Broken("wrong-rank", Flaw::kRank, any), Promises{"rank"});
+  EXPECT_EQ(Broken("never-fails", Flaw::kNotFinite, any), Promises{"endings"});
 }
 
 }  // namespace

@@ -270,10 +270,10 @@ void ExpectBitsOfTheText(Coordinates set) {
   EXPECT_LT(bits.refused, 12);
 }
 
-/// Ten in the plane, ten in space: chains, trees, and loops that share bodies.
+/// Chains, trees, and loops that share bodies: two of each in the plane and two of each in space.
 TEST(RecordedFunctionTest, RandomMechanismsHaveTheBitsOfTheText) {
   BitsOfTheText bits;
-  for (int k = 0; k < 20; ++k) {
+  for (int k = 0; k < 12; ++k) {
     const bool is_planar = k % 2 == 0;
     const SpaceKind space = is_planar ? SpaceKind::kPlanar : SpaceKind::kSpatial;
     const auto seed = static_cast<std::uint64_t>(k);
@@ -292,9 +292,9 @@ TEST(RecordedFunctionTest, RandomMechanismsHaveTheBitsOfTheText) {
       }
     }
   }
-  // 18 of 120 right-hand sides are not covered, each for a named reason
-  EXPECT_GE(bits.compared, 95);
-  EXPECT_LE(bits.refused, 18);
+  // 8 of 72 right-hand sides are not covered, each for a named reason
+  EXPECT_GE(bits.compared, 60);
+  EXPECT_LE(bits.refused, 8);
 }
 
 TEST(RecordedFunctionTest, AllShippedMechanismsHaveTheBitsOfTheTextInJointCoordinates) {

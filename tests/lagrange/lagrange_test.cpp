@@ -66,7 +66,9 @@ void ExpectAlike(const MechanismDescription& description, Coordinates coordinate
 template <class Space>
 void ExpectAlikeInAll(SpaceKind space) {
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    // the cost of dense equations is the cube of their number, in absolute coordinates 6 per body
+    const std::uint64_t seeds = coordinates == Coordinates::kAbsolute ? 5 : 8;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       const int n = 2 + static_cast<int>(seed);
       ExpectAlike<Space>(testing::RandomChain(n + 6, space, seed), coordinates, seed);
       ExpectAlike<Space>(testing::RandomTree(3 * n, space, seed), coordinates, seed);

@@ -191,9 +191,9 @@ struct End {
   }
 };
 
-End ReferenceAt(const std::string& name, double t) {
+End ReferenceAt(const std::string& name, double t, WaysTried tried = WaysTried::kAll) {
   End end{Shipped(name), {}};
-  end.reference = MakeReference(end.user, t, LinkLength(end.user), {.points = 11});
+  end.reference = MakeReference(end.user, t, LinkLength(end.user), {.points = 11}, tried);
   EXPECT_EQ(end.reference.outcome, "finished") << name << ": " << end.reference.message;
   EXPECT_EQ(end.reference.trust_horizon, t) << name;
   std::cout << name << " at " << t << " s: certified to " << end.reference.Certified().position
@@ -227,7 +227,8 @@ TEST(PublishedNumbers, A01After900Swings) {
 }
 
 TEST(PublishedNumbers, A02ThroughTenPositionsInLine) {
-  const End end = ReferenceAt("n-four-bar", 10.0);
+  // the way that is taken; the cheaper one, which fails here, takes most of the time
+  const End end = ReferenceAt("n-four-bar", 10.0, WaysTried::kFurthest);
   const double x = std::cos(end.Angle("crank0")), y = std::sin(end.Angle("crank0"));
   EXPECT_NEAR(x, reference::kA02DerivedN2AtTenSeconds.x, 1e-11);
   EXPECT_NEAR(y, reference::kA02DerivedN2AtTenSeconds.y, 1e-11);

@@ -90,7 +90,9 @@ TYPED_TEST(SparsePartitionTest, SolvesWhatDenseMultipliersSolve) {
   const SpaceKind space = TypeParam::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
   Tally tally;
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    // the cost of dense equations is the cube of their number, in absolute coordinates 6 per body
+    const std::uint64_t seeds = coordinates == Coordinates::kAbsolute ? 5 : 8;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
       const int n = 2 + static_cast<int>(seed);
       const Choice choice = seed % 2 == 0 ? Choice::kKept : Choice::kFree;
       ExpectAlike<TypeParam>(testing::RandomChain(n + 6, space, seed), coordinates, choice, seed,

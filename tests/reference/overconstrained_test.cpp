@@ -52,10 +52,11 @@ TEST(DriftOfBennettsLinkage, GrowsQuadraticallyAtAccelerationLevel) {
 }
 
 TEST(DriftOfBennettsLinkage, GrowsLinearlyAtVelocityLevel) {
-  // the part that comes back with each turn hides the growth for 100 s in reduction (t^0.81)
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    // the part that comes back with each turn hides the growth for 100 s in reduction (t^0.81)
+    const double horizon = formulation == "reduction" ? 400.0 : 100.0;
     const Record record =
-        RunProblem(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, 400.0, 8);
+        RunProblem(Shipped("bennett"), At(formulation, Enforcement::kVelocity), 1e-8, horizon, 8);
     EXPECT_EQ(record.Number("ensemble_failed"), 0);
     EXPECT_NEAR(record.Number("growth_exponent"), 1.0, 0.15);
   }
@@ -93,22 +94,24 @@ MechanismFile WithTurnedFrames(MechanismFile mechanism, double angle) {
   return mechanism;
 }
 
+/// Both drifts grow by the same power of time: their ratio at 40 s is the ratio at 100 s.
 TEST(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) {
+  constexpr double kHorizon = 40.0;
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
       for (const double rtol : {1e-6, 1e-9, 1e-12}) {
-        const Record away = RunProblem(ModelledAway(), At("odca", level, set), rtol, 100.0);
+        const Record away = RunProblem(ModelledAway(), At("odca", level, set), rtol, kHorizon);
         ASSERT_EQ(away.Text("outcome"), "finished");
         // the finest tolerance takes most of the time
         const std::vector<double> angles =
             rtol < 1e-10 ? std::vector{0.8} : std::vector{0.0, 0.4, 0.8, 1.2};
         for (const double angle : angles) {
           const Record record = RunProblem(WithTurnedFrames(Shipped("bennett"), angle),
-                                           At("odca", level, set), rtol, 100.0);
+                                           At("odca", level, set), rtol, kHorizon);
           EXPECT_EQ(record.Text("outcome"), "finished");
           const double ratio =
               record.Number("drift_position_max") / away.Number("drift_position_max");
-          // rows of another joint in another scale: measured 0.7 to 3.6, at every angle the same
+          // rows of another joint in another scale: measured 0.7 to 3.0, at every angle the same
           EXPECT_LE(ratio, 5.0) << ToString(level) << " " << ToString(set) << " " << rtol << " "
                                 << angle;
         }
@@ -127,11 +130,12 @@ TEST_P(Overconstrained, KeepsItsEnergyInAllMethodsAsPublishedToo) {
         const Enforcement level =
             formulation == "reduction" ? Enforcement::kVelocity : Enforcement::kAcceleration;
         const Method method = At(formulation, level, set, solver);
-        const Record record = RunProblem(mechanism, method, 1e-8, 50.0);
+        const Record record = RunProblem(mechanism, method, 1e-8, 20.0);
         EXPECT_EQ(record.Text("outcome"), "finished") << ToString(method);
-        // 50 s of some 50 steps a second, each with an error of the tolerance, twice integrated
-        EXPECT_LE(record.Number("energy_error_relative"), 1e-3) << ToString(method);
-        EXPECT_LE(record.Number("drift_position_max"), 1e-4) << ToString(method);
+        // 20 s of some 50 steps a second, each with an error of the tolerance: energy grows with
+        // time, drift with its square
+        EXPECT_LE(record.Number("energy_error_relative"), 4e-4) << ToString(method);
+        EXPECT_LE(record.Number("drift_position_max"), 1.6e-5) << ToString(method);
         std::cout << ToString(method) << ": drift " << record.Number("drift_position_max")
                   << " m, energy " << record.Number("energy_error_relative") << "\n";
       }
@@ -144,8 +148,10 @@ INSTANTIATE_TEST_SUITE_P(Mechanisms, Overconstrained,
                                            "three-cranks"),
                          [](const auto& one) { return WithoutDashes(one.param); });
 
-/// It oscillates past the positions in which two of its cranks are in line with the plate.
+/// It oscillates past the positions in which two of its cranks are in line with the plate: eight
+/// periods.
 TEST(MovingRows, KeepEnergyAndLoopsAtAllLevels) {
+  constexpr double kHorizon = 8.0;
   const MechanismFile mechanism =
       ReadMechanism(kConfigs / "experiments/overconstrained/plate-on-cranks.json");
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
@@ -154,15 +160,15 @@ TEST(MovingRows, KeepEnergyAndLoopsAtAllLevels) {
                                       Enforcement::kPosition, Enforcement::kBaumgarte}) {
         SCOPED_TRACE(ToString(At(formulation, level, set)));
         constexpr double kRtol = 1e-10;
-        const Record record = RunProblem(mechanism, At(formulation, level, set), kRtol, 20.0);
+        const Record record = RunProblem(mechanism, At(formulation, level, set), kRtol, kHorizon);
         EXPECT_EQ(record.Text("outcome"), "finished");
         EXPECT_EQ(record.Text("warnings"), "");
         EXPECT_EQ(record.Number("regularized_evaluations"), 0);
-        // each step errs by about rtol, twice integrated over 20 s in units of the period of 1 s
+        // each step errs by about rtol, twice integrated in units of the period of 1 s
         const double steps = record.Number("steps");
         EXPECT_LE(record.Number("energy_error_relative"), kRtol * steps);
         EXPECT_LE(record.Number("drift_position_max"),
-                  level == Enforcement::kPosition ? 1e-14 : 20.0 * kRtol * steps);
+                  level == Enforcement::kPosition ? 1e-14 : kHorizon * kRtol * steps);
       }
     }
   }

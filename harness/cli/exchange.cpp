@@ -56,6 +56,7 @@ struct ViewCommand {
         {"--no-annotations", "SVG of the mechanism alone, without text and unassembled start",
          &svg.plain},
         {"--all", "Print all rows of long tables (text)", &all},
+        WideOption(),
         CpuOption(&limits),
         MemoryOption(&limits)};
   }

@@ -27,7 +27,8 @@ struct TrajectoryCommand {
             {"--mechanism", "Mechanism (JSON) to check a CSV trajectory against", &mechanism},
             {"--compare-with", "Trajectory to compare a CSV trajectory with", &ours},
             {"--figure", "Figure of both trajectories and their difference: .svg, .pdf", &figure,
-             Needs("--compare-with")}};
+             Needs("--compare-with")},
+            WideOption()};
   }
 };
 

@@ -94,7 +94,7 @@ MechanismFile WithTurnedFrames(MechanismFile mechanism, double angle) {
   return mechanism;
 }
 
-/// Both drifts grow by the same power of time: their ratio at 40 s is the ratio at 100 s.
+/// Both drifts grow by the same power of time. At 100 s the ratios were 0.7 to 3.6.
 TEST(BennettsFrames, AtAnyAngleCostAFewTimesTheDriftOfRedundancyModelledAway) {
   constexpr double kHorizon = 40.0;
   for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {

@@ -145,7 +145,7 @@ bool AssemblySweep::Join(const Node& node, Rows rows) {
   Factored2<double>* factors = factors_.data() + node.first_pin;
   double *U = U_.data(), *W = W_.data() + node.matrix;
   const double* L = W + 2 * n * node.kept;
-  // two columns of U and W in the rows of the first pins, from those of X or Y
+  // two columns of U and W in the rows of the first pins, from columns of X or Y
   const auto reduce = [&](int place, int num_pins, const auto& block) LOOPBENCH_INLINED {
     double *ux = U + 2 * n * place, *uy = ux + n;
     double *wx = W + 2 * n * place, *wy = wx + n;

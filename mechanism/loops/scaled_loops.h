@@ -44,9 +44,9 @@ LoopSpectrum SpectrumOfLoops(const Kinematics<Space, double>& kinematics);
 template <class Space>
 ScaledLoops ScaleLoops(const Kinematics<Space, double>& kinematics);
 
-/// Constraints of all cut joints as rows that compare: J L^-T with L L^T the geometric mass matrix,
-/// each row over the square root of its own free response. Rows are by joint and direction in the
-/// joint's own axes, imposed directions before released ones. In double, whatever the scalar.
+/// Constraints of all cut joints as comparable rows: J L^-T, with L L^T the geometric mass matrix.
+/// Each row is divided by the square root of its own free response. Rows are by joint and direction
+/// in the joint's own axes, imposed directions before released ones. Always in double.
 struct DirectionRows {
   Eigen::MatrixXd rows;
   Eigen::VectorXd mismatch;           ///< of positions, scaled with unit masses, so [m]

@@ -32,20 +32,17 @@ MechanismDescription MergeRigidBodies(const MechanismDescription& description,
                                       const std::vector<Attachment>& attachments,
                                       Renumbering* renumbering);
 
-// Bodies joined by welds move as one.
-
-/// Attachments of welded bodies to the one of them that stands first in the description (Ground
-/// before all). A weld that closes a loop in joint coordinates (topology.h) stays a joint: it is
-/// where the loop is assembled and where its drift shows, and without it another joint, perhaps one
-/// with an initial value, would have to be cut. A group whose welds contradict each other, or whose
-/// bodies other joints connect as well, is left as it is; all are where forces are unknown.
+/// Attachments of welded bodies to the first of them in the description (Ground before all).
+///
+/// A weld that closes a loop in joint coordinates (topology.h) stays a joint, because the loop is
+/// assembled there. Without it another joint, perhaps one with an initial value, would be cut. A
+/// group stays as it is if its welds contradict each other, or if other joints connect its bodies.
+/// Where forces are unknown, all groups stay.
 std::vector<Attachment> FindWelded(const MechanismDescription& description);
 
 /// Does the same with these joints alone, which must be welds; other welds count as any joint.
 std::vector<Attachment> FindWelded(const MechanismDescription& description,
                                    const std::vector<bool>& welds);
-
-// Bodies that certainly cannot move: bars of a triangle on the ground, and the like.
 
 /// Speeds of the forest above which nothing is looked for: the test is dense and runs before every
 /// run.
@@ -58,12 +55,11 @@ inline constexpr double kCertain = 1e-3;
 /// Returns attachments to Ground of all bodies in a rigid sub-structure at the assembled start;
 /// empty if there are none, assembly fails or forces are unknown.
 ///
-/// The rule: a set of bodies, with the joints among them and to Ground and no others, whose
-/// constraints at the start have a Jacobian of full column rank, with a ratio of singular values
-/// above kCertain. Such a set has no motion even to first order, so its position is isolated and
-/// it stays there whatever the rest does. Joints with prescribed motions are not among these. A
-/// body that merely stands still at the start, such as a slider at dead centre, is in no such set,
-/// because the rest of its loop moves.
+/// A sub-structure is a set of bodies with the joints among them and to Ground. It is rigid if the
+/// Jacobian of its constraints at the start has full column rank, with a ratio of singular values
+/// above kCertain. It then has no motion even to first order, so its position is isolated. Joints
+/// with prescribed motions do not count. A slider at dead centre only stands still: the rest of its
+/// loop moves.
 std::vector<Attachment> FindImmovable(const MechanismDescription& description);
 
 }  // namespace loopbench

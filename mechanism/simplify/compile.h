@@ -2,11 +2,11 @@
 // compiled into a Mechanism, and maps results back to the user's bodies and joints.
 //
 // Simplifications, in this order, each with a switch:
-//   welds      bodies joined by welds become one (attach.h);
-//   immovable  bodies that certainly cannot move become part of Ground (attach.h);
-//   islands    parts connected through Ground at most become descriptions of their own
-//   (topology.h); planar     a spatial part that moves in parallel planes becomes planar (plane.h);
-//   redundancy constraints redundant at every position are released (redundancy.h).
+//   welds       Bodies joined by welds become one (attach.h).
+//   immovable   Bodies that certainly cannot move become part of Ground (attach.h).
+//   islands     Parts connected only through Ground become separate descriptions (topology.h).
+//   planar      A spatial part that moves in parallel planes becomes planar (plane.h).
+//   redundancy  Constraints that are redundant at every position are released (redundancy.h).
 // The motion is the same except for rounding. An unknown kind of joint or force prevents a
 // simplification.
 #pragma once

@@ -129,10 +129,10 @@ Simplified FreezeConstantParts(const MechanismDescription& description, const Sh
 Simplified HoldStiffSprings(const MechanismDescription& description, const ShortRun& run,
                             const SimplifyOptions& options);
 
-/// Replaces a planar body with only two pins, or a spatial body with only two spherical joints (or
-/// one and a universal joint), by a rod of its name, the lightest first. Its named points at the
-/// pins stay as points "<body>.<point>" of the bodies there. If nothing else carries the two bodies
-/// of the rod, they float on free joints.
+/// Replaces bodies by rods of their names, the lightest first. A planar body must have two pins and
+/// nothing else, a spatial body two spherical joints or one and a universal joint. Named points
+/// at the pins stay as points "<body>.<point>" of the bodies there. If nothing else carries the two
+/// bodies of the rod, they float on free joints.
 Simplified LightenLinks(const MechanismDescription& description, const ShortRun& run,
                         const SimplifyOptions& options);
 

@@ -25,7 +25,7 @@ std::size_t Cells(const std::string& text) {
   return cells;
 }
 
-/// The lines of the first table: heading, rule, rows, and what follows without an empty line.
+/// The lines of the first table (heading, rule, rows) and all others up to an empty line.
 std::vector<std::string> TableLines(const std::string& text) {
   const std::size_t rule = std::min(text.find("\n--"), text.find("\n  --"));
   if (rule == std::string::npos) throw std::runtime_error("no table in " + text);

@@ -79,9 +79,9 @@ struct Tally {
   int states = 0, refused = 0, regularized = 0, answered_though_regularized = 0;
   double worst = 0.0;  ///< difference over its bound
 
-  /// Adds a state of `n` bodies. A short cut may refuse states that the general sweep regularizes,
-  /// and states near them: bounds on eigenvalues are at most so many times their limit of 1e-4 that
-  /// rcond is below 0.01.
+  /// Adds a state of `n` bodies. A short cut may reject states that the general sweep regularizes,
+  /// and states near them, with rcond below 0.01. Its bounds on eigenvalues are up to a hundred
+  /// times their limit of 1e-4.
   void Add(const Both& both, int n, const std::string& name) {
     ++states;
     if (both.outcome != Outcome::kFinished || both.general.smallest_weight < 1.0) {

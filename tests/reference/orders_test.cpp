@@ -102,8 +102,8 @@ double ErrorOf(const std::vector<Numbers>& states, const std::vector<Numbers>& e
 
 constexpr Enforcement kLevelsOfTables[] = {Enforcement::kAcceleration, Enforcement::kVelocity};
 
-/// Multipliers at the levels of OrdersOfTables are left out: its tables include those of all
-/// profiles, with the steps of these.
+/// Multipliers at the levels of OrdersOfTables are left out: it runs the tables of all profiles
+/// with the same steps.
 std::vector<Method> AllMethods() {
   std::vector<Method> methods;
   for (const char* name : {"odca", "lagrange", "reduction"}) {

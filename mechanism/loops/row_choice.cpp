@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace loopbench {
@@ -10,27 +11,34 @@ RowChoice::RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int
     : rows_(rows),
       left_(rows),
       quotas_(std::move(quotas)),
-      is_taken_(static_cast<std::size_t>(rows.rows()), false),
+      joint_of_(static_cast<std::size_t>(rows.rows())),
+      is_taken_(joint_of_.size(), false),
       taken_(quotas_.size(), 0) {
   int in_quotas = 0;
   for (std::size_t j = 0; j < quotas_.size(); ++j) {
     const Quota& quota = quotas_[j];
     const int fixed = quota.keep == quota.count ? quota.count : quota.fixed;
-    for (int i = 0; i < fixed; ++i) Take(j, quota.first + i);
+    std::fill_n(joint_of_.begin() + quota.first, quota.count, j);
+    for (int i = 0; i < fixed; ++i) Take(quota.first + i);
     in_quotas += quota.keep;
   }
-  TakeBest(std::min(in_quotas, total));
+  in_quotas = std::min(in_quotas, total);
+  TakeBest(in_quotas);
+  DropDependent();
+  while (std::ssize(order_) < in_quotas && (Augment(0.1) || Augment(kDependent))) {
+  }
+  TakeBest(in_quotas);
   Exchange();
   is_in_quota_ = is_taken_;
   for (Quota& quota : quotas_) quota.keep = quota.count;
   TakeBest(total);
 }
 
-void RowChoice::Take(std::size_t joint, int row) {
+void RowChoice::Take(int row) {
   is_taken_[row] = true;
-  ++taken_[joint];
-  order_.push_back({joint, row});
+  ++taken_[joint_of_[row]];
   const double norm = left_.row(row).norm();
+  order_.push_back({row, norm});
   least_ = std::min(least_, norm);
   if (!(norm > 0.0)) return;
   const Eigen::RowVectorXd unit = left_.row(row) / norm;
@@ -41,67 +49,114 @@ void RowChoice::Take(std::size_t joint, int row) {
   }
 }
 
+void RowChoice::TakeAgain(const std::vector<Taken>& order) {
+  order_.clear();
+  left_ = rows_;
+  is_taken_.assign(is_taken_.size(), false);
+  taken_.assign(taken_.size(), 0);
+  least_ = std::numeric_limits<double>::infinity();
+  for (const Taken& one : order) Take(one.row);
+}
+
 void RowChoice::TakeBest(int total) {
   while (std::ssize(order_) < total) {
     double best = -1.0;
-    std::size_t joint = 0;
     int row = -1;
-    for (std::size_t j = 0; j < quotas_.size(); ++j) {
-      if (taken_[j] >= quotas_[j].keep) continue;
-      for (int r = quotas_[j].first; r < quotas_[j].first + quotas_[j].count; ++r) {
-        if (is_taken_[r]) continue;
-        // the first of equals, rounding aside, so that all formulations choose alike
-        const double norm = left_.row(r).norm();
-        if (row >= 0 && !(norm > best * (1.0 + 1e-6))) continue;
-        best = norm;
-        joint = j;
-        row = r;
-      }
+    for (int r = 0; r < rows_.rows(); ++r) {
+      if (is_taken_[r] || !HasRoom(joint_of_[r])) continue;
+      // the first of equals, rounding aside, so that all formulations choose alike
+      const double norm = left_.row(r).norm();
+      if (row >= 0 && !(norm > best * (1.0 + 1e-6))) continue;
+      best = norm;
+      row = r;
     }
     if (row < 0) break;
-    Take(joint, row);
+    Take(row);
   }
+}
+
+void RowChoice::DropDependent() {
+  std::vector<Taken> order = order_;
+  const double scale = rows_.rowwise().norm().maxCoeff();
+  std::erase_if(order, [&](const Taken& one) {
+    return one.norm <= kDependent * scale && MayChange(one.row);
+  });
+  if (order.size() < order_.size()) TakeAgain(order);
+}
+
+RowChoice::Projection RowChoice::OntoTaken() const {
+  const auto size = static_cast<Eigen::Index>(order_.size());
+  Eigen::MatrixXd taken(size, rows_.cols());
+  for (Eigen::Index k = 0; k < size; ++k) taken.row(k) = rows_.row(order_[k].row);
+  Eigen::MatrixXd gram = taken * taken.transpose();
+  gram.diagonal().array() += 1e-12 * gram.trace();  // rows that may not change may be dependent
+  Projection onto;
+  onto.inverse = gram.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  const Eigen::MatrixXd along = rows_ * taken.transpose();
+  onto.T = along * onto.inverse;
+  onto.rest = rows_.rowwise().squaredNorm() - along.cwiseProduct(onto.T).rowwise().sum();
+  return onto;
+}
+
+bool RowChoice::Augment(double tolerance) {
+  const Projection onto = OntoTaken();
+  const double least = tolerance * tolerance * rows_.rowwise().squaredNorm().maxCoeff();
+  constexpr int kNone = -1, kNotReached = -2;
+  std::vector<int> before(is_taken_.size(), kNotReached), leaves(is_taken_.size(), kNone);
+  std::vector<int> reached;
+  for (int row = 0; row < rows_.rows(); ++row) {
+    if (is_taken_[row] || !MayChange(row) || !(onto.rest[row] > least)) continue;
+    reached.push_back(row);
+    before[row] = kNone;
+  }
+  std::ranges::stable_sort(reached, std::greater(), [&](int row) { return onto.rest[row]; });
+  for (std::size_t next = 0; next < reached.size(); ++next) {
+    const int row = reached[next];
+    if (HasRoom(joint_of_[row])) {
+      std::vector<Taken> order = order_;
+      int enters = row;
+      for (; before[enters] != kNone; enters = before[enters]) order[leaves[enters]].row = enters;
+      order.push_back({enters, 0.0});
+      TakeAgain(order);
+      return true;
+    }
+    for (std::size_t k = 0; k < order_.size(); ++k) {
+      if (joint_of_[order_[k].row] != joint_of_[row] || !MayChange(order_[k].row)) continue;
+      for (int other = 0; other < rows_.rows(); ++other) {
+        if (is_taken_[other] || before[other] != kNotReached || !MayChange(other)) continue;
+        if (!(std::abs(onto.T(other, static_cast<Eigen::Index>(k))) > tolerance)) continue;
+        reached.push_back(other);
+        before[other] = row;
+        leaves[other] = static_cast<int>(k);
+      }
+    }
+  }
+  return false;
 }
 
 void RowChoice::Exchange() {
   constexpr double kGain = 2.0;
-  const auto may_change = [&](std::size_t joint, int row) {
-    const Quota& quota = quotas_[joint];
-    return quota.keep < quota.count && row >= quota.first + quota.fixed;
-  };
   for (Eigen::Index round = 0; round < rows_.rows() && !order_.empty(); ++round) {
-    const auto size = static_cast<Eigen::Index>(order_.size());
-    Eigen::MatrixXd taken(size, rows_.cols());
-    for (Eigen::Index k = 0; k < size; ++k) taken.row(k) = rows_.row(order_[k].row);
-    const Eigen::MatrixXd inverse =
-        (taken * taken.transpose()).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
-    const Eigen::MatrixXd T = rows_ * taken.transpose() * inverse;
+    const Projection onto = OntoTaken();
     double most = kGain * kGain;
     Taken* out = nullptr;
     int in = -1;
-    for (Eigen::Index k = 0; k < size; ++k) {
-      const std::size_t joint = order_[k].joint;
-      if (!may_change(joint, order_[k].row)) continue;
-      for (int row = quotas_[joint].first; row < quotas_[joint].first + quotas_[joint].count;
-           ++row) {
-        if (is_taken_[row] || !may_change(joint, row)) continue;
-        const double rest = (rows_.row(row) - T.row(row) * taken).squaredNorm();
-        const double gain = T(row, k) * T(row, k) + rest * inverse(k, k);  // of volume, squared
+    for (Eigen::Index k = 0; k < std::ssize(order_); ++k) {
+      Taken& one = order_[k];
+      if (!MayChange(one.row)) continue;
+      for (int row = 0; row < rows_.rows(); ++row) {
+        if (joint_of_[row] != joint_of_[one.row] || is_taken_[row] || !MayChange(row)) continue;
+        // of volume, squared
+        const double gain = onto.T(row, k) * onto.T(row, k) + onto.rest[row] * onto.inverse(k, k);
         if (!(gain > most)) continue;
         most = gain;
-        out = &order_[k];
+        out = &one;
         in = row;
       }
     }
     if (out == nullptr) return;
     out->row = in;
-    const std::vector<Taken> order = std::move(order_);
-    order_.clear();
-    left_ = rows_;
-    is_taken_.assign(is_taken_.size(), false);
-    taken_.assign(taken_.size(), 0);
-    least_ = std::numeric_limits<double>::infinity();
-    for (const Taken& one : order) Take(one.joint, one.row);
+    TakeAgain(std::vector<Taken>(order_));
   }
 }
 

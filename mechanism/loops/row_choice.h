@@ -20,7 +20,8 @@ struct Quota {
 class RowChoice {
  public:
   /// Takes all rows of joints that keep all and prescribed ones, the best others until all quotas
-  /// are full, improved by exchanges within joints, then the best of all until `total` are taken.
+  /// are full, and then the best of all until `total` are taken. Rows within quotas are independent
+  /// if any such choice is. Exchanges within joints improve them.
   RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int total);
 
   /// The least norm that a row had left when it was taken.
@@ -31,21 +32,40 @@ class RowChoice {
   std::vector<Released> BeyondQuotas(const std::vector<int>& joints) const;
 
  private:
-  /// Takes one row of a joint (index into the quotas).
-  void Take(std::size_t joint, int row);
+  struct Taken {
+    int row;
+    double norm;  ///< that it had left
+  };
+  /// All rows as T times the rows taken, and a rest orthogonal to these.
+  struct Projection {
+    Eigen::MatrixXd inverse, T;  ///< inverse Gram matrix of the rows taken
+    Eigen::VectorXd rest;        ///< squared norms
+  };
+  static constexpr double kDependent = 1e-6;  ///< share of the largest norm
+
+  bool HasRoom(std::size_t joint) const { return taken_[joint] < quotas_[joint].keep; }
+  bool MayChange(int row) const {
+    const Quota& quota = quotas_[joint_of_[row]];
+    return quota.keep < quota.count && row >= quota.first + quota.fixed;
+  }
+  void Take(int row);
+  void TakeAgain(const std::vector<Taken>& order);
   /// More rows by pivoting until `total` are taken.
   void TakeBest(int total);
-  /// Exchanges rows of a joint while this doubles the volume of the rows taken. Pivoting alone may
-  /// take a row early that leaves other joints nothing.
+  /// Pivoting may take a row early that leaves other joints only rows that depend on those taken.
+  void DropDependent();
+  /// Takes one more independent row. If its joint has no room, one of its rows leaves, and so on:
+  /// a shortest augmenting path of the intersection of two matroids (Schrijver, Combinatorial
+  /// Optimization, section 41.2). False if there is none whose elements of T exceed `tolerance`.
+  bool Augment(double tolerance);
+  /// Exchanges rows of a joint while this doubles the volume of the rows taken.
   void Exchange();
+  Projection OntoTaken() const;
 
-  struct Taken {
-    std::size_t joint;
-    int row;
-  };
   Eigen::MatrixXd rows_, left_;  ///< left_: rows less their parts along those taken
   std::vector<Taken> order_;
   std::vector<Quota> quotas_;
+  std::vector<std::size_t> joint_of_;  ///< index into the quotas, by row
   std::vector<bool> is_taken_, is_in_quota_;
   std::vector<int> taken_;  ///< by joint
   double least_ = std::numeric_limits<double>::infinity();

@@ -214,21 +214,27 @@ void ImportDraft::AddBall(const XmlElement& element,
   AddLoop(element, NameLater("ball"), JointType::kSpherical, {a, P}, {b, Q});
 }
 
-void ImportDraft::AddCoupling(const XmlElement& element, const std::string& name,
+bool ImportDraft::AddCoupling(const XmlElement& element, const std::string& name,
                               std::vector<CouplingDescription::Part> parts, double offset) {
   const auto has_coordinate = [&](const CouplingDescription::Part& part) {
     return NumValues(description.joints[part.joint].type, SpaceKind::kSpatial, false) == 1;
   };
-  if (!std::ranges::all_of(parts, has_coordinate)) return Note(element, kNotCoupled, true);
+  if (!std::ranges::all_of(parts, has_coordinate)) {
+    Note(element, kNotCoupled, true);
+    return false;
+  }
   std::erase_if(parts, [](const CouplingDescription::Part& part) { return part.ratio == 0.0; });
   if (parts.empty()) {
     Note(element, "dropped: all coefficients are 0", offset != 0.0);
-  } else if (parts.size() == 1) {
+    return false;
+  }
+  if (parts.size() == 1) {
     const auto [joint, ratio] = parts.front();
     description.joints[joint].motions = {{0, Polynomial{{offset / ratio}}}};
   } else {
     description.couplings.push_back({joints_.Take(name), std::move(parts), offset});
   }
+  return true;
 }
 
 void ImportDraft::AddMimic(const XmlElement& element, int follower,

@@ -15,6 +15,7 @@
 #include "harness/exchange/export_names.h"
 #include "harness/exchange/import.h"
 #include "harness/exchange/xml_document.h"
+#include "harness/text/words.h"
 #include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {
@@ -154,13 +155,18 @@ inline constexpr const char* kNotCoupled =
 inline constexpr const char* kDrakeBall = "drake:ball_constraint";
 inline constexpr const char* kNoEnds = "joints turn and slide without ends";
 
-/// Returns the entry of a name; if there is none, rejects the value with `expected`.
+/// Returns the entry of a name; if there is none, rejects the value with `expected` and the nearest
+/// name.
 template <class Entry>
 const Entry& Named(const std::map<std::string, Entry>& entries, const std::string& name,
                    const XmlValue& value, std::string_view expected) {
   const auto found = entries.find(name);
-  if (found == entries.end()) value.Fail(expected);
-  return found->second;
+  if (found != entries.end()) return found->second;
+  std::vector<std::string> names;
+  for (const auto& [known, entry] : entries) names.push_back(known);
+  const std::string nearest = NearestSpelling(name, names);
+  const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
+  value.Fail(std::string(expected) + cure);
 }
 
 // Joints in series without mass between them (import_chain.cpp, import_links.cpp).
@@ -266,9 +272,9 @@ class ImportDraft {
     }
     if (damping > 0.0) description.forces.emplace_back(JointDamper{last_joint(), damping});
   }
-  /// Adds the coupling sum_i ratio_i q_i = offset; a motion if one ratio is not 0. Dropped with a
-  /// note unless all joints have one coordinate.
-  void AddCoupling(const XmlElement& element, const std::string& name,
+  /// Adds the coupling sum_i ratio_i q_i = offset; a motion if one ratio is not 0. Returns
+  /// false if it is dropped with a note: a joint has several coordinates, or all ratios are 0.
+  bool AddCoupling(const XmlElement& element, const std::string& name,
                    std::vector<CouplingDescription::Part> parts, double offset);
   /// Adds the coupling q_follower = ratio q_leader + offset.
   void AddFollower(const XmlElement& element, const std::string& name, int follower,

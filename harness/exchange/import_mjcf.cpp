@@ -113,8 +113,13 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
       settings.silent_groups.insert(static_cast<int>(group));
     }
   }
-  for (const XmlElement& flags : element.Children({"flag"})) {
-    bool has_gravity = true, has_passive = true, has_constraints = true;
+}
+
+/// Reads the flags of all <option>, of which the last value counts, and applies them.
+void ReadFlags(const XmlElement& root, MjcfModel* model) {
+  MjcfSettings& settings = model->settings;
+  bool has_gravity = true, has_passive = true, has_constraints = true;
+  for (const XmlElement& flags : root.InSections("option", {"flag"})) {
     for (const auto& [name, value] : {std::pair{"gravity", &has_gravity},
                                       {"passive", &has_passive},
                                       {"spring", &settings.has_springs},
@@ -127,10 +132,10 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
       const auto given = flags.Attribute(name);
       if (given) *value = given->Choice<bool>({{"disable", false}, {"enable", true}});
     }
-    if (!has_gravity) gravity.setZero();
-    if (!has_constraints) settings.has_equality = false;
-    if (!has_passive) settings.has_springs = settings.has_dampers = false;
   }
+  if (!has_gravity) model->draft->description.gravity.setZero();
+  if (!has_constraints) settings.has_equality = false;
+  if (!has_passive) settings.has_springs = settings.has_dampers = false;
 }
 
 /// Keeps meshes for the masses of geoms; the name of a mesh is by default its file's without
@@ -140,6 +145,7 @@ void ReadAssets(const XmlElement& root, MjcfModel* model) {
     for (const XmlElement& mesh : assets.Children({"mesh"})) {
       const XmlElement element = model->defaults.Of(mesh, "");
       const auto name = mesh.Attribute("name"), file = element.Attribute("file");
+      element.Ignore();  // a mesh without use has no note
       if (!name && !file) continue;
       const std::string known =
           name ? name->Name() : std::filesystem::path(file->Name()).stem().string();
@@ -174,6 +180,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
     ReadCompiler(element, &model.settings);
   }
   for (const XmlElement& element : root.Children({"option"})) ReadOption(element, &model);
+  ReadFlags(root, &model);
   for (const XmlElement& element : root.Children({"default"})) model.defaults.Read(element, "");
   ReadAssets(root, &model);
   const std::vector<XmlElement> worlds = root.Children({"worldbody"});

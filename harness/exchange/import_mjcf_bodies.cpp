@@ -140,9 +140,9 @@ const Solid& MeshSolid(const MjcfModel& model, const XmlValue& name) {
   return known->second;
 }
 
-/// Reads a geom; returns false if it has no mass.
-bool ReadGeom(const MjcfModel& model, const MjcfPlaced& geom, bool drops_meshes,
-              PlacedSolid* read) {
+/// Reads a geom; returns false if it has no mass. `is_idle`: its mass has no effect, so that shapes
+/// that are not read are accepted.
+bool ReadGeom(const MjcfModel& model, const MjcfPlaced& geom, bool is_idle, PlacedSolid* read) {
   const XmlElement& element = geom.element;
   const auto given = element.Attribute("type");
   const auto mesh = element.Attribute("mesh");
@@ -157,8 +157,10 @@ bool ReadGeom(const MjcfModel& model, const MjcfPlaced& geom, bool drops_meshes,
   const double group = element.Number("group", 0.0);
   if (group < model.settings.first_group || group > model.settings.last_group) return false;
   if (kg == 0.0 || (kg < 0.0 && density == 0.0)) return false;
-  if (type == kWithoutMass || (drops_meshes && (mesh || type == kOfMesh))) return false;
-  if (const auto shell = element.Attribute("shellinertia"); BoolOr(shell)) {
+  const auto shell = element.Attribute("shellinertia");
+  const bool is_shell = BoolOr(shell);
+  if (type == kWithoutMass || (is_idle && (mesh || type == kOfMesh || is_shell))) return false;
+  if (is_shell) {
     shell->Fail("false: the inertia of shells is not known here");
   }
   if (mesh && type != kOfMesh) mesh->Fail("no mesh: a shape is not fitted to it");
@@ -312,11 +314,11 @@ void ReadMasses(Contents& contents, int body, bool is_fixed, MjcfModel* model) {
   const MjcfSettings& settings = model->settings;
   const bool wants_geoms = settings.inertia == MjcfSettings::kFromGeoms ||
                            (settings.inertia == MjcfSettings::kAuto && !has_inertial);
-  const bool drops_meshes = is_fixed && settings.total_mass <= 0.0;
+  const bool is_idle = is_fixed && settings.total_mass <= 0.0;
   std::vector<PlacedSolid> parts;
   for (const MjcfPlaced& geom : contents["geom"]) {
     PlacedSolid part;
-    if (wants_geoms && ReadGeom(*model, geom, drops_meshes, &part)) parts.push_back(part);
+    if (wants_geoms && ReadGeom(*model, geom, is_idle, &part)) parts.push_back(part);
   }
   BodyDescription masses = SumOf(parts);
   const bool from_geoms = masses.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains

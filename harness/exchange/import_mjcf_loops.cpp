@@ -11,8 +11,12 @@ std::string NameOr(const XmlElement& element, const std::string& otherwise) {
 }
 
 /// Adds a <connect> or <weld> of two sites, or of two bodies by a point or pose at rest.
+///
+/// MuJoCo's weld: x1 + R1 relpose = x2 + R2 anchor, and torquescale times the relative rotation is
+/// 0 (engine_core_constraint.c).
 void AddClosure(const XmlElement& equality, MjcfModel* model) {
   const bool is_weld = equality.tag() == "weld";
+  const bool turns = !is_weld || equality.Number("torquescale", 1.0) == 0.0;
   const auto& rest = model->draft->at_rest;
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
   FrameOn first, second;
@@ -26,9 +30,10 @@ void AddClosure(const XmlElement& equality, MjcfModel* model) {
     if (body2) second.body = model->BodyNamed(*body2);
   }
   if (!site1 && is_weld) {
-    first.X = rest[first.body].Inverse() * rest[second.body];
+    second.X.p = VectorOr(equality.Attribute("anchor"));
+    first.X = rest[first.body].Inverse() * rest[second.body] * second.X;
     if (const auto pose = equality.Attribute("relpose")) {
-      // pose of the second body in the first; a zero quaternion selects the drawn poses
+      // a zero quaternion selects the drawn poses
       const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
       const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
       if (q.norm() > 0.0) first.X = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
@@ -37,16 +42,14 @@ void AddClosure(const XmlElement& equality, MjcfModel* model) {
     first.X.p = equality.Required("anchor", "3 numbers").Vector();
     second.X = rest[second.body].Inverse() * rest[first.body] * first.X;
   }
-  if (is_weld) {
-    // `anchor`: point of the weld; irrelevant, since a weld holds everywhere
-    for (const char* name : {"anchor", "torquescale", "relpose"}) equality.Attribute(name);
-  } else {
+  for (const char* name : {"anchor", "relpose"}) equality.Attribute(name);  // not used with sites
+  if (turns) {
     first.X.q.setIdentity();
     second.X.q.setIdentity();
   }
   const std::string name = NameOr(equality, equality.tag()) + model->Suffix();
   model->draft->AddLoop(equality, model->draft->NameLater(name),
-                        is_weld ? JointType::kWeld : JointType::kSpherical, first, second);
+                        turns ? JointType::kSpherical : JointType::kWeld, first, second);
 }
 
 /// Returns the coefficients of `polycoef`; missing ones have their defaults.
@@ -58,79 +61,55 @@ std::vector<double> PolynomialOf(const XmlElement& equality) {
   return a;
 }
 
-/// Couples two joints, or holds one at a constant. Returns false if it is dropped.
-///
-/// MuJoCo: q1 - q1_0 = a_0 + a_1 (q2 - q2_0) + ..., with q_0 the coordinates in the drawn position.
-/// Loopbench's coordinates are 0 there.
-bool AddJointEquality(const XmlElement& equality, MjcfModel* model) {
-  const MjcfJoint& joint =
-      model->joints[model->JointNamed(equality.Required("joint1", "the name of a joint"))];
-  const std::vector<double> a = PolynomialOf(equality);
-  const auto other = equality.Attribute("joint2");
-  const MjcfJoint* leader = other ? &model->joints[model->JointNamed(*other)] : nullptr;
-  if (joint.num_q() != 1 || (leader != nullptr && leader->num_q() != 1)) {
-    model->draft->Note(equality, kNotCoupled, true);
-    return false;
+using Parts = std::vector<CouplingDescription::Part>;
+
+/// Returns the coefficients of a fixed tendon. Its length is sum_i coef_i q_i.
+Parts CoefficientsOf(const XmlElement& tendon, const MjcfModel& model) {
+  Parts parts;
+  for (const XmlElement& child : tendon.Children({"joint"})) {
+    const std::size_t index = model.JointNamed(child.Required("joint", "the name of a joint"));
+    const int joint = model.joints[index].joint;
+    if (std::ranges::count(parts, joint, &CouplingDescription::Part::joint) > 0) {
+      child.Fail("a joint twice", "each joint once");
+    }
+    parts.push_back({joint, child.Required("coef", "a number").Number()});
   }
-  if (leader != nullptr && (a[2] != 0.0 || a[3] != 0.0 || a[4] != 0.0)) {
+  return parts;
+}
+
+/// Couples two lengths, or holds one constant. Returns false if the constraint is dropped.
+///
+/// MuJoCo: L1 - L1_0 = a_0 + a_1 (L2 - L2_0) + ..., with L_0 the lengths in the drawn position.
+/// Loopbench's coordinates are 0 there. The length of a joint is its coordinate.
+bool AddCoupling(const XmlElement& equality, const std::string& name, Parts parts,
+                 const std::optional<Parts>& others, MjcfModel* model) {
+  const std::vector<double> a = PolynomialOf(equality);
+  if (others && (a[2] != 0.0 || a[3] != 0.0 || a[4] != 0.0)) {
     model->draft->Note(equality, "polycoef",
                        "dropped: couplings are linear: this is a freedom more than in the file",
                        true);
     return false;
   }
-  if (leader == nullptr) {
-    model->draft->description.joints[joint.joint].motions = {{0, Polynomial{{a[0]}}}};
-    return true;
+  for (const auto& [joint, ratio] : others.value_or(Parts())) {
+    const auto known = std::ranges::find(parts, joint, &CouplingDescription::Part::joint);
+    auto& part =
+        known != parts.end() ? *known : parts.emplace_back(CouplingDescription::Part{joint, 0.0});
+    part.ratio -= a[1] * ratio;
   }
-  model->draft->AddFollower(equality, NameOr(equality, "equality") + model->Suffix(), joint.joint,
-                            {leader->joint, a[1]}, a[0]);
-  return true;
+  return model->draft->AddCoupling(equality, name + model->Suffix(), std::move(parts), a[0]);
 }
 
-void ReadEquality(const XmlElement& root, MjcfModel* model) {
-  for (const XmlElement& element : root.InSections("equality")) {
-    const auto active = model->defaults.Of(element, "", "equality", false).Attribute("active");
-    if (!model->settings.has_equality || !BoolOr(active, true)) {
-      model->draft->DropWhole(element, "it is not active");
-      continue;
-    }
-    const XmlElement equality = model->defaults.Of(element, "", "equality");
-    for (const char* name : {"solref", "solimp"}) equality.Attribute(name);
-    const std::string tag = element.tag();
-    bool is_exact = tag == "connect" || tag == "weld";
-    MjcfModel::References references;
-    if (tag == "joint") {
-      for (const char* name : {"joint1", "joint2"}) {
-        references.emplace_back("joint", element.Attribute(name));
-      }
-    } else if (is_exact) {
-      for (const char* name : {"body1", "body2", "site1", "site2"}) {
-        references.emplace_back(std::string(name, 4), element.Attribute(name));
-      }
-    }
-    model->ForReplicas(references, [&] {
-      if (tag == "connect" || tag == "weld") AddClosure(equality, model);
-      if (tag == "joint") is_exact = AddJointEquality(equality, model);
-    });
-    if (is_exact) {
-      model->draft->Note(element, "imposed exactly here; MuJoCo lets it give way");
-    } else if (tag != "joint" && tag != "tendon") {
-      model->draft->DropWhole(element, "there is no constraint of this kind", true);
-    }
+bool AddJointEquality(const XmlElement& equality, MjcfModel* model) {
+  const auto part = [&](const XmlValue& name) {
+    return Parts{{model->joints[model->JointNamed(name)].joint, 1.0}};
+  };
+  const Parts first = part(equality.Required("joint1", "the name of a joint"));
+  std::optional<Parts> second;
+  if (const auto other = equality.Attribute("joint2")) second = part(*other);
+  if (second && second->front().joint == first.front().joint) {
+    equality.Fail("a joint that follows itself", "another joint");
   }
-}
-
-/// Returns tendons whose length an active <equality><tendon> keeps constant.
-std::map<std::string, XmlElement> HeldTendons(const XmlElement& root, const MjcfModel& model) {
-  std::map<std::string, XmlElement> held;
-  for (const XmlElement& element : root.InSections("equality", {"tendon"})) {
-    const XmlElement equality = model.defaults.Of(element, "", "equality", false);
-    const auto active = equality.Attribute("active");
-    const auto first = equality.Attribute("tendon1");
-    if (!first || equality.Attribute("tendon2") || !BoolOr(active, true)) continue;
-    held.emplace(first->Name(), element);
-  }
-  return held;
+  return AddCoupling(equality, NameOr(equality, "equality"), first, second, model);
 }
 
 /// Returns the two sites of a straight tendon, or nothing.
@@ -152,16 +131,16 @@ void AddSpring(const XmlElement& tendon, const std::pair<BodyPoint, BodyPoint>& 
   std::tie(spring.from, spring.to) = ends;
   spring.stiffness = tendon.Number("stiffness", 0.0, kNotNegative);
   spring.damping = tendon.Number("damping", 0.0, kNotNegative);
+  if (!model->settings.has_springs) spring.stiffness = 0.0;
+  if (!model->settings.has_dampers) spring.damping = 0.0;
   spring.length = free_length;
   if (const auto given = tendon.Attribute("springlength")) {
     const std::vector<double> rest = given->Numbers(1, 2);
-    if (rest.size() == 2 && rest[0] != rest[1]) {
+    if (spring.stiffness > 0.0 && rest[0] != rest.back()) {
       given->Fail("one length: a spring with a range where it is free is no force here");
     }
     if (rest[0] >= 0.0) spring.length = rest[0];
   }
-  if (!model->settings.has_springs) spring.stiffness = 0.0;
-  if (!model->settings.has_dampers) spring.damping = 0.0;
   if (spring.stiffness > 0.0 || spring.damping > 0.0) {
     model->draft->description.forces.emplace_back(spring);
   }
@@ -172,61 +151,109 @@ double LengthOf(const std::pair<BodyPoint, BodyPoint>& ends, const std::vector<P
   return (place(ends.first) - place(ends.second)).norm();
 }
 
-/// Adds a fixed tendon of constant length: a coupling of the joints' coordinates, which are 0 in
-/// the drawn position.
-void AddFixedTendon(const XmlElement& element, const XmlElement& held, MjcfModel* model) {
-  std::vector<CouplingDescription::Part> parts;
-  for (const XmlElement& child : element.Children({"joint"})) {
-    const MjcfJoint& joint =
-        model->joints[model->JointNamed(child.Required("joint", "the name of a joint"))];
-    if (joint.num_q() != 1) return model->draft->Note(element, kNotCoupled, true);
-    const auto part = std::ranges::find(parts, joint.joint, &CouplingDescription::Part::joint);
-    if (part != parts.end()) child.Fail("a joint twice", "each joint once");
-    parts.push_back({joint.joint, child.Required("coef", "a number").Number()});
+/// Adds the constraint of one or two tendons: a coupling of the joints of fixed tendons, or a rod.
+/// Returns false if it is dropped.
+bool AddTendonEquality(const XmlElement& equality, const std::vector<XmlElement>& tendons,
+                       MjcfModel* model) {
+  ImportDraft* draft = model->draft;
+  const bool is_pair = tendons.size() > 1;
+  equality.Attribute("name");  // the coupling or rod has the name of the first tendon
+  const std::string name = tendons[0].Attribute("name")->Name();
+  if (std::ranges::all_of(tendons, [](const XmlElement& one) { return one.tag() == "fixed"; })) {
+    std::optional<Parts> others;
+    if (is_pair) others = CoefficientsOf(tendons[1], *model);
+    return AddCoupling(equality, name, CoefficientsOf(tendons[0], *model), others, model);
   }
-  const XmlElement equality = model->defaults.Of(held, "", "equality");
-  equality.Attribute("name");  // the coupling has the name of the tendon
-  model->draft->AddCoupling(element, element.Attribute("name")->Name() + model->Suffix(),
-                            std::move(parts), PolynomialOf(equality)[0]);
-  const XmlElement tendon = model->defaults.Of(element, "", "tendon");
-  model->NoteLimits(tendon, "tendons do not end");
-  for (const char* key : {"stiffness", "damping", "frictionloss", "armature"}) {
-    model->DropNonzero(tendon, key, "the length of the tendon is constant");
+  const auto ends = is_pair ? std::nullopt : StraightEnds(tendons[0], *model);
+  if (!ends || ends->first.body == ends->second.body) {
+    draft->DropWhole(equality,
+                     "only fixed tendons, and the length of one straight spatial tendon, are "
+                     "constraints here: this is a freedom more than in the file",
+                     true);
+    return false;
+  }
+  const double length = LengthOf(*ends, draft->at_rest) + PolynomialOf(equality)[0];
+  if (!(length > 0.0)) tendons[0].Fail("a length that is not > 0", "one that is");
+  const auto& [a, b] = *ends;
+  draft
+      ->AddJoint(draft->NameLater(name + model->Suffix()), JointType::kRod,
+                 {a.body, Placement(a.at)}, {b.body, Placement(b.at)})
+      .parameter = length;
+  return true;
+}
+
+/// Adds the names of the sites and joints of a tendon.
+void AddReferences(const XmlElement& tendon, MjcfModel::References* references) {
+  for (const char* kind : {"site", "joint"}) {
+    for (const XmlElement& part : tendon.Children({kind})) {
+      references->emplace_back(kind, part.Attribute(kind));
+    }
   }
 }
 
-void ReadTendon(const XmlElement& element, const std::map<std::string, XmlElement>& held,
-                MjcfModel* model) {
-  const auto name = element.Attribute("name");
-  const bool is_held = name && held.contains(name->text()) && model->settings.has_equality;
-  if (element.tag() == "fixed" && is_held) {
-    return AddFixedTendon(element, held.at(name->text()), model);
+void ReadEquality(const XmlElement& root, const std::map<std::string, XmlElement>& tendons,
+                  MjcfModel* model) {
+  for (const XmlElement& element : root.InSections("equality")) {
+    const auto active = model->defaults.Of(element, "", "equality", false).Attribute("active");
+    if (!model->settings.has_equality || !BoolOr(active, true)) {
+      model->draft->DropWhole(element, "it is not active");
+      continue;
+    }
+    const XmlElement equality = model->defaults.Of(element, "", "equality");
+    for (const char* name : {"solref", "solimp"}) equality.Attribute(name);
+    const std::string tag = element.tag();
+    bool is_exact = tag == "connect" || tag == "weld";
+    MjcfModel::References references;
+    std::vector<XmlElement> lengths;
+    if (tag == "tendon") {
+      const XmlValue first = element.Required("tendon1", "the name of a tendon");
+      for (const auto& name : {std::optional(first), element.Attribute("tendon2")}) {
+        if (!name) continue;
+        lengths.push_back(Named(tendons, name->text(), *name, "the name of a tendon"));
+        AddReferences(lengths.back(), &references);
+      }
+    } else if (tag == "joint") {
+      for (const char* name : {"joint1", "joint2"}) {
+        references.emplace_back("joint", element.Attribute(name));
+      }
+    } else if (is_exact) {
+      for (const char* name : {"body1", "body2", "site1", "site2"}) {
+        references.emplace_back(std::string(name, 4), element.Attribute(name));
+      }
+    }
+    model->ForReplicas(references, [&] {
+      if (tag == "connect" || tag == "weld") AddClosure(equality, model);
+      if (tag == "joint") is_exact = AddJointEquality(equality, model);
+      if (tag == "tendon") is_exact = AddTendonEquality(equality, lengths, model);
+    });
+    if (is_exact) {
+      model->draft->Note(element, "imposed exactly here; MuJoCo lets it give way");
+    } else if (tag != "joint" && tag != "tendon") {
+      model->draft->DropWhole(element, "there is no constraint of this kind", true);
+    }
   }
+}
+
+/// Reads forces of a tendon. `groups`: FixedTogether() of the bodies.
+void ReadTendon(const XmlElement& element, const std::vector<int>& groups, MjcfModel* model) {
   const auto ends = element.tag() == "spatial" ? StraightEnds(element, *model) : std::nullopt;
-  if (!ends || ends->first.body == ends->second.body) {
-    return model->draft->DropWhole(
-        element,
-        is_held ? "only straight spatial and fixed tendons are constraints here: this is a freedom "
-                  "more than in the file"
-                : "only spatial tendons straight between two sites of two bodies are springs here",
-        true);
+  if (ends && groups[ends->first.body] == groups[ends->second.body]) {
+    return model->draft->DropWhole(element, "both ends are on bodies that are fixed together");
   }
   const XmlElement tendon = model->defaults.Of(element, "", "tendon");
-  AddSpring(tendon, *ends, LengthOf(*ends, model->where_springs_are_free), model);
   model->NoteLimits(tendon, "tendons do not end");
+  if (ends) {
+    AddSpring(tendon, *ends, LengthOf(*ends, model->where_springs_are_free), model);
+  } else {
+    tendon.Ignore();
+    for (const char* key : {"stiffness", "damping"}) {
+      model->DropNonzero(
+          tendon, key,
+          "only spatial tendons straight between two sites of two bodies are springs here");
+    }
+  }
   model->DropNonzero(tendon, "frictionloss", "there is no dry friction");
   model->DropNonzero(tendon, "armature", "tendons have no inertia");
-  if (!is_held) return;
-  const XmlElement equality = model->defaults.Of(held.at(name->text()), "", "equality");
-  equality.Attribute("name");  // the rod has the name of the tendon
-  const double length = LengthOf(*ends, model->draft->at_rest) + PolynomialOf(equality)[0];
-  if (!(length > 0.0)) element.Fail("a length that is not > 0", "one that is");
-  ImportDraft* draft = model->draft;
-  const auto& [a, b] = *ends;
-  const std::string rod = draft->NameLater(name->Name() + model->Suffix());
-  draft->AddJoint(rod, JointType::kRod, {a.body, Placement(a.at)}, {b.body, Placement(b.at)})
-      .parameter = length;
-  draft->Note(equality, "a rod here, exactly of its length");
 }
 
 // <keyframe>: conversion of coordinates and speeds from MuJoCo's joints.
@@ -280,16 +307,17 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
 }  // namespace
 
 void ReadMjcfLoops(const XmlElement& root, MjcfModel* model) {
-  const std::map<std::string, XmlElement> held = HeldTendons(root, *model);
-  ReadEquality(root, model);
-  for (const XmlElement& element : root.InSections("tendon")) {
+  std::map<std::string, XmlElement> tendons;
+  const std::vector<XmlElement> elements = root.InSections("tendon");
+  for (const XmlElement& element : elements) {
+    if (const auto name = element.Attribute("name")) tendons.emplace(name->text(), element);
+  }
+  ReadEquality(root, tendons, model);
+  const std::vector<int> groups = FixedTogether(model->draft->description);
+  for (const XmlElement& element : elements) {
     MjcfModel::References parts;
-    for (const char* kind : {"site", "joint"}) {
-      for (const XmlElement& part : element.Children({kind})) {
-        parts.emplace_back(kind, part.Attribute(kind));
-      }
-    }
-    model->ForReplicas(parts, [&] { ReadTendon(element, held, model); });
+    AddReferences(element, &parts);
+    model->ForReplicas(parts, [&] { ReadTendon(element, groups, model); });
   }
 }
 

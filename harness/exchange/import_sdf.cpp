@@ -14,20 +14,17 @@ constexpr double kSdfGravity = 9.8;     // [m/s^2]
 constexpr double kSdfDensity = 1000.0;  // [kg/m^3]
 
 constexpr DroppedReason kSdfReasons[] = {
-    {"visual", "shapes do not move anything"},
     {"collision", "there is no contact"},
     {"sensor", "there are no sensors"},
-    {"physics", "runs choose their own integrator and steps"},
     {"atmosphere enable_wind", "there is no medium"},
     {"wind fluid_added_mass", "there is no medium", true},
-    {"velocity_decay", "there is no medium: a force would have to say it", true},
     {"kinematic", "bodies move as forces make them", true},
     {"plugin", "there are no plugins", true},
     {"state", "the start is that of the poses", true},
     {"actor", "actors are no mechanism"},
     {"population", "it makes models while it runs", true},
     // without influence on the motion
-    {"audio_source audio_sink light projector particle_emitter battery scene gui audio "
+    {"visual audio_source audio_sink light projector particle_emitter battery scene gui audio "
      "magnetic_field spherical_coordinates self_collide allow_auto_disable must_be_base_link "
      "road gripper link@name model@canonical_link sdf@version",
      ""}};
@@ -122,13 +119,16 @@ SdfFrame ReadPose(const XmlElement& element, const SdfFile& file) {
   return frame;
 }
 
-/// Returns the pose of a part in its link.
-Placement PoseInLink(const XmlElement& part, const XmlElement& link, const SdfFile& file) {
-  const SdfFrame pose = ReadPose(part, file);
-  if (!pose.relative_to.empty() && pose.relative_to != link.RequiredName()) {
+/// Returns the pose of a part in its link. Only parts other than <inertial> may be relative to
+/// other frames.
+Placement PoseInLink(const XmlElement& part, const XmlElement& link, const SdfScope& scope) {
+  const SdfFrame pose = ReadPose(part, scope.file);
+  const std::string own = link.RequiredName();
+  if (pose.relative_to.empty() || pose.relative_to == own) return pose.raw;
+  if (part.tag() == "inertial") {
     part.RequiredChild("pose").Required("relative_to", "").Fail("none, or its own link");
   }
-  return pose.raw;
+  return scope.Resolve(own, part).Inverse() * scope.Resolve(pose.relative_to, part) * pose.raw;
 }
 
 /// Reads the name and frame of a link, frame or joint.
@@ -162,45 +162,55 @@ void ReadNames(SdfScope* scope) {
   }
   for (const XmlElement& child : element.Children({"model"})) {
     const std::string name = child.RequiredName();
-    if (const auto placement = child.Filled("placement_frame")) {
-      placement->Fail("none: poses are those of the model's frame");
-    }
     const auto fixed = child.Content("static");
     const bool is_static = scope->is_static || BoolOr(fixed);
-    scope->Add(name, ReadPose(child, scope->file));
     const auto& model = scope->models[name] =
         std::make_unique<SdfScope>(child, scope->file, scope->prefix + name + "::", is_static);
     ReadNames(model.get());
+    SdfFrame frame = ReadPose(child, scope->file);
+    if (const auto placed = child.Filled("placement_frame")) {
+      // the pose is the pose of this frame of the model
+      frame.raw = frame.raw * model->Resolve(placed->Name(), child).Inverse();
+    }
+    scope->Add(name, std::move(frame));
   }
 }
 
-/// Computes the mass of a link from its collision shapes.
-void ReadShapes(const XmlElement& link, const XmlElement& inertial, int body, const SdfFile& file) {
+/// Computes the mass of a link from its collision shapes, which have these poses in it.
+void ReadShapes(const XmlElement& link, const XmlElement& inertial,
+                const std::vector<Placement>& poses, int body, ImportDraft* draft) {
   const double density = NumberOr(inertial.Content("density"), kSdfDensity, kPositive);
   std::vector<PlacedSolid> parts;
   for (const XmlElement& collision : link.Children({"collision"})) {
     PlacedSolid part;
     part.solid = ShapeIn(collision.RequiredChild("geometry"));
-    part.X = PoseInLink(collision, link, file);
+    part.X = poses[parts.size()];
     part.mass = part.solid.volume * NumberOr(collision.Content("density"), density, kPositive);
     parts.push_back(part);
   }
   const BodyDescription sum = SumOf(parts);
   if (!(sum.mass > 0.0)) inertial.Fail("auto without a <collision>", "one with a volume");
-  file.draft->SetMass(body, sum.mass, sum.com, sum.inertia);
+  const double mass = NumberOr(inertial.Content("mass"), sum.mass, kPositive);
+  draft->SetMass(body, mass, sum.com, mass / sum.mass * sum.inertia);
 }
 
 /// Reads <inertial> and the other properties of a link.
-void ReadLink(const XmlElement& link, int body, bool is_static, const SdfFile& file) {
-  ImportDraft* draft = file.draft;
+void ReadLink(const XmlElement& link, int body, const SdfScope& scope) {
+  ImportDraft* draft = scope.file.draft;
   const bool has_weight = BoolOr(link.Content("gravity"), true);
-  if (!has_weight && !is_static) draft->AddLift(body, 1.0);
+  if (!has_weight && !scope.is_static) draft->AddLift(body, 1.0);
   const auto kinematic = link.Child("kinematic");
   if (kinematic && kinematic->Content().Bool()) {
     draft->Note(*kinematic, "dropped: bodies move as forces make them", true);
   }
+  if (const auto decay = link.Child("velocity_decay")) {
+    const double linear = NumberOr(decay->Content("linear"), 0.0);
+    const bool acts = linear != 0.0 || NumberOr(decay->Content("angular"), 0.0) != 0.0;
+    decay->Ignore();
+    if (acts && !scope.is_static) draft->DropWhole(*decay, "there is no medium", true);
+  }
   const auto inertial = link.Child("inertial");
-  if (is_static) {
+  if (scope.is_static) {
     if (inertial) inertial->Ignore();
     return;  // merged with the ground
   }
@@ -209,11 +219,13 @@ void ReadLink(const XmlElement& link, int body, bool is_static, const SdfFile& f
     return draft->Note(link, "no <inertial>: 1 kg and 1 kg m^2, the defaults of SDF");
   }
   if (BoolOr(inertial->Attribute("auto"))) {
-    draft->ReadMassLater(body, [=] { ReadShapes(link, *inertial, body, file); });
     inertial->Ignore();
+    std::vector<Placement> poses;
     for (const XmlElement& collision : link.Children({"collision"})) {
       draft->DropWhole(collision, "only its mass matters");
+      poses.push_back(PoseInLink(collision, link, scope));
     }
+    draft->ReadMassLater(body, [=] { ReadShapes(link, *inertial, poses, body, draft); });
     return;
   }
   const double mass = NumberOr(inertial->Content("mass"), 1.0, kNotNegative);
@@ -223,7 +235,7 @@ void ReadLink(const XmlElement& link, int body, bool is_static, const SdfFile& f
       return NumberOr(inertia->Content(name), is_moment ? 1.0 : 0.0);
     });
   }
-  const Placement X = PoseInLink(*inertial, link, file);
+  const Placement X = PoseInLink(*inertial, link, scope);
   draft->SetMass(body, mass, X.p, InTurnedAxes(X.q, I));
 }
 
@@ -235,13 +247,29 @@ void ReadLinks(SdfScope* scope) {
     const int body = draft->AddBody(child, scope->prefix + name);
     const Placement X = scope->at_rest * scope->Resolve(name, child);
     draft->at_rest[body] = X;
-    ReadLink(child, body, scope->is_static, scope->file);
+    ReadLink(child, body, *scope);
     if (scope->is_static) draft->Fix(kGround, X, body, " fixed");
   }
   for (auto& [name, model] : scope->models) {
     model->at_rest = scope->at_rest * scope->Resolve(name, model->element);
     ReadLinks(model.get());
   }
+}
+
+/// Returns the gravity, if it is given. Before 1.6 it is in the first <physics>, from where
+/// libsdformat moves it (sdf/1.6/1_5.convert).
+std::optional<XmlValue> GravityOf(const XmlElement& world, const SdfFile& file) {
+  auto gravity = world.Content("gravity");
+  const std::vector<XmlElement> profiles = world.Children({"physics"});
+  if (!gravity && file.minor < 6 && !profiles.empty()) gravity = profiles[0].Content("gravity");
+  for (const XmlElement& physics : profiles) {
+    file.draft->DropWhole(physics, "runs choose their own integrator and steps");
+    const auto other = physics.Child("gravity");
+    if (other && file.minor >= 6) {
+      file.draft->Note(*other, "dropped: from 1.6 on, <world> contains the gravity", true);
+    }
+  }
+  return gravity;
 }
 
 }  // namespace
@@ -332,7 +360,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   }
   const std::vector<XmlElement> models = top.Children({"model"});
   if (models.empty()) top.Fail("no <model>", "at least one");
-  if (const auto gravity = world ? world->Content("gravity") : std::nullopt) {
+  if (const auto gravity = GravityOf(top, file)) {
     draft->description.gravity = gravity->Vector();
   } else {
     draft->AssumeGravity(top, kSdfGravity);

@@ -11,15 +11,11 @@ constexpr double kPerpendicular = 1e-9;  // cosine tolerance for nine digits
 constexpr double kSameAxis = 1e-5;       // [rad]: axes of gearboxes repeat those of joints
 constexpr double kNoLimit = 1e15;        // the defaults are 1e16 and infinity
 
-/// Returns axes with x along the first axis, y along the second.
-Eigen::Quaterniond UniversalAxes(const XmlElement& joint, Vector3d first, Vector3d second) {
+/// Returns axes with x along the first axis, y along the second, if these are perpendicular.
+std::optional<Eigen::Quaterniond> UniversalAxes(Vector3d first, Vector3d second) {
   first.normalize();
   second.normalize();
-  if (std::abs(first.dot(second)) > kPerpendicular) {
-    joint.Fail(fmt::format("axes {:.6g} degrees apart",
-                           std::acos(first.dot(second)) * 180.0 / std::numbers::pi),
-               "perpendicular ones: others need a body with mass between them");
-  }
+  if (std::abs(first.dot(second)) > kPerpendicular) return std::nullopt;
   return FromAxes(first, second, first.cross(second));
 }
 
@@ -124,6 +120,19 @@ void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportD
   if (moves) draft->description.initial.coordinates.push_back({draft->last_joint(), values});
 }
 
+/// Reads dynamics, mimics and start of the joint that was added last. Its own axes come first.
+void ReadAxes(const std::vector<XmlElement>& axes, std::size_t num_own, const SdfScope& scope,
+              Couplings* couplings) {
+  ImportDraft* draft = scope.file.draft;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    ReadDynamics(axes[i], num_own == 1 && i == 0, draft);
+    const auto mimic = axes[i].Child("mimic");
+    if (mimic && i < num_own) couplings->mimics.push_back({*mimic, &scope, draft->last_joint()});
+    if (mimic && i >= num_own) draft->DropWhole(*mimic, "the joint has no such axis", true);
+  }
+  ReadStart(axes, num_own, draft);
+}
+
 /// Reads a <joint> between links that are bodies already.
 void ReadJoint(const XmlElement& element, const SdfScope& scope, Couplings* couplings) {
   ImportDraft* draft = scope.file.draft;
@@ -137,9 +146,9 @@ void ReadJoint(const XmlElement& element, const SdfScope& scope, Couplings* coup
   const XmlElement parent = element.RequiredChild("parent");
   const XmlElement child = element.RequiredChild("child");
   if (!known) return couplings->gearboxes.push_back({element, &scope});
-  const JointType type = *known;
-  const bool is_universal = type == kUniversal;
-  const FrameOn P = EndOf(parent, scope), Q = EndOf(child, scope);
+  JointType type = *known;
+  const FrameOn P = EndOf(parent, scope);
+  FrameOn Q = EndOf(child, scope);
   if (P.body == Q.body) {
     element.Fail("parent and child that are one body", "two different bodies");
   }
@@ -152,22 +161,34 @@ void ReadJoint(const XmlElement& element, const SdfScope& scope, Couplings* coup
                       named->second.element.tag() == "link";
   Placement X_QM = is_raw ? frame.raw : Q.X.Inverse() * X_rest;
   Placement X_PF = P.X.Inverse() * (is_raw ? Q.X * X_QM : X_rest);
+  std::vector<XmlElement> axes = element.Children({"axis"});
   const auto axis = element.Child("axis"), axis2 = element.Child("axis2");
-  const bool has_own_axis = TraitsOf(type).own_axis != '-';
-  const bool has_axis = has_own_axis || is_universal;
+  const bool has_axis = TraitsOf(type).own_axis != '-' || type == kUniversal;
   if (has_axis && !axis) element.Fail("no <axis>", "one");
   Vector3d own = Vector3d::Zero();
   if (has_axis) own = ReadAxis(*axis, scope, X_model_joint);
-  if (is_universal) {
-    if (!axis2) element.Fail("no <axis2>", "one");
-    const Eigen::Quaterniond q =
-        UniversalAxes(element, own, ReadAxis(*axis2, scope, X_model_joint));
-    X_QM.q = X_QM.q * q;
-    X_PF.q = X_PF.q * q;
+  if (type == kUniversal && !axis2) element.Fail("no <axis2>", "one");
+  if (axis2) axes.push_back(*axis2);
+  if (type == kUniversal) {
+    const Vector3d second = ReadAxis(*axis2, scope, X_model_joint);
+    if (const auto q = UniversalAxes(own, second)) {
+      X_QM.q = X_QM.q * *q;
+      X_PF.q = X_PF.q * *q;
+    } else {
+      // two hinges, with a link without mass between them
+      const int link = draft->AddLink(element, Q.body);
+      draft
+          ->AddJoint(draft->NameLater(scope.prefix + name), kRevolute, {link, X_QM}, {Q.body, X_QM})
+          .axis = second;
+      ReadAxes({*axis2}, 1, scope, couplings);
+      type = kRevolute;
+      Q.body = link;
+      axes.pop_back();
+    }
   }
   JointDescription& joint = draft->AddJoint(draft->NewJointName(element, scope.prefix + name), type,
                                             {P.body, X_PF}, {Q.body, X_QM});
-  if (has_own_axis) joint.axis = own;
+  if (TraitsOf(type).own_axis != '-') joint.axis = own;
   if (type == kHelical) joint.parameter = ReadPitch(element);
   joint.cut = scope.is_urdf();
   if (const auto physics = element.Child("physics")) {
@@ -175,19 +196,7 @@ void ReadJoint(const XmlElement& element, const SdfScope& scope, Couplings* coup
     if (simbody && BoolOr(simbody->Content("must_be_loop_joint"))) joint.cut = true;
     physics->Ignore();
   }
-  // the joint's own axes come first
-  std::vector<XmlElement> axes;
-  for (const auto& one : {axis, axis2}) {
-    if (one) axes.push_back(*one);
-  }
-  const std::size_t num_own = is_universal ? 2 : has_axis ? 1 : 0;
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    ReadDynamics(axes[i], num_own == 1 && i == 0, draft);
-    const auto mimic = axes[i].Child("mimic");
-    if (mimic && i < num_own) couplings->mimics.push_back({*mimic, &scope, draft->last_joint()});
-    if (mimic && i >= num_own) draft->DropWhole(*mimic, "the joint has no such axis", true);
-  }
-  ReadStart(axes, num_own, draft);
+  ReadAxes(axes, type == kUniversal ? 2 : has_axis ? 1 : 0, scope, couplings);
 }
 
 void ReadJoints(const SdfScope& scope, Couplings* couplings) {

@@ -8,20 +8,26 @@ namespace {
 constexpr double kGravity = 9.81;  // [m/s^2]: default, since URDF specifies none
 
 constexpr const char* kOtherProgram = "it is for another program";
+constexpr const char* kNoActuators = "there are no actuators";
 
 constexpr DroppedReason kUrdfReasons[] = {
-    {"visual", "shapes do not move anything"},
     {"collision", "there is no contact"},
     {"mujoco", kOtherProgram},
     {"limit", kNoEnds, true},
     {"safety_controller", "there is no controller"},
     {"calibration", "it says where a sensor's zero is"},
-    {"transmission", "there are no actuators"},
+    {"ros2_control", kNoActuators},
     {"gazebo", "it is for another program, and no child of <robot>", true},
     {"sensor", "there are no sensors"},
     {"dynamics@friction", kDryFriction, true},
     // without influence on the motion
-    {"material robot@version link@type", ""}};
+    {"visual material robot@version link@type", ""}};
+
+/// Contents of <gazebo> without influence on the motion.
+constexpr DroppedReason kIdleGazebo = {
+    "plugin sensor visual collision material preserveFixedJoint disableFixedJointLumping "
+    "provideFeedback selfCollide mu1 mu2 fdir1 kp kd maxVel minDepth maxContacts laserRetro",
+    kOtherProgram};
 
 /// Returns the pose in the attributes of an element.
 Placement PoseIn(const XmlElement& element, ImportDraft* draft) {
@@ -41,11 +47,12 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   if (!inertial) return;
   const Placement X = OriginOf(*inertial, draft);
   const XmlElement mass = inertial->RequiredChild("mass");
-  const XmlElement inertia = inertial->RequiredChild("inertia");
   const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
+  const auto inertia = inertial->Child("inertia");
+  if (!inertia) return draft->ReadMassLater(body, [=] { inertial->RequiredChild("inertia"); });
   const Eigen::Matrix3d I = InertiaOf([&](const char* name, bool is_moment) {
-    return is_moment ? inertia.Required(name, "a number [kg m^2]").Number()
-                     : inertia.Number(name, 0.0);
+    return is_moment ? inertia->Required(name, "a number [kg m^2]").Number()
+                     : inertia->Number(name, 0.0);
   });
   draft->SetMass(body, kg, X.p, InTurnedAxes(X.q, I));
 }
@@ -158,10 +165,36 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
 void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
   const auto mimic = read.element.Child("mimic");
   if (!mimic) return;
+  if (read.type == JointType::kWeld) {
+    return draft->DropWhole(*mimic, "a fixed joint does not move");
+  }
   const int leader = draft->JointNamed(mimic->Required("joint", "the name of a joint"));
   const double multiplier = mimic->Number("multiplier", 1.0);
   const double offset = mimic->Number("offset", 0.0);
   draft->AddMimic(*mimic, follower, {leader, multiplier}, offset);
+}
+
+/// Reads a <transmission>: Drake's inertia of a rotor, seen from the joint, is gear_ratio^2 times
+/// the given one.
+void ReadTransmission(const XmlElement& element, ImportDraft* draft) {
+  double inertia = 0.0;
+  for (const XmlElement& actuator : element.Children({"actuator"})) {
+    const auto value = [&](const char* tag, double otherwise, const Range& range) {
+      const auto child = actuator.Child(tag);
+      return child ? child->Required("value", "a number").Number(range) : otherwise;
+    };
+    const double ratio = value("drake:gear_ratio", 1.0, {});
+    inertia += ratio * ratio * value("drake:rotor_inertia", 0.0, kNotNegative);
+  }
+  draft->DropWhole(element, inertia > 0.0 ? "only its rotor_inertia matters" : kNoActuators);
+  if (inertia == 0.0) return;
+  const XmlValue name = element.RequiredChild("joint").Required("name", "the name of a joint");
+  JointDescription& joint = draft->description.joints[draft->JointNamed(name)];
+  if (NumValues(joint.type, SpaceKind::kSpatial, false) == 1) {
+    joint.rotor_inertia += inertia;
+  } else if (joint.type != JointType::kWeld) {
+    draft->Drop(element, "drake:rotor_inertia", kNoRotors);
+  }
 }
 
 /// Followers start where their leaders place them. Other joints start at zero.
@@ -215,11 +248,14 @@ void ReadGazebo(const XmlElement& root, ImportDraft* draft) {
   std::vector<XmlElement> joints;
   for (const XmlElement& gazebo : root.Children({"gazebo"})) {
     const bool is_model = !gazebo.Attribute("reference") && !gazebo.Children({"joint"}).empty();
-    if (!is_model) draft->DropWhole(gazebo, kOtherProgram, true);
-    for (const XmlElement& child : is_model ? gazebo.Children() : std::vector<XmlElement>()) {
-      if (child.tag() == "joint") joints.push_back(child);
-      if (child.tag() != "joint") draft->DropWhole(child, kOtherProgram, true);
+    bool changes_motion = false;
+    for (const XmlElement& child : gazebo.Children()) {
+      const bool acts = !kIdleGazebo.Has(child.tag()), is_joint = child.tag() == "joint";
+      changes_motion = changes_motion || acts;
+      if (is_model && is_joint) joints.push_back(child);
+      if (is_model && !is_joint) draft->DropWhole(child, kOtherProgram, acts);
     }
+    if (!is_model) draft->DropWhole(gazebo, kOtherProgram, changes_motion);
   }
   ReadGazeboJoints(root, joints, draft);
 }
@@ -246,6 +282,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);
   PlaceFollowers(draft);
+  for (const XmlElement& one : root.Children({"transmission"})) ReadTransmission(one, draft);
   for (const XmlElement& loop : root.Children({"loop_joint"})) AddLoop(loop, draft);
   for (const XmlElement& ball : root.Children({kDrakeBall})) {
     draft->AddBall(

@@ -283,14 +283,22 @@ Element* XmlDocument::Parse(std::string_view text, const std::string& file) {
                 fmt::format("more than {} elements within each other", TINYXML2_MAX_ELEMENT_DEPTH),
                 "fewer");
   }
+  if (error == tinyxml2::XML_ERROR_PARSING_ATTRIBUTE) {
+    xml::FailIn(file, xml.ErrorLineNum(), "an attribute twice, or without a value in quotes",
+                "each attribute once, as name=\"value\"");
+  }
   if (error != tinyxml2::XML_SUCCESS) {
     xml::FailIn(file, std::max(1, xml.ErrorLineNum()),
                 fmt::format("a fault of syntax ({})", xml.ErrorIDToName(error)), "well-formed XML");
   }
   for (const auto* node = xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
-    if (node->ToUnknown() == nullptr) continue;
-    xml::FailIn(file, node->GetLineNum(), "a document type or declaration of entities",
-                "none: they are not read");
+    if (node->ToUnknown() != nullptr) {
+      xml::FailIn(file, node->GetLineNum(), "a document type or declaration of entities",
+                  "none: they are not read");
+    }
+    if (node->ToElement() != nullptr && node != xml.RootElement()) {
+      xml::FailIn(file, node->GetLineNum(), "a second root element", "one");
+    }
   }
   if (xml.RootElement() == nullptr) {
     xml::FailIn(file, 1, "no element", "<mujoco>, <robot> or <sdf>");

@@ -14,7 +14,7 @@ class ImportCommandLine : public CommandLineTest {};
 TEST_F(ImportCommandLine, WritesAMechanismAndSaysWhatIsNotThere) {
   ExpectEnding(Call("import '" + kImports + "/pendulum.xml'"), 0,
                {"pendulum.xml:14: <geom name=\"floor\">: dropped: there is no contact",
-                "wrote pendulum.json: spatial, 1 bodies, 1 joints, 0 forces"});
+                "wrote pendulum.json: spatial, 1 body, 1 joint, 0 forces"});
   EXPECT_EQ(ReadMechanism(folder_ / "pendulum.json").description.bodies[1].name, "pole");
   ExpectEnding(Call("check pendulum.json"), 0, {});
 }
@@ -47,7 +47,7 @@ TEST_F(ImportCommandLine, KeepsRoundedAnglesWhereAsked) {
   ExpectEnding(Call("import turned.urdf"), 0,
                {"1.5708 is taken as 1.5707963267948966", "--keep-digits"});
   EXPECT_NEAR(angle(), 1.5707963267948966, 1e-15);
-  ExpectEnding(Call("import turned.urdf --keep-digits"), 0, {"1 notes"});
+  ExpectEnding(Call("import turned.urdf --keep-digits"), 0, {"1 note,"});
   EXPECT_NEAR(angle(), 1.5708, 1e-15);
 }
 

@@ -250,6 +250,9 @@ TEST(ImportHostile, EntitiesAndDocumentTypesAreRefused) {
   ExpectRefusal("", {"file.xml:1", "well-formed XML"});
   ExpectRefusal("   ", {"file.xml:1"});
   ExpectRefusal("<mujoco><worldbody></mujoco>", {"file.xml:1", "fault of syntax"});
+  ExpectRefusal("<mujoco/>\n<mujoco/>", {"file.xml:2: found a second root element, expected one"});
+  ExpectRefusal("<mujoco>\n<option a=\"\" a=\"\"/></mujoco>",
+                {"file.xml:2: found an attribute twice, or without a value in quotes"});
   ExpectRefusal("<mujoco>\xff</mujoco>", {"file.xml:1"});
   ExpectRefusal(std::string("<mujoco>\0</mujoco>", 18), {"file.xml:1"});
 }

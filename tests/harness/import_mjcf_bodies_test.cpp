@@ -168,9 +168,32 @@ TEST(ImportMjcf, GravityIsThatOfTheOptionAndOfFlags) {
   EXPECT_EQ(Read("<joint/>", "<option gravity=\"1 2 3\"/>").description.gravity.y(), 2.0);
   EXPECT_TRUE(Read("<joint/>", "<option><flag gravity=\"disable\"/></option>")
                   .description.gravity.isZero());
+  // the last value of a flag counts, whatever gravity follows
+  EXPECT_TRUE(
+      Read("<joint/>", "<option><flag gravity=\"disable\"/></option><option gravity=\"0 0 -3\"/>")
+          .description.gravity.isZero());
+  const auto flags = [](const std::string& first, const std::string& second) {
+    return Read("<joint name=\"j\"/>",
+                "<option><flag " + first + "/></option><option><flag " + second + "/></option>",
+                "<equality><joint joint1=\"j\"/></equality>")
+        .description;
+  };
+  EXPECT_EQ(flags("gravity=\"disable\"", "gravity=\"enable\"").gravity.z(), -9.81);
+  EXPECT_TRUE(flags("constraint=\"disable\"", "equality=\"enable\"").joints[0].motions.empty());
+  EXPECT_EQ(flags("equality=\"disable\"", "equality=\"enable\"").joints[0].motions.size(), 1u);
   // a body without weight is pushed up by it
   const Imported light = Read("<joint/>", "", "", "gravcomp=\"0.5\"");
   EXPECT_NEAR(ForcesOf<PointForce>(light)[0].force.z(), 0.5 * 9.81, 1e-15);
+}
+
+TEST(ImportMjcf, ShellsThatAreFixedAreAccepted) {
+  const auto model = [](const std::string& joint) {
+    return "<mujoco><worldbody><body>" + joint +
+           "<geom size=\"0.1\" shellinertia=\"true\"/><body><joint/>" + std::string(kInertial) +
+           "</body></body></worldbody></mujoco>";
+  };
+  EXPECT_EQ(Refusal(model("")), "");
+  ExpectRefusal(model("<joint/>"), {"shellinertia: found \"true\""});
 }
 
 /// Where a joint stands in the body that it moves, which the file draws at the origin, and its

@@ -37,6 +37,30 @@ TEST(ImportMjcf, EqualitiesCloseLoopsWhereTheFileDrawsThem) {
   EXPECT_EQ(off.description.joints.size(), 2u);
 }
 
+TEST(ImportMjcf, WeldsCloseAtAnchorAndRelpose) {
+  const auto last = [](const std::string& attributes) {
+    return Two("<equality><weld body1=\"a\" body2=\"b\" " + attributes + "/></equality>")
+        .description.joints.back();
+  };
+  // x1 + R1 relpose = x2 + R2 anchor
+  const JointDescription posed = last("anchor=\"-0.5 0 0\" relpose=\"0.25 0 1 1 0 0 1\"");
+  EXPECT_EQ(posed.type, JointType::kWeld);
+  EXPECT_EQ(posed.from.position, Eigen::Vector3d(0.25, 0, 1));
+  EXPECT_NEAR(posed.from.rotation.z(), kPi / 2, kEps);
+  EXPECT_EQ(posed.to.position, Eigen::Vector3d(-0.5, 0, 0));
+  EXPECT_TRUE(posed.to.rotation.isZero(0.0));
+  // b is drawn at (-1, 2, 0) in a, turned by a quarter: its x is the y of a
+  const Eigen::Vector3d drawn(-1, 1.5, 0);
+  EXPECT_LE((last("anchor=\"-0.5 0 0\"").from.position - drawn).norm(), 10 * kEps);
+  // without torque, only the points coincide
+  const JointDescription ball = last("anchor=\"-0.5 0 0\" torquescale=\"0\"");
+  EXPECT_EQ(ball.type, JointType::kSpherical);
+  EXPECT_LE((ball.from.position - drawn).norm(), 10 * kEps);
+  EXPECT_EQ(ball.to.position, Eigen::Vector3d(-0.5, 0, 0));
+  EXPECT_TRUE(ball.from.rotation.isZero(0.0));
+  EXPECT_EQ(last("torquescale=\"0.5\"").type, JointType::kWeld);
+}
+
 TEST(ImportMjcf, WeldsOfSitesMakeTheirFramesCoincide) {
   const auto model = [](const std::string& equality) {
     return "<mujoco><worldbody><site name=\"s0\" pos=\"0 0 3\"/><body name=\"a\" pos=\"1 0 "
@@ -112,9 +136,77 @@ TEST(ImportMjcf, FixedTendonsOfConstantLengthAreCouplings) {
   ASSERT_EQ(coupling.parts.size(), 3u);
   EXPECT_EQ(coupling.parts[1].joint, 1);
   EXPECT_EQ(coupling.parts[2].ratio, -3.0);
+  // a fixed tendon alone has no effect without a force
   const Imported alone = ImportText(model + "</mujoco>", "file.xml");
   EXPECT_TRUE(alone.description.couplings.empty());
-  ExpectNote(alone, "<fixed name=\"t\">", "only spatial tendons straight");
+  EXPECT_TRUE(alone.notes.empty());
+  const Imported stiff = ImportText(
+      "<mujoco><default><tendon stiffness=\"1\"/></default>" + model.substr(8) + "</mujoco>",
+      "file.xml");
+  ExpectNote(stiff, "<fixed name=\"t\"> stiffness", "only spatial tendons straight");
+}
+
+TEST(ImportMjcf, TwoFixedTendonsAreOneCoupling) {
+  const auto model = [](const std::string& attributes) {
+    return "<mujoco>" + std::string(kTwoBodies) +
+           R"(<tendon><fixed name="t"><joint joint="j" coef="2"/></fixed><fixed name="u">
+      <joint joint="k" coef="-1"/><joint joint="j" coef="0.5"/></fixed><spatial name="spring"
+      stiffness="1"><site site="s1"/><site site="s2"/></spatial></tendon><equality>
+      <tendon name="e" )" +
+           attributes + "/></equality></mujoco>";
+  };
+  // 2 j = 0.1 + 3 (0.5 j - k)
+  const Imported both =
+      ImportText(model("tendon1=\"t\" tendon2=\"u\" polycoef=\"0.1 3\""), "file.xml");
+  ASSERT_EQ(both.description.couplings.size(), 1u);
+  const CouplingDescription& coupling = both.description.couplings[0];
+  EXPECT_EQ(coupling.name, "t");
+  EXPECT_EQ(coupling.offset, 0.1);
+  ASSERT_EQ(coupling.parts.size(), 2u);
+  EXPECT_EQ(coupling.parts[0].joint, 0);
+  EXPECT_EQ(coupling.parts[0].ratio, 0.5);
+  EXPECT_EQ(coupling.parts[1].joint, 1);
+  EXPECT_EQ(coupling.parts[1].ratio, 3.0);
+  ExpectNote(both, "<tendon name=\"e\">", "imposed exactly");
+  EXPECT_EQ(both.notes.size(), 1u);
+  const auto drop = [&](const std::string& attributes, const std::string& element,
+                        const std::string& reason) {
+    const Imported dropped = ImportText(model(attributes), "file.xml");
+    EXPECT_TRUE(dropped.description.couplings.empty());
+    ASSERT_EQ(dropped.notes.size(), 1u);
+    ExpectNote(dropped, element, reason);
+    EXPECT_TRUE(dropped.notes[0].changes_motion);
+    EXPECT_EQ(ForcesOf<SpringDamper>(dropped).size(), 1u);
+  };
+  drop("tendon1=\"t\" tendon2=\"u\" polycoef=\"0 1 1\"", "<tendon name=\"e\"> polycoef", "linear");
+  drop("tendon1=\"t\" tendon2=\"spring\"", "<tendon name=\"e\">", "a freedom more");
+  drop("tendon1=\"spring\" tendon2=\"spring\"", "<tendon name=\"e\">", "a freedom more");
+  const Imported same = ImportText(model("tendon1=\"t\" tendon2=\"t\""), "file.xml");
+  EXPECT_TRUE(same.description.couplings.empty());
+  ExpectNote(same, "<tendon name=\"e\">", "all coefficients are 0");
+  EXPECT_EQ(same.notes.size(), 1u);
+  ExpectRefusal(model("tendon1=\"sprin\""), {"<tendon name=\"e\"> tendon1: found \"sprin\"",
+                                             "name of a tendon (did you mean \"spring\"?)"});
+  ExpectRefusal(model("tendon1=\"t\" tendon2=\"x\""), {"tendon2: found \"x\""});
+  ExpectRefusal(model(""), {"found no \"tendon1\""});
+}
+
+TEST(ImportMjcf, RangesOfSpringsMatterWithAForceOnly) {
+  const auto model = [](const std::string& before, const std::string& attributes,
+                        const std::string& joint) {
+    return "<mujoco>" + before + "<worldbody><site name=\"s0\"/><body pos=\"1 0 0\">" + joint +
+           kInertial + "<site name=\"s1\"/><body><joint/>" + kInertial +
+           "</body></body></worldbody><tendon><spatial springlength=\"0 0.5\" " + attributes +
+           "><site site=\"s0\"/><site site=\"s1\"/></spatial></tendon></mujoco>";
+  };
+  const std::string off = "<option><flag spring=\"disable\"/></option>", stiff = "stiffness=\"1\"";
+  ExpectRefusal(model("", stiff, "<joint/>"), {"one length"});
+  EXPECT_EQ(Refusal(model("", "damping=\"1\"", "<joint/>")), "");
+  EXPECT_EQ(Refusal(model(off, stiff, "<joint/>")), "");
+  const Imported fixed = ImportText(model("", stiff, ""), "file.xml");
+  EXPECT_TRUE(fixed.description.forces.empty());
+  ExpectNote(fixed, "<spatial>", "fixed together");
+  EXPECT_FALSE(fixed.notes[0].changes_motion);
 }
 
 TEST(ImportMjcf, CoordinatesThatStayAreImposedExactlyToo) {

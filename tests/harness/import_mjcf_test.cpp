@@ -85,7 +85,7 @@ TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
   <extension><plugin plugin="p"/></extension>
   <deformable/>
   <equality><flex flex="f"/></equality>
-  <tendon><fixed name="f"><joint joint="l" coef="1"/></fixed></tendon>
+  <tendon><fixed name="f" damping="1"><joint joint="l" coef="1"/></fixed></tendon>
   <actuator><general joint="j"/></actuator>
   <keyframe><key/><key name="later"/></keyframe>
   <surprise/>
@@ -112,13 +112,22 @@ TEST(ImportMjcf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<extension>", "no plugins");
   ExpectNote(imported, "<deformable>", "rigid");
   ExpectNote(imported, "<flex>", "no constraint of this kind");
-  ExpectNote(imported, "<fixed name=\"f\">", "straight between two sites");
+  ExpectNote(imported, "<fixed name=\"f\"> damping", "straight between two sites");
   ExpectNote(imported, "<general>", "control is 0");
   ExpectNote(imported, "<key name=\"later\">", "first <key>");
   ExpectNote(imported, "<surprise>", "not known");
   // in the order of the file, each with its line
   EXPECT_TRUE(std::ranges::is_sorted(imported.notes, {}, &ImportNote::line));
   EXPECT_EQ(imported.notes.front().line, 2);
+}
+
+TEST(ImportMjcf, DefaultsOfMeshesWithoutUseHaveNoNote) {
+  const Imported imported = ImportText(
+      "<mujoco><default><mesh scale=\"0.1 0.1 0.1\"/></default><asset><mesh file=\"m.stl\"/>"
+      "</asset><worldbody><body><joint/>" +
+          std::string(kInertial) + "<geom type=\"mesh\" mesh=\"m\"/></body></worldbody></mujoco>",
+      "file.xml");
+  EXPECT_FALSE(HasNote(imported, "<mesh>", ""));
 }
 
 TEST(ImportMjcf, WhatCannotBeSaidIsRefusedWithItsLine) {

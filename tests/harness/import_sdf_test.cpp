@@ -58,10 +58,91 @@ TEST(ImportSdf, JointsAreTheKindsOfOurs) {
     const Imported imported = Read(Link("a") + Joint("j", theirs, "world", "a", inside));
     EXPECT_EQ(ToString(JointNamed(imported, "j").type), ours);
   }
-  ExpectRefusal(
-      Sdf(Link("a") + Joint("j", "universal", "world", "a",
-                            "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>1 1 0</xyz></axis2>")),
-      {"file.xml:4: <joint name=\"j\">: found axes 45 degrees apart", "perpendicular"});
+}
+
+TEST(ImportSdf, UniversalJointsOfOtherAxesAreTwoHinges) {
+  const Imported imported = Read(
+      Link("a", "1 0 0 0 0 0") +
+          Joint("j", "universal", "world", "a",
+                "<pose>0 1 0 0 0 0</pose><axis><xyz>1 0 0</xyz><initial_position>0.5"
+                "</initial_position></axis><axis2><xyz>1 1 0</xyz><dynamics><damping>2</damping>"
+                "</dynamics></axis2>"),
+      "1.6");
+  ASSERT_EQ(imported.description.bodies.size(), 3u);
+  ASSERT_EQ(imported.description.joints.size(), 2u);
+  const JointDescription &inner = JointNamed(imported, "j"),
+                         &outer = imported.description.joints[0];
+  EXPECT_EQ(inner.type, JointType::kRevolute);
+  EXPECT_EQ(inner.from.body, kGround);
+  EXPECT_EQ(inner.from.position, Eigen::Vector3d(1, 1, 0));
+  EXPECT_EQ(inner.axis, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(outer.type, JointType::kRevolute);
+  EXPECT_EQ(outer.from.body, inner.to.body);
+  EXPECT_EQ(imported.description.bodies[static_cast<std::size_t>(outer.to.body)].name, "a");
+  EXPECT_EQ(outer.to.position, Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(outer.axis, Eigen::Vector3d(1, 1, 0));
+  ASSERT_EQ(ForcesOf<JointDamper>(imported).size(), 1u);
+  EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].joint, 0);
+  ASSERT_EQ(imported.description.initial.coordinates.size(), 1u);
+  EXPECT_EQ(imported.description.initial.coordinates[0].joint, 1);
+  ExpectNote(imported, "<joint name=\"j\">", "a link without mass");
+}
+
+TEST(ImportSdf, PosesOfModelsAreOfTheirPlacementFrame) {
+  const Imported imported = ImportText(
+      "<sdf version=\"1.9\"><model name=\"m\" placement_frame=\"f\"><pose>1 2 3 0 0 0</pose>" +
+          Link("a", "0.5 0 0 0 0 0") +
+          "<frame name=\"f\" attached_to=\"a\"><pose>0 0 1 0 0 1.5707963267948966</pose></frame>" +
+          Joint("j", "fixed", "world", "a", "") + "</model></sdf>",
+      "file.sdf");
+  // f stands at (0.5, 0, 1) in the model, turned by a quarter, and at (1, 2, 3) in the world
+  const JointDescription& joint = JointNamed(imported, "j");
+  EXPECT_LE((joint.from.position - Eigen::Vector3d(1, 2, 2)).norm(), 1e-15);
+  EXPECT_NEAR(joint.from.rotation.z(), -kPi / 2, 1e-15);
+}
+
+TEST(ImportSdf, GravityIsInPhysicsBeforeItIsInTheWorld) {
+  const auto world = [](const std::string& version, const std::string& inside) {
+    return ImportText("<sdf version=\"" + version + "\"><world name=\"w\">" + inside +
+                          "<model name=\"m\">" + Link("a") + "</model></world></sdf>",
+                      "file.sdf");
+  };
+  const std::string moon = "<physics><gravity>0 0 -1.62</gravity></physics>";
+  for (const char* version : {"1.4", "1.5"}) {
+    const Imported imported = world(version, moon);
+    EXPECT_EQ(imported.description.gravity.z(), -1.62);
+    EXPECT_FALSE(HasNote(imported, "<world", "gravity"));
+  }
+  // the first one counts
+  EXPECT_EQ(
+      world("1.5", moon + "<physics><gravity>0 0 -1</gravity></physics>").description.gravity.z(),
+      -1.62);
+  EXPECT_EQ(world("1.5", moon + "<gravity>0 0 -2</gravity>").description.gravity.z(), -2.0);
+  const Imported later = world("1.6", moon);
+  EXPECT_EQ(later.description.gravity.z(), -9.8);
+  ExpectNote(later, "<gravity>", "from 1.6 on");
+}
+
+TEST(ImportSdf, AutomaticMassesAreScaledToTheGivenOne) {
+  const auto body = [](const std::string& mass) {
+    return Read(
+               "<link name=\"a\"><inertial auto=\"true\">" + mass +
+               "</inertial><collision name=\"c\"><geometry><box><size>1 1 1</size></box></geometry>"
+               "</collision></link>")
+        .description.bodies[1];
+  };
+  EXPECT_EQ(body("").mass, 1000.0);
+  EXPECT_EQ(body("<mass>5</mass>").mass, 5.0);
+  EXPECT_NEAR(body("<mass>5</mass>").inertia(0, 0), 5.0 / 6.0, 1e-15);
+}
+
+TEST(ImportSdf, DecayOfVelocitiesChangesTheMotionUnlessItIsZero) {
+  const auto read = [](const std::string& linear) {
+    return Read("<link name=\"a\"><velocity_decay><linear>" + linear +
+                "</linear><angular>0</angular></velocity_decay>" + kInertial + "</link>");
+  };
+  EXPECT_FALSE(HasNote(read("0"), "<velocity_decay>", ""));
+  ExpectNote(read("0.1"), "<velocity_decay>", "no medium");
 }
 
 TEST(ImportSdf, PosesAreRelativeToWhatTheyName) {
@@ -239,7 +320,8 @@ TEST(ImportSdf, EveryKindOfDroppedElementHasItsNote) {
       "<sdf version=\"1.6\"><world "
       "name=\"w\"><physics/><problem/><state/><plugin/><wind/><strange/>"
       "<model name=\"m\"><self_collide>0</self_collide><plugin/><link name=\"a\">"
-      "<kinematic>true</kinematic><velocity_decay/><visual name=\"v\"/><collision name=\"c\"/>"
+      "<kinematic>true</kinematic><velocity_decay><linear>1</linear></velocity_decay><visual "
+      "name=\"v\"/><collision name=\"c\"/>"
       "<sensor name=\"s\"/></link>" +
           Joint("j", "revolute", "world", "a",
                 "<axis><limit><lower>-1</lower><upper>inf</upper></limit><odd/></axis>") +
@@ -252,7 +334,7 @@ TEST(ImportSdf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<strange>", "not known");
   ExpectNote(imported, "<kinematic>", "as forces make them");
   ExpectNote(imported, "<velocity_decay>", "no medium");
-  ExpectNote(imported, "<visual name=\"v\">", "shapes");
+  EXPECT_FALSE(HasNote(imported, "<visual", ""));
   ExpectNote(imported, "<collision name=\"c\">", "no contact");
   ExpectNote(imported, "<sensor name=\"s\">", "no sensors");
   ExpectNote(imported, "<limit>", "without ends");

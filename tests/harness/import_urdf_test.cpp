@@ -148,7 +148,7 @@ TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
             Joint("k", "floating", "a", "b", "<dynamics damping=\"1\"/><mimic joint=\"j\"/>") +
             "<transmission/><gazebo/><material name=\"m\"/><sensor/>"),
       "file.urdf");
-  ExpectNote(imported, "<visual>", "shapes");
+  EXPECT_FALSE(HasNote(imported, "<visual>", ""));
   ExpectNote(imported, "<collision>", "no contact");
   ExpectNote(imported, "<odd>", "not known");
   ExpectNote(imported, "<limit>", "without ends");
@@ -162,6 +162,47 @@ TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
   ExpectNote(imported, "<sensor>", "no sensors");
   ASSERT_EQ(ForcesOf<JointDamper>(imported).size(), 1u);
   EXPECT_EQ(ForcesOf<JointDamper>(imported)[0].damping, 0.5);
+}
+
+TEST(ImportUrdf, PartsOfOtherProgramsChangeTheMotionIfTheyAct) {
+  const auto changes = [](const std::string& part) {
+    const Imported imported = ImportText(
+        Robot(Link("world", "") + Link("a") + Joint("j", "continuous", "world", "a") + part),
+        "file.urdf");
+    return std::ranges::any_of(imported.notes, &ImportNote::changes_motion);
+  };
+  EXPECT_FALSE(changes("<ros2_control name=\"x\"><joint name=\"j\"/></ros2_control>"));
+  EXPECT_FALSE(changes("<gazebo><plugin name=\"c\"/></gazebo>"));
+  EXPECT_FALSE(
+      changes("<gazebo reference=\"j\"><preserveFixedJoint>true</preserveFixedJoint></gazebo>"));
+  EXPECT_TRUE(
+      changes("<gazebo reference=\"a\"><mu1>1</mu1><turnGravityOff>1</turnGravityOff></gazebo>"));
+}
+
+TEST(ImportUrdf, RotorsOfTransmissionsMoveWithTheirJoints) {
+  const auto robot = [](const std::string& type, const std::string& joint = "j") {
+    return Robot(Link("world", "") + Link("a") + Joint("j", type, "world", "a") + Link("b") +
+                 Joint("k", "continuous", "a", "b") + "<transmission><joint name=\"" + joint +
+                 "\"/><actuator><drake:rotor_inertia value=\"0.5\"/><drake:gear_ratio value=\"4\"/>"
+                 "</actuator></transmission>");
+  };
+  const Imported geared = ImportText(robot("continuous"), "file.urdf");
+  EXPECT_EQ(JointNamed(geared, "j").rotor_inertia, 8.0);
+  EXPECT_EQ(JointNamed(geared, "k").rotor_inertia, 0.0);
+  ExpectNote(geared, "<transmission>", "only its rotor_inertia");
+  ExpectNote(ImportText(robot("floating"), "file.urdf"), "<transmission> drake:rotor_inertia",
+             "only joints with one coordinate");
+  EXPECT_FALSE(HasNote(ImportText(robot("fixed"), "file.urdf"), "rotor_inertia", ""));
+  ExpectRefusal(robot("fixed", "i"), {"<joint name=\"i\"> name: found \"i\""});
+}
+
+TEST(ImportUrdf, LinksThatAreFixedNeedNoInertia) {
+  const auto robot = [](const std::string& type) {
+    return Robot(Link("world", "") + Link("a", "<inertial><mass value=\"5\"/></inertial>") +
+                 Link("b") + Joint("i", type, "world", "a") + Joint("j", "continuous", "a", "b"));
+  };
+  EXPECT_EQ(Refusal(robot("fixed")), "");
+  ExpectRefusal(robot("continuous"), {"<inertial>: found no <inertia>"});
 }
 
 TEST(ImportUrdf, MimicsAreCouplings) {
@@ -193,6 +234,12 @@ TEST(ImportUrdf, MimicsAreCouplings) {
   ExpectRefusal(robot("<mimic joint=\"z\"/>"),
                 {"<mimic> joint: found \"z\"", "a joint in this file"});
   ExpectRefusal(robot("<mimic joint=\"k\"/>"), {"<mimic>: found a joint that follows itself"});
+  const Imported fixed = ImportText(
+      Robot(Link("world", "") + Link("a") + Link("b") + Joint("j", "continuous", "world", "a") +
+            Joint("k", "fixed", "a", "b", "<mimic joint=\"j\"/>")),
+      "file.urdf");
+  ExpectNote(fixed, "<mimic>", "does not move");
+  EXPECT_TRUE(std::ranges::none_of(fixed.notes, &ImportNote::changes_motion));
 }
 
 TEST(ImportUrdf, CyclesOfMimicsAreRefused) {

@@ -386,8 +386,11 @@ TEST_F(MeshFiles, MjcfGeomsTakeTheMassOfTheirMesh) {
 }
 
 TEST_F(MeshFiles, SdfLinksTakeTheMassOfTheirShapes) {
-  const auto model = [](const std::string& inside) {
-    return "<sdf version=\"1.11\"><model name=\"m\"><link name=\"arm\"><inertial "
+  const auto model = [](const std::string& inside, const std::string& link_pose = "") {
+    return "<sdf version=\"1.11\"><model name=\"m\"><frame name=\"end\"><pose>0 0 3 0 0 "
+           "1.5707963267948966</pose></frame><link name=\"arm\">" +
+           link_pose +
+           "<inertial "
            "auto=\"true\"><density>1200</density>"
            "</inertial>" +
            inside +
@@ -395,8 +398,8 @@ TEST_F(MeshFiles, SdfLinksTakeTheMassOfTheirShapes) {
            "<child>arm</child><axis><xyz>0 1 0</xyz></axis></joint></model></sdf>";
   };
   const auto shape = [](const std::string& geometry, const std::string& more = "") {
-    return "<collision name=\"c" + more + "\">" + more + "<geometry>" + geometry +
-           "</geometry></collision>";
+    return "<collision name=\"c" + std::to_string(more.size()) + "\">" + more + "<geometry>" +
+           geometry + "</geometry></collision>";
   };
   // a beam of 1.92 kg and a bob of 5.02655 kg
   const Imported pendulum = ImportText(
@@ -407,6 +410,19 @@ TEST_F(MeshFiles, SdfLinksTakeTheMassOfTheirShapes) {
   EXPECT_NEAR(body.mass, 6.946548, 1e-6);
   EXPECT_NEAR(body.com.z(), -0.861802, 1e-6);
   EXPECT_NEAR(body.inertia(1, 1), 0.527692, 1e-6);
+  // shapes relative to other frames: (0.2, 0, 0) in "end" is (0, 0.2, 3) in the model
+  const std::string turned = "<pose>0 0.2 1 1.5707963267948966 0 0</pose>";  // y, z: z, -y
+  const BodyDescription placed =
+      ImportText(model(shape("<box><size>0.04 0.04 1.0</size></box>",
+                             "<pose relative_to=\"end\">0.2 0 0 0 0 0</pose>"),
+                       turned),
+                 "m.sdf")
+          .description.bodies.at(1);
+  EXPECT_LT((placed.com - Eigen::Vector3d(0.0, 2.0, 0.0)).norm(), 1e-14);
+  EXPECT_NEAR(placed.inertia(1, 1), 1.92 * 2 * 0.04 * 0.04 / 12, 1e-15);  // along the link's y
+  ExpectRefusal(model(shape("<sphere><radius>1</radius></sphere>",
+                            "<pose relative_to=\"ends\">0 0 0 0 0 0</pose>")),
+                {"the frame \"ends\", which is not there"});
   const auto mass_of = [&](const std::string& inside) {
     return ImportText(model(inside), "m.sdf").description.bodies.at(1).mass;
   };

@@ -113,13 +113,16 @@ class Assembler {
       return (left - J * change).template lpNorm<Eigen::Infinity>() > least ||
              change.norm() > kSmallChange * start_.u.norm();
     };
-    const bool fits = misfit <= least || (misfit <= description_.accuracy * size && is_rounded());
+    bool fits = misfit <= least;
+    const bool is_rounding = !fits && is_rounded();
+    fits = fits || (is_rounding && misfit <= description_.accuracy * size);
     start_.u = start_.u.cwiseProduct(units_.columns);
     start_.speed_residual = InSi(left, units);
     if (fits) return;
     start_.outcome = Outcome::kInconsistentStart;
-    start_.message = mechanism_.name() + ": " +
-                     DescribeConflict(description_, kinematics_, {left, units, true, given_cut_});
+    UnsatisfiedConstraints unmet{left, units, true, given_cut_};
+    if (is_rounding) unmet.accuracy = misfit / size;
+    start_.message = mechanism_.name() + ": " + DescribeConflict(description_, kinematics_, unmet);
   }
 
   const MechanismDescription& description_;

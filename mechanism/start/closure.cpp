@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -26,8 +25,6 @@ constexpr double kDrawn = 7.0;
 /// changes by its own size, 1e-5 at most: a step moves by 1e-5^2 / kStayDamping^2 = 1e-6. Steps
 /// that reduce the residual by less than kSlow end the iteration.
 constexpr double kStayDamping = 1e-2, kSlow = 0.1;
-/// Gaps beyond the accuracy by less than this factor have a hint.
-constexpr double kHint = 100.0;
 
 /// The search ends when so many starts in a row have found nothing nearer: a branch that every
 /// fourth start leads to is missed by one search in 1e6. Positions count as nearer beyond round-off
@@ -109,15 +106,9 @@ class Closure {
       closed = closed || IsRounded(e);
       if (!closed) {
         start->outcome = Outcome::kInconsistentStart;
-        start->message =
-            mechanism_.name() + ": " +
-            DescribeConflict(description_, kinematics_, {e, row_units, false, guesses_.held()});
-        if (const double needed = AccuracyOf(e); needed < kHint * description_.accuracy) {
-          char hint[64];
-          std::snprintf(hint, sizeof hint, "; it closes with an \"accuracy\" of %.1e",
-                        1.05 * needed);
-          start->message += hint;
-        }
+        start->message = mechanism_.name() + ": " +
+                         DescribeConflict(description_, kinematics_,
+                                          {e, row_units, false, guesses_.held(), AccuracyOf(e)});
       }
     }
     start->q = q;

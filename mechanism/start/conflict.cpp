@@ -71,10 +71,19 @@ class Conflict {
     std::ranges::stable_sort(found_, [](const OfJoint& a, const OfJoint& b) {
       return a.rod != b.rod ? a.rod : a.scaled > b.scaled;
     });
-    return Sentence() + Given();
+    return Sentence() + Given() + Hint();
   }
 
  private:
+  std::string Hint() const {
+    constexpr double kHint = 100.0;
+    if (!(unmet_.accuracy < kHint * description_.accuracy)) return "";
+    char hint[64];
+    std::snprintf(hint, sizeof hint, "; it closes with an \"accuracy\" of %.1e",
+                  1.05 * unmet_.accuracy);
+    return hint;
+  }
+
   void Add(int row, const Direction<Space, double>& direction, OfJoint& joint) {
     const double scaled = std::abs(unmet_.rows[row]);
     if (scaled < joint.scaled) return;

@@ -1,6 +1,7 @@
 // Reasons for a failed assembly: names the joints in conflict.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct UnsatisfiedConstraints {
   VectorX<double> units;               ///< [m] or [rad] each
   bool speeds = false;                 ///< of speeds: all of it per second
   std::vector<OfCutJoint> extra = {};  ///< fixed or given
+  /// Accuracy of the input with which they are satisfied; the message names it if it is near.
+  double accuracy = std::numeric_limits<double>::infinity();
 };
 
 /// Names the joints and couplings in conflict with their residuals and units, rods first, then the

@@ -134,7 +134,7 @@ std::string WhyStuck(const Mechanism<Space, double>& mechanism, const VectorX<do
   return "this position is singular, the " + std::to_string(first_order) +
          (first_order == 1 ? " speed that its" : " independent speeds that its") +
          " constraints leave lead" + (first_order == 1 ? "s" : "") +
-         " nowhere: what is tried next to it falls back to it";
+         " nowhere: what is tried next to it returns to it";
 }
 
 }  // namespace

@@ -248,6 +248,26 @@ TEST(RoundedInput, DrivenLinkagesExchangeNoEnergyPerTurn) {
   }
 }
 
+/// Four decimals: the position closes with the default accuracy, but the given speed does not fit.
+TEST(RoundedInput, SpeedsThatDoNotFitNameTheAccuracyWithWhichTheyDo) {
+  MechanismDescription description =
+      ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /
+                    "tests/reference/rounded/waldron-four-digits.json")
+          .description;
+  const auto start = [&description] {
+    const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
+    return Assemble<Spatial>(description, mechanism);
+  };
+  const std::string message = start().message;
+  EXPECT_NE(message.find("no speeds that fit"), std::string::npos) << message;
+  const std::string hint = "it closes with an \"accuracy\" of ";
+  const std::size_t at = message.find(hint);
+  ASSERT_NE(at, std::string::npos) << message;
+  description.accuracy = std::stod(message.substr(at + hint.size()));
+  EXPECT_LT(description.accuracy, 1e-3);
+  EXPECT_EQ(start().outcome, Outcome::kFinished) << start().message;
+}
+
 /// Positions where the directions released elsewhere would leave the joint open.
 TEST(RoundedInput, StartsOfLinkagesAreClosed) {
   for (const double angle : {2.4, 2.5, 5.9}) {

@@ -162,7 +162,8 @@ void RequireMotion(const AdviseCommand& command, const MechanismDescription& use
 }
 
 std::string WhatWasTried(const Advice& advice) {
-  std::string text = fmt::format("{} methods in {:.3g} s", advice.trials, advice.pilot_s);
+  std::string text =
+      fmt::format("{} in {:.3g} s", WithCount(advice.trials, "method"), advice.pilot_s);
   if (advice.untried > 0) {
     text += fmt::format(", {} not tried: time limit reached (--cpu-limit)", advice.untried);
   }
@@ -276,7 +277,7 @@ Record RowOfModel(const AdviseCommand& command, const MechanismFile& file,
   Record row;
   row.Set("model", model.name);
   const auto refuse = [&](const std::string& why) {
-    row.Set("verdict", "refused: " + why);
+    row.Set("verdict", "rejected: " + why);
     return row;
   };
   // the same times as the full model
@@ -323,7 +324,7 @@ void PrintModels(const AdviseCommand& command, const MechanismFile& file,
   }
   Print("\nSimpler models, compared with the certified motion of the full model\n\n");
   if (table.rows.empty()) {
-    Print("  none: nothing can be left out (loopbench simplify says why)\n");
+    Print("  none: nothing can be left out (see loopbench simplify)\n");
     return;
   }
   PrintText(ToScreen(table));

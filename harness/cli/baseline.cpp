@@ -63,7 +63,7 @@ void RequirePrograms(const BaselineCommand& command) {
     if (tried.error == 0) continue;
     Reject("--counts {}: {}{}", command.counts.string(), tried.Failure(program),
            program == "valgrind" ? "; install it: apt-get install valgrind"
-                                 : "; --count-program says where it is");
+                                 : "; set its path with --count-program");
   }
 }
 
@@ -239,7 +239,7 @@ int Baseline(const BaselineCommand& command, const Typed& typed) {
     return PrintComparison(command.dir, work / kResults, typed);
   }
   WriteFileAtomically(baseline, ReadFile(work / kResults));
-  Print("renewed {}: {} records\n", baseline.string(), Load(baseline).size());
+  Print("renewed {}: {}\n", baseline.string(), WithCount(Load(baseline).size(), "record"));
   return 0;
 }
 

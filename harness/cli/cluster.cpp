@@ -116,7 +116,7 @@ int SubmitAgain(const SubmitCommand& command) {
   }
   std::string problem;
   const auto queued = QueuedTasks(run.array_job, &problem);
-  if (!queued) throw std::runtime_error("which parts run cannot be asked: " + problem);
+  if (!queued) throw std::runtime_error("the state of the parts is not available: " + problem);
   std::erase_if(parts, [&queued](int part) { return queued->contains(part); });
   if (parts.empty()) {
     Print("{}: every part is done or in the queue\n", command.folder.string());
@@ -232,16 +232,17 @@ int Submit(SubmitCommand command) {
                                      {"collect.sh", CollectScript(run, folder)}}) {
       PrintText(fmt::format("==> {} <==\n{}\n", (folder / name).string(), text));
     }
-    Print("{} cases in {} parts; nothing was written, nothing submitted\n", run.all_cases,
-          run.parts);
+    Print("{} in {}; nothing was written, nothing submitted\n", WithCount(run.all_cases, "case"),
+          WithCount(run.parts, "part"));
     return 0;
   }
   if (!MakeClusterRun(run, folder)) {
-    Reject("{}: found the folder of a submit, expected a new one; to go on with it: {}",
+    Reject("{}: found the folder of a submit, expected a new one; to resume it: {}",
            folder.string(), SubmitAgainLine(folder));
   }
   WriteScripts(run, folder);
-  Print("{} cases in {} parts in {}\n", run.all_cases, run.parts, folder.string());
+  Print("{} in {} in {}\n", WithCount(run.all_cases, "case"), WithCount(run.parts, "part"),
+        folder.string());
   if (!command.no_queue) {
     Queue(parts, folder, &run);
   } else {
@@ -313,16 +314,17 @@ void RequireNothingElse(const std::vector<std::string>& given) {
   const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
   for (const std::string& option : given) {
     if (may_stand.contains(option)) continue;
-    Reject("--resubmit: found {} beside it, expected none: the folder knows", option);
+    Reject("--resubmit: found {} beside it, expected none: the folder contains them", option);
   }
 }
 
 int SubmitAsTyped(SubmitCommand& submit, const Typed& typed) {
   ClusterRun& run = submit.run;
   if (submit.again != run.experiments.empty()) {
-    throw ConfigError(
-        submit.again ? "--resubmit: found experiments beside it, expected none: the folder knows"
-                     : "submit: found no experiment, expected at least one, or --resubmit");
+    throw ConfigError(submit.again
+                          ? "--resubmit: found experiments beside it, expected none: the folder "
+                            "contains them"
+                          : "submit: found no experiment, expected at least one, or --resubmit");
   }
   if (submit.again) RequireNothingElse(typed.given);
   if (!submit.time.empty()) run.batch_options.push_back("--time=" + submit.time);

@@ -165,6 +165,9 @@ void AppendProvenance(Table& table, const std::string& typed);
 /// equal bytes.
 std::string RenderKept(Table table, const std::string& format);
 
+/// Rejects an output that is named like a picture, unless it is an existing folder.
+void RejectPictures(const std::filesystem::path& out, const char* expected);
+
 /// Draws the figures into a folder, as svg or pdf. Prints the reason for each figure that cannot be
 /// drawn, and then returns 2.
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,

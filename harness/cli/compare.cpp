@@ -60,8 +60,8 @@ struct CompareCommand {
         {"--only", "Only this group (repeatable)", &options.only, OneOf(GroupNames())},
         {"--where", "Only records of both with key=value[,value] (or !=, <, <=, >, >=)", &where},
         {"--match",
-         "KEY[,KEY]: cases meet by these keys, whatever else they were run with (default: all "
-         "keys, and equal mechanisms and limits)",
+         "KEY[,KEY]: keys by which cases are matched (default: all keys, and equal mechanisms and "
+         "limits)",
          &options.match, kSplits},
         {"--allow-missing", "NEW may lack cases of BASE", &options.subset},
         {"--added", "NEW may have cases that BASE lacks (always with a history)", &options.added},
@@ -145,7 +145,7 @@ void NoteCases(const std::string& what, const std::vector<std::string>& cases,
   if (cases.empty()) return;
   constexpr std::size_t kMaxNamed = 20;
   const bool all = cases.size() <= kMaxNamed;
-  AddNote(notes, "{} {}{}", cases.size(), what,
+  AddNote(notes, "{} {}{}", WithCount(cases.size(), "case"), what,
           all ? ":" : fmt::format(" (--format csv names all), the first {}:", kMaxNamed));
   for (const std::string& one : cases | std::views::take(kMaxNamed)) notes.push_back("  " + one);
 }
@@ -187,14 +187,16 @@ std::string Conclusion(const ComparisonReport& comparison, const CompareOptions&
   const int code = comparison.ExitCode(options);
   const int worse = comparison.Count(Judgement::kWorse);
   const int different = comparison.Count(Judgement::kDifferent);
-  if (code == 1 && different == 0) return fmt::format("REGRESSION: {} measures", worse);
-  if (code == 1 && worse == 0) return fmt::format("DIFFERENT: {} measures", different);
-  if (code == 1) return fmt::format("REGRESSION: {} measures, {} more different", worse, different);
+  if (code == 1 && different == 0) return "REGRESSION: " + WithCount(worse, "measure");
+  if (code == 1 && worse == 0) return "DIFFERENT: " + WithCount(different, "measure");
+  if (code == 1) {
+    return fmt::format("REGRESSION: {}, {} more different", WithCount(worse, "measure"), different);
+  }
   if (code == 2) return "INCONCLUSIVE: " + comparison.Obstacle(options);
   const int better = comparison.Count(Judgement::kBetter);
   const int undecided = comparison.Count(Judgement::kNotMeasured, "times");
-  return (better > 0 ? fmt::format("BETTER: {} measures, none worse", better) : "NO CHANGE") +
-         (undecided > 0 ? fmt::format("; {} times not compared", undecided) : "");
+  return (better > 0 ? "BETTER: " + WithCount(better, "measure") + ", none worse" : "NO CHANGE") +
+         (undecided > 0 ? "; " + WithCount(undecided, "time") + " not compared" : "");
 }
 
 /// Filters the records of both sides. Rejects a key that neither side has: it would have no effect.
@@ -326,13 +328,12 @@ int ShowComparison(const CompareCommand& command, const Typed& typed) {
   }
   notes = ReasonNotes(comparison);
   if (!base_name.empty()) notes.push_back(base_name);
-  NoteCases("cases only in BASE", comparison.only_base, notes);
-  NoteCases("cases only in NEW", comparison.only_fresh, notes);
-  NoteCases("cases there more than once, not compared", comparison.ambiguous, notes);
-  NoteCases("cases that ran another mechanism, limits or ensemble under equal keys, not compared",
+  NoteCases("only in BASE", comparison.only_base, notes);
+  NoteCases("only in NEW", comparison.only_fresh, notes);
+  NoteCases("there more than once, not compared", comparison.ambiguous, notes);
+  NoteCases("that ran another mechanism, limits or ensemble under equal keys, not compared",
             comparison.other_content, notes);
-  NoteCases("cases compared although they ran with other settings", comparison.other_settings,
-            notes);
+  NoteCases("compared although they ran with other settings", comparison.other_settings, notes);
   notes.insert(notes.end(), origins.begin(), origins.end());
   Table findings = FindingTable(comparison, command.format == "csv");
   if (command.format == "csv") {
@@ -377,6 +378,7 @@ std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
   std::vector<std::string> warnings;
   std::vector<Record> records = ReadMeasurements(path, &warnings);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
+  VerifyFilesOf(records, std::filesystem::is_directory(path) ? StoreFile(path) : path);
   return records;
 }
 

@@ -190,7 +190,8 @@ std::vector<std::string> Crossovers(std::span<const Record> rows) {
 Table CountTable(std::vector<Record> rows) {
   Table table{.rows = std::move(rows)};
   table.columns = Columns(
-      "mechanism, formulation, enforcement, coordinates=coord., solver, bodies:integer, "
+      "mechanism::2, formulation::2, enforcement::2, coordinates=coord.::2, solver::2, "
+      "bodies:integer, "
       "flops:integer:2, flops_per_body=per body:fixed, exponent:exponent:2, kinematics:integer, "
       "forces:integer, solve:integer, additions=+ -:integer, multiplications=*:integer, "
       "divisions=/:integer, roots=sqrt:integer, sines=sin cos:integer, other:integer:-1, "

@@ -70,7 +70,7 @@ void PrintPicture(const Picture& picture, const ExplainView& view) {
     untitled.title.clear();
     PrintSection(table.title, untitled, view);
   }
-  if (!picture.notes.empty()) Print("\nWhat a run leaves out, and what is not shown\n");
+  if (!picture.notes.empty()) Print("\nOmitted by runs, and not drawn\n");
   for (const std::string& note : picture.notes) Print("  {}\n", note);
 }
 
@@ -88,8 +88,9 @@ int ViewHere(const ViewCommand& command, const std::string& format, const Explai
       text = format == "svg" ? ToSvg(picture, command.svg) : ToHtml(picture);
     }
     WriteFileAtomically(out, text);
-    Print("wrote {}: {} bodies, {} joints, {} motions, {} kB\n", out.string(), picture.bodies - 1,
-          picture.joints, picture.motions.size(), (text.size() + 999) / 1000);
+    Print("wrote {}: {}, {}, {}, {} kB\n", out.string(), WithCount(picture.bodies - 1, "body"),
+          WithCount(picture.joints, "joint"), WithCount(picture.motions.size(), "motion"),
+          (text.size() + 999) / 1000);
   }
   if (picture.assembled) return 0;
   PrintError("not assembled: {}\n", picture.message);
@@ -102,6 +103,7 @@ int View(ViewCommand& command, const Typed&) {
   const std::string ending = command.out.extension().string();
   std::string format = command.format;
   if (format.empty()) format = ending == ".svg" ? "svg" : ending == ".txt" ? "text" : "html";
+  if (format != "svg") RejectPictures(command.out, "\".html\", \".svg\" or \".txt\"");
   if (format == "html" && command.svg.view != ViewNames().front()) {
     throw ConfigError("--view is for svg: a page is turned by hand");
   }
@@ -129,7 +131,8 @@ struct ImportCommand {
         {"--floating", "Free root link instead of a fixed one (URDF)", &options.floats},
         {"--keep-digits", "Keep rounded angles and directions (1.5708) as written",
          &options.keeps_digits},
-        {"--balance-inertia", "Replace moments of inertia that no body has by their mean",
+        {"--balance-inertia",
+         "Replace moments of inertia that violate the triangle inequality by their mean",
          &options.balances_inertia},
         {"--gravity", "Gravity x,y,z [m/s^2] instead of the file's", &gravity},
         {"--json", "One JSON document instead (docs/exchange.md has its keys)", &json},
@@ -179,9 +182,11 @@ int ImportHere(const ImportCommand& command) {
           note.changes_motion ? " [changes the motion]" : "");
   }
   const auto changed = std::ranges::count(imported.notes, true, &ImportNote::changes_motion);
-  Print("wrote {}: {}, {} bodies, {} joints, {} forces; {} notes, {} of them change the motion\n",
-        out.string(), ToString(description.space), description.bodies.size() - 1,
-        description.joints.size(), description.forces.size(), imported.notes.size(), changed);
+  Print("wrote {}: {}, {}, {}, {}; {}, {} of them {} the motion\n", out.string(),
+        ToString(description.space), WithCount(description.bodies.size() - 1, "body"),
+        WithCount(description.joints.size(), "joint"),
+        WithCount(description.forces.size(), "force"), WithCount(imported.notes.size(), "note"),
+        changed, changed == 1 ? "changes" : "change");
   return 0;
 }
 
@@ -273,8 +278,8 @@ int ConvertHere(const ConvertCommand& command) {
     PrintDocument(command, mechanism.name, out, {}, file.notes);
     return 0;
   }
-  Print("wrote {}: {} bodies, {} joints, {} kB\n", out.string(), mechanism.bodies.size() - 1,
-        mechanism.joints.size(), (file.text.size() + 999) / 1000);
+  Print("wrote {}: {}, {}, {} kB\n", out.string(), WithCount(mechanism.bodies.size() - 1, "body"),
+        WithCount(mechanism.joints.size(), "joint"), (file.text.size() + 999) / 1000);
   for (const exchange::Note& note : file.notes) {
     Print("  {}{}\n", note.loss ? "With a loss: " : "", note.text);
   }
@@ -407,6 +412,12 @@ int GenerateHere(const GenerateCommand& command) {
     if (!command.fmu.empty()) fmu = exchange::MakeFmu(code, file.description.name, motion.step);
   } catch (const generate::NotCovered& why) {
     throw ConfigError(command.mechanism.string() + ": cannot be generated: " + why.what());
+  }
+  for (const exchange::CodeFile& part : code.files) {
+    using std::filesystem::weakly_canonical;
+    if (weakly_canonical(command.out / part.name) != weakly_canonical(command.fmu)) continue;
+    Reject("--fmu: found \"{}\", expected a file other than the generated code",
+           command.fmu.string());
   }
   for (const exchange::CodeFile& part : code.files) {
     WriteFileAtomically(command.out / part.name, part.text);

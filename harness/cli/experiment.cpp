@@ -128,12 +128,13 @@ Table CaseTable(const Overview& overview, const Selection& filter, const OtherRu
   table.columns.push_back({"horizon", "horizon [s]", Format::kShortest});
   table.columns.push_back({"runs", "runs", Format::kInteger});
   table.rows = CaseRows(experiments, filter);
-  table.notes = {fmt::format("{} cases and {} timings", overview.cases(), others.timings)};
+  table.notes = {WithCount(overview.cases(), "case") + " and " +
+                 WithCount(others.timings, "timing")};
   if (others.rungs > 0) {
-    table.notes.front() += fmt::format(", {} runs in several scalars", others.rungs);
+    table.notes.front() += fmt::format(", {} in several scalars", WithCount(others.rungs, "run"));
   }
   if (overview.combinations > 1) {
-    table.notes.front() += fmt::format(" in {} combinations", overview.combinations);
+    table.notes.front() += " in " + WithCount(overview.combinations, "combination");
   }
   if (overview.is_sample) {
     AddNote(table.notes,
@@ -188,9 +189,10 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
     RequireFreedom(experiments);
   }
   const std::string& name = experiments.front().name;
-  checked.sentence = fmt::format("experiment \"{}\", {} cases", name, overview.cases());
+  checked.sentence =
+      fmt::format("experiment \"{}\", {}", name, WithCount(overview.cases(), "case"));
   if (overview.combinations > 1) {
-    checked.sentence += fmt::format(" in {} combinations", overview.combinations);
+    checked.sentence += " in " + WithCount(overview.combinations, "combination");
   }
   if (overview.is_sample) {
     checked.sentence += fmt::format(
@@ -218,7 +220,8 @@ Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& co
   const auto& [name, bodies, joints] =
       std::tie(file.description.name, file.description.bodies, file.description.joints);
   checked.sentence =
-      fmt::format("mechanism \"{}\", {} bodies, {} joints", name, bodies.size() - 1, joints.size());
+      fmt::format("mechanism \"{}\", {}, {}", name, WithCount(bodies.size() - 1, "body"),
+                  WithCount(joints.size(), "joint"));
   Put(checked.document, "kind", "mechanism", "name", name, "bodies", bodies.size() - 1, "joints",
       joints.size());
   return checked;
@@ -238,20 +241,21 @@ Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command
       return CheckMechanism(path, command);
     case FileKind::kClaims: {
       const std::size_t claims = ReadClaims(path).size();
-      set(fmt::format("{} claims", claims), "claims", "claims", claims);
+      set(WithCount(claims, "claim"), "claims", "claims", claims);
       break;
     }
     case FileKind::kMap: {
       const MapRules map = ReadMapRules(path);
       std::size_t rows = 0;
       for (const MapGroup& group : map.groups) rows += group.rows.size();
-      set(fmt::format("robustness map of {} rows and {} methods", rows, map.columns.size()), "map",
-          "rows", rows, "methods", map.columns.size());
+      set(fmt::format("robustness map of {} and {}", WithCount(rows, "row"),
+                      WithCount(map.columns.size(), "method")),
+          "map", "rows", rows, "methods", map.columns.size());
       break;
     }
     case FileKind::kBenchmarks: {
       const std::size_t groups = ReadBenchmarks(path).groups.size();
-      set(fmt::format("{} groups of benchmarks", groups), "benchmarks", "groups", groups);
+      set(WithCount(groups, "group") + " of benchmarks", "benchmarks", "groups", groups);
       break;
     }
     case FileKind::kSeries: {
@@ -391,7 +395,7 @@ int AssembleFile(const AssembleCommand& command, const ExplainView& view) {
                         MechanismText(description, known));
   }
   if (!command.out.empty()) {
-    Print("\nwrote {} files to {}; loopbench view shows them\n", branches.found.size(),
+    Print("\nwrote {} to {}; loopbench view shows them\n", WithCount(branches.found.size(), "file"),
           command.out.string());
   }
   return 0;

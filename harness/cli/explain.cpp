@@ -63,7 +63,7 @@ void ExplainMethods(const Experiment& experiment) {
          "if constraints lose rank.",
          [](const Method& c) { return c.solver == SolverKind::kAsPublished; });
   define("rank-revealing",
-         "solvers that detect rank loss (reduction: independent speeds are chosen anew).",
+         "solvers that detect rank loss (reduction: independent speeds are chosen again).",
          [](const Method& c) { return c.solver == SolverKind::kRankRevealing; });
 }
 

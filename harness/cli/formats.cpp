@@ -421,7 +421,8 @@ std::string WithMigrationHint(std::string message) {
   if (std::ranges::any_of(kKeys, is_key, &OldKey::old) ||
       std::ranges::any_of(kRecordKeys, is_key, &OldName::old) ||
       std::ranges::any_of(kValues, is_value, &OldValue::old) ||
-      holds("no key that tells the kind") || holds(fmt::format(kExpectedFormat, kRecordFormat))) {
+      holds("no key that identifies the file type") ||
+      holds(fmt::format(kExpectedFormat, kRecordFormat))) {
     message += "\n`loopbench migrate FILE` replaces names of earlier versions";
   }
   return message;

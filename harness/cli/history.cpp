@@ -165,8 +165,8 @@ int HistoryAdd(const HistoryAddCommand& command, const Typed&) {
     PrintWarnings(torn, open);
     return "Measurements of " + ShortCommit(entry.commit);
   });
-  Print("added {} records of commit {} ({}) on {}\n", records.size(), ShortCommit(added.commit),
-        added.date, added.machine);
+  Print("added {} of commit {} ({}) on {}\n", WithCount(records.size(), "record"),
+        ShortCommit(added.commit), added.date, added.machine);
   return 0;
 }
 
@@ -197,8 +197,9 @@ int HistoryReport(const HistoryReportCommand& command, const Typed& typed) {
   const std::string page = HistoryPage(history, found, command.title, Provenance(typed.line));
   const auto out = command.out.empty() ? command.place.store / "history.html" : command.out;
   WriteFileAtomically(out, page);
-  Print("wrote {}: {} series over {} entries, {} steps, {} kB\n", out.string(), found.series.size(),
-        history.entries.size(), found.Steps(), (page.size() + 999) / 1000);
+  Print("wrote {}: {} series over {}, {}, {} kB\n", out.string(), found.series.size(),
+        WithCount(history.entries.size(), "entry"), WithCount(found.Steps(), "step"),
+        (page.size() + 999) / 1000);
   return 0;
 }
 

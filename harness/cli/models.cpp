@@ -234,17 +234,17 @@ void WriteVerdict(const MechanismFile& file, const JudgedModel& whole, const Jud
   if (&judged == &whole) return record.Set("model_verdict", std::string("full model"));
   record.Set("model_accepts", question.accept);
   const auto conclude = [&](const std::string& verdict) { record.Set("model_verdict", verdict); };
-  if (!judged.fault.empty()) return conclude("refused: " + judged.fault);
+  if (!judged.fault.empty()) return conclude("rejected: " + judged.fault);
   const CausedError caused = ErrorOfModel(file.description, whole.certain.reference, judged.model,
                                           judged.certain.reference, {});
   record.Set("model_points", std::int64_t{caused.points});
-  if (caused.points == 0) return conclude("refused: it has no point of the full model");
+  if (caused.points == 0) return conclude("rejected: it has no point of the full model");
   const double certified =
       whole.certain.reference.Certified().position + judged.certain.reference.Certified().position;
   Put(record, "model_error", caused.largest, "model_error_at", caused.point, "reference_error",
       certified, "reference_valid_until", caused.until);
   const bool accepted = caused.largest + certified <= question.accept;
-  conclude(fmt::format("{} at {} m", accepted ? "accepted" : "refused", question.accept));
+  conclude(fmt::format("{} at {} m", accepted ? "accepted" : "rejected", question.accept));
 }
 
 }  // namespace

@@ -93,10 +93,10 @@ struct WorkPrecisionCommand {
          "Key that is the cost: wall_s (default: the timed median), rhs_equivalents, steps, ...",
          &options.cost},
         {"--per", "Keys that make one problem: a,b", &options.per, kSplits},
-        {"--error-levels", "Errors that the overview asks for: a,b", &options.classes,
-         From(0.0, 1e300), kSplits},
+        {"--error-levels", "Error levels of the overview: a,b", &options.classes, From(0.0, 1e300),
+         kSplits},
         WhereOption(&options.where),
-        {"-o,--out", "Folder (default: that of the store)", &out},
+        {"-o,--out", "Folder (default: folder of the store)", &out},
         TableFormatOption(&format),
         {"--all", "Print all rows, not only Pareto fronts", &all},
         WideOption(),
@@ -106,21 +106,12 @@ struct WorkPrecisionCommand {
   }
 };
 
-/// Rejects a folder that is named like a picture and does not exist.
-void RequireFolder(const std::filesystem::path& out, const char* expected) {
-  constexpr std::array kPictures = {".svg", ".pdf", ".png", ".jpg", ".jpeg", ".eps", ".gif"};
-  const std::string ending = out.extension().string();
-  if (std::ranges::find(kPictures, ending) == kPictures.end()) return;
-  if (std::filesystem::is_directory(out)) return;
-  Reject("--out {}: found the ending \"{}\", expected {}", out.string(), ending, expected);
-}
-
 /// Returns --out if it ends like a figure file; else it is a folder.
 std::filesystem::path FileOf(const PlotCommand& command) {
   const std::filesystem::path& out = command.out;
   const std::string ending = out.extension().string();
   if (ending != ".svg" && ending != ".pdf") {
-    RequireFolder(out, "\".svg\", \".pdf\" or a folder");
+    RejectPictures(out, "\".svg\", \".pdf\" or a folder");
     return out / fmt::format("{}.{}", FileName(command.free.y + "-over-" + command.free.x),
                              command.format.empty() ? "svg" : command.format);
   }
@@ -147,7 +138,11 @@ bool IsFree(const PlotCommand& command) {
   if ((free.x + free.y + free.group + free.log).empty() && !free.title && free.labels.empty()) {
     return false;
   }
-  if (free.x.empty() || free.y.empty()) {
+  if (free.x.empty() != free.y.empty()) {
+    throw ConfigError(free.y.empty() ? "plot: found --x KEY without --y KEY, expected both"
+                                     : "plot: found --y KEY without --x KEY, expected both");
+  }
+  if (free.x.empty()) {
     throw ConfigError("plot: --group, --log, --title and --label need --x KEY and --y KEY");
   }
   return true;
@@ -251,7 +246,7 @@ int PrintTable(const TableCommand& command, const Typed& typed) {
 
 int Plot(const PlotCommand& command, const Typed&) {
   const bool is_free = IsFree(command);
-  if (!is_free) RequireFolder(command.out, "a folder; a file needs --x KEY and --y KEY");
+  if (!is_free) RejectPictures(command.out, "a folder; a file needs --x KEY and --y KEY");
   const Loaded loaded = LoadOrScan(command.store, command.where);
   if (loaded.many && is_free) return DrawMany(*loaded.many, command);
   if (loaded.many) {
@@ -301,6 +296,7 @@ int PrintVerdicts(const VerdictCommand& command, const Typed& typed) {
   const std::vector<Record> records = LoadRecords(command.store);
   if (records.empty()) throw ConfigError(command.store.string() + ": found no records to judge");
   RequireOneContent(records, command.store, "check-claims");
+  VerifyFilesOf(records, StoreFile(command.store));
   std::vector<ClaimResult> results;
   for (const ClaimRule& rule : ReadClaims(command.claims)) {
     results.push_back(Evaluate(rule, records));
@@ -327,6 +323,9 @@ int WriteReport(const ReportCommand& command, const Typed& typed) {
     PrintError("report: this program was built without (cmake -DLOOPBENCH_REPORT=ON needs npm)\n");
     return 2;
   }
+  const std::filesystem::path out =
+      command.out.empty() ? StoreFile(command.store).parent_path() / "report.html" : command.out;
+  RejectPictures(out, "\".html\"");
   ReportOptions options{
       .store = command.store, .rules_file = command.rules, .claims_file = command.claims};
   if (!command.rules.empty()) options.rules = ReadMapRules(command.rules);
@@ -336,8 +335,6 @@ int WriteReport(const ReportCommand& command, const Typed& typed) {
   if (!options.claims.empty()) RequireOneContent(records, command.store, "check-claims");
   ReportData data = MakeReport(records, options);
   data.provenance = Provenance(typed.line);
-  const std::filesystem::path out =
-      command.out.empty() ? StoreFile(command.store).parent_path() / "report.html" : command.out;
   const std::string page = ToHtml(data);
   WriteFileAtomically(out, page);
   Print("wrote {}: {} runs, {} of them failed and {} flagged, {} kB\n", out.string(), data.runs,
@@ -393,6 +390,14 @@ int PrintWorkPrecision(const WorkPrecisionCommand& command, const Typed& typed) 
 }
 
 }  // namespace
+
+void RejectPictures(const std::filesystem::path& out, const char* expected) {
+  constexpr std::array kPictures = {".svg", ".pdf", ".png", ".jpg", ".jpeg", ".eps", ".gif"};
+  const std::string ending = out.extension().string();
+  if (std::ranges::find(kPictures, ending) == kPictures.end()) return;
+  if (std::filesystem::is_directory(out)) return;
+  Reject("--out {}: found the ending \"{}\", expected {}", out.string(), ending, expected);
+}
 
 void AddResults(Commands& commands) {
   commands.Add("table", "Print a table of stored records", PrintTable);

@@ -71,13 +71,14 @@ void PrintInterrupted(const RunCommand& command, const ResultStore& store, const
   const auto records =
       std::count(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>(), '\n');
   PrintError(
-      "interrupted: {} records are kept in {}, {} of them of this run; cases under way were "
+      "interrupted: {} kept in {}, {} of them of this run; cases under way were "
       "stopped and left nothing, tables were not written\n",
-      records, store.file().string(), store.appended());
+      WithCount(records, "record"), store.file().string(), store.appended());
   if (command.suite.rerun == Rerun::kAll) {
-    PrintError("to go on, without those that were run again: the same command with --rerun none\n");
+    PrintError(
+        "to resume, without those that were run again: the same command with --rerun none\n");
   } else {
-    PrintError("to go on: {}\n", typed.again);
+    PrintError("to resume: {}\n", typed.again);
   }
 }
 
@@ -284,11 +285,12 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
                const Estimate& estimate) {
   const Experiment& first = overview.experiments.front();
   Print("{}{}{}\n", first.name, first.comment.empty() ? "" : ": ", first.comment);
-  for (const auto& [name, values] : overview.axes) Print("  axis {}: {} values\n", name, values);
-  if (!overview.axes.empty()) Print("  {} combinations\n", overview.combinations);
-  Print("  {} problems, {} methods, {} tolerances", first.problems.size(), first.methods.size(),
-        first.tolerances.size());
-  if (!first.fixed_steps.empty()) Print(", {} fixed steps", first.fixed_steps.size());
+  for (const auto& [name, values] : overview.axes)
+    Print("  axis {}: {}\n", name, WithCount(values, "value"));
+  if (!overview.axes.empty()) Print("  {}\n", WithCount(overview.combinations, "combination"));
+  Print("  {}, {}, {}", WithCount(first.problems.size(), "problem"),
+        WithCount(first.methods.size(), "method"), WithCount(first.tolerances.size(), "tolerance"));
+  if (!first.fixed_steps.empty()) Print(", {}", WithCount(first.fixed_steps.size(), "fixed step"));
   if (first.integrators.size() > 1) Print(", {} integrators", first.integrators.size());
   Print("\n\n");
   Table table{.columns = Columns(
@@ -302,14 +304,15 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
   for (const std::string& one : estimate.cut_off()) {
     Print("Pilot run stopped: {}. Its cases are estimated by its CPU time.\n", one);
   }
-  Print("{} cases, {} runs (ensembles in addition to the unperturbed run), {} timings\n",
-        plan.cases, plan.runs, plan.timings);
+  Print("{}, {} (ensembles in addition to the unperturbed run), {}\n",
+        WithCount(plan.cases, "case"), WithCount(plan.runs, "run"),
+        WithCount(plan.timings, "timing"));
   Print("estimated time: accuracy {} with one job", Duration(plan.seconds));
   if (plan.references > 0) {
-    Print(", {} references {}", plan.references, Duration(plan.reference_seconds));
+    Print(", {} {}", WithCount(plan.references, "reference"), Duration(plan.reference_seconds));
   }
   if (plan.rungs > 0) {
-    Print(", {} runs in several floating-point types {}", plan.rungs,
+    Print(", {} in several floating-point types {}", WithCount(plan.rungs, "run"),
           Duration(plan.ladder_seconds));
   }
   if (plan.timings > 0) Print(", timings {}", Duration(plan.timing_seconds));
@@ -378,7 +381,7 @@ int Merge(const MergeCommand& command, const Typed&) {
   if (!merged.missing().empty()) {
     PrintError(
         "{}: {} of {} cases are in no part, {} among them; nothing was merged. The experiment, its "
-        "mechanisms or the program are not what they were when the parts ran\n",
+        "mechanisms or the program changed since the shards ran\n",
         target.file().string(), merged.missing().size(), command.order.size(),
         merged.missing().front());
     return 1;
@@ -405,10 +408,11 @@ int Merge(const MergeCommand& command, const Typed&) {
   WriteReferences(references, target.file());
   target.Commit();
   for (const std::string& note : references.notes) PrintError("{}\n", note);
-  Print("{} records of {} stores are {} cases in {}\n", merged.read(), command.stores.size(),
-        merged.size(), target.file().string());
+  Print("{} of {}: {} in {}\n", WithCount(merged.read(), "record"),
+        WithCount(command.stores.size(), "store"), WithCount(merged.size(), "case"),
+        target.file().string());
   if (!references.texts.empty()) {
-    Print("{} references beside it\n", references.texts.size());
+    Print("{} beside it\n", WithCount(references.texts.size(), "reference"));
   }
   return 0;
 }

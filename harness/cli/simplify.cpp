@@ -239,7 +239,7 @@ void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
   Table table = MakeTable(records, {.kind = "models", .compact = true});
   table.title.clear();
   PrintSection("Compared with the certified motion of the full model", table, view);
-  Print("  {} records in {}\n", records.size(), store.file().string());
+  Print("  {} in {}\n", WithCount(records.size(), "record"), store.file().string());
 }
 
 /// Lists the possible simplifications of each rule. With a folder, writes a mechanism file for each
@@ -264,7 +264,7 @@ int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
   if (any) {
     PrintModels(ladder, view);
   } else {
-    Print("\n{} cannot be simplified: no idea applies.\n", file.description.name);
+    Print("\n{} cannot be simplified: no rule applies.\n", file.description.name);
   }
   if (command.out.empty()) return 0;
   if (!any && !command.assembled) {

@@ -3,8 +3,10 @@
 
 #include <iterator>
 #include <numbers>
+#include <ranges>
 
 #include "harness/cli/commands.h"
+#include "harness/json/json_document.h"
 #include "harness/trajectory/check.h"
 
 namespace loopbench::harness {
@@ -21,11 +23,13 @@ struct TrajectoryCommand {
     return {{"source", "Folder of a run, or a trajectory (.csv)", &source, kRequired},
             WhereOption(&where),
             {"-o,--out", "Output folder; for a CSV source, output file", &out},
-            FormatOption(&format, {"csv", "jsonl"}),
+            {"--format", "Format of --out", &format, OneOf({"csv", "jsonl"}), Needs("--out")},
             {"--columns", "Only t and columns with these prefixes: a,b", &columns, kSplits},
-            {"--every", "Only every N-th row", &every, From(1, 1e9), ShowsDefault(false)},
+            {"--every", "Only every N-th row", &every, From(1, 1e9), ShowsDefault(false),
+             Needs("--out")},
             {"--mechanism", "Mechanism (JSON) to check a CSV trajectory against", &mechanism},
-            {"--compare-with", "Trajectory to compare a CSV trajectory with", &ours},
+            {"--compare-with", "Trajectory to compare a CSV trajectory with", &ours,
+             Excludes({"--out"})},
             {"--figure", "Figure of both trajectories and their difference: .svg, .pdf", &figure,
              Needs("--compare-with")},
             WideOption()};
@@ -69,6 +73,11 @@ int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to
   for (const std::size_t i : chosen) columns.push_back(reader.columns()[i]);
   const auto format =
       command.format == "jsonl" ? TrajectoryFormat::kJsonLines : TrajectoryFormat::kCsv;
+  for (std::size_t i = 0; format == TrajectoryFormat::kJsonLines && i < columns.size(); ++i) {
+    if (const std::string fault = EncodingFault(columns[i].Label()); !fault.empty()) {
+      Reject<std::runtime_error>("{}: label {}:{}", from.string(), chosen[i] + 1, fault);
+    }
+  }
   notes.insert(notes.end(), reader.notes().begin(), reader.notes().end());
   TrajectoryWriter writer(to, columns, notes, format);
   std::int64_t number = 0;
@@ -139,7 +148,7 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
   for (const Record& record : records) {
     const std::filesystem::path from = TrajectoryOf(record, file);
     if (from.empty() || !std::filesystem::exists(from)) {
-      PrintError("{}: it is gone; run --rerun all makes it again\n",
+      PrintError("{}: missing; run --rerun all writes it\n",
                  (file.parent_path() / "trajectories" / record.Text("trajectory")).string());
       code = 2;
     } else if (!IsVerified(record, from)) {
@@ -180,7 +189,7 @@ void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
       check.no_energy.empty()
           ? fmt::format("energy: changes by {:.3e} J at most, at {:g} s; kinetic up to {:.3e} J",
                         check.energy.value, check.energy.t, check.kinetic)
-          : "energy: not known, for " + check.no_energy);
+          : "energy: not checked: " + check.no_energy);
   if (!check.speeds.empty()) {
     const auto worst = std::ranges::max_element(
         check.speeds, {}, [](const SpeedCheck& speed) { return speed.apart.value; });
@@ -204,6 +213,24 @@ void RequireFinite(double number, const std::string& label, double t,
   if (std::isfinite(number)) return;
   Reject<std::runtime_error>("{}: found {} in \"{}\" at t = {}, expected a finite number, as in {}",
                              file.string(), number, label, t, other.string());
+}
+
+/// Names the columns of a trajectory that the other one lacks, for example by another unit.
+void NoteOthers(const Trajectory& trajectory, const std::filesystem::path& path,
+                const Trajectory& other, std::vector<std::string>& notes) {
+  constexpr std::size_t kMaxNamed = 6;
+  std::vector<std::string> labels;
+  for (const TrajectoryColumn& column : trajectory.columns) {
+    const std::string label = column.kind.empty() ? column.component : column.Label();
+    const auto is_same = [&label](const TrajectoryColumn& one) {
+      return (one.kind.empty() ? one.component : one.Label()) == label;
+    };
+    if (std::ranges::none_of(other.columns, is_same)) labels.push_back(label);
+  }
+  if (labels.empty()) return;
+  AddNote(notes, "{} only in {}, not compared: {}{}", WithCount(labels.size(), "column"),
+          path.string(), fmt::join(labels | std::views::take(kMaxNamed), ", "),
+          labels.size() > kMaxNamed ? ", ..." : "");
 }
 
 int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
@@ -261,6 +288,8 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
     AddNote(table.notes, "{} of {} rows are not compared: {} has no such times",
             theirs.rows() - most, theirs.rows(), command.ours.string());
   }
+  NoteOthers(ours, command.ours, theirs, table.notes);
+  NoteOthers(theirs, command.source, ours, table.notes);
   if (between > 0) {
     AddNote(
         table.notes,
@@ -277,8 +306,9 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   for (const SharedColumn& column : shared) {
     if (column.unit == shared.front().unit && drawn.size() < kMost) drawn.push_back(column);
   }
-  const auto fault =
-      WriteFigure(command.figure, TrajectoryFigure(ours, theirs, drawn, "ours and theirs"));
+  const std::string title = fmt::format("first: {}, second: {}", command.source.filename().string(),
+                                        command.ours.filename().string());
+  const auto fault = WriteFigure(command.figure, TrajectoryFigure(ours, theirs, drawn, title));
   if (fault) Reject<std::runtime_error>("{}: {}", command.figure.string(), *fault);
   Print("wrote {}: {} of {} columns\n", command.figure.string(), drawn.size(), shared.size());
   return 0;
@@ -287,7 +317,15 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
 /// Lists the trajectories of a store; writes them to `out`; checks one against a mechanism;
 /// compares it with the trajectory `ours`.
 int ShowTrajectories(const TrajectoryCommand& command, const Typed& typed) {
-  if (command.source.extension() != ".csv") {
+  const bool is_store = command.source.extension() != ".csv";
+  if (!command.columns.empty() && command.out.empty() && command.ours.empty()) {
+    throw ConfigError("--columns: found neither --out nor --compare-with, expected one of them");
+  }
+  if (!is_store && !command.where.empty()) {
+    Reject("--where: found a trajectory, '{}', expected the folder of a run",
+           command.source.string());
+  }
+  if (is_store) {
     if (command.mechanism.empty() && command.ours.empty()) return OfStore(command, typed.line);
     Reject("{}: found a store beside --mechanism or --compare-with, expected a trajectory (.csv)",
            command.source.string());

@@ -188,7 +188,7 @@ const Fields<GroupInFile>& GroupFields() {
        {"preprocess", Bool(&GroupInFile::compile),
         "If true, the members' parts after all simplifications replace the members."},
        {"", By(Json::object(), ChangeMembers)},
-       {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "what is measured"),
+       {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "a measured quantity"),
         "Right-hand sides, integrator steps, or both.", "\"rhs\", \"step\" or both"},
        {"methods", Methods(&BenchmarkGroup::methods), "Methods that impose the loop constraints.",
         "an array of methods"}});

@@ -179,7 +179,7 @@ int WaysOf(const OutputOptions& output) {
 void RequireOneWay(const JsonNode& node, OutputOptions& output) {
   // invalid values are already reported
   const bool said = node.Optional("step") || node.Optional("number") || node.Optional("times");
-  if (WaysOf(output) > 1) return node.FailAs("several ways to say times", kOneWay);
+  if (WaysOf(output) > 1) return node.FailAs("several definitions of times", kOneWay);
   if (WaysOf(output) == 0 && !said) return node.FailAs("no times", kOneWay);
   if (!std::ranges::is_sorted(output.times, std::ranges::less_equal())) {
     node.Optional("times")->FailAs("times that do not rise", "each later than the one before");
@@ -333,8 +333,9 @@ const Fields<ReferenceOptions>& ReferenceFields() {
   static const Fields<ReferenceOptions> fields(
       "reference",
       "Reference solution of each mechanism and horizon, at high order in a wide floating-point "
-      "type, by two formulations and at two tolerances. Runs are compared with it where these "
-      "agree. Stored next to the store. Or published data.",
+      "type, from three integrations: multipliers at two tolerances, O-DCA at one between them. "
+      "Runs are compared with it where the three agree. Stored next to the store. Or published "
+      "data.",
       {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
         "Floating-point type. float128 has 33 digits, takes about 50 times as long, and is for "
         "planar mechanisms; as-needed adds it if long-double does not certify to the end."},

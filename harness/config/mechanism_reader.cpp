@@ -503,7 +503,8 @@ void RefuseReleased(const MechanismDescription& description) {
   for (const JointDescription& joint : description.joints) {
     if (joint.released.empty()) continue;
     throw ConfigError(fmt::format(
-        "{}: joint \"{}\": found released directions, expected none: no mechanism file says them",
+        "{}: joint \"{}\": found released directions, expected none: mechanism files cannot "
+        "contain them",
         description.name, joint.name));
   }
 }

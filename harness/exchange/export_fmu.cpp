@@ -192,10 +192,11 @@ std::string MakeFmu(const Code& code, const std::string& model_name, double step
   harness::WriteFileAtomically(folder.path() / fmi, functions);
   const std::string binary = (folder.path() / (code.identifier + ".so")).string();
   // for every processor of this architecture, not only the present one
-  generate::RunCompiler({"-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off",
-                         "-fvisibility=hidden", "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-o", binary,
-                         (folder.path() / source->name).string(), (folder.path() / fmi).string(),
-                         "-lm"});
+  generate::RunCompiler(
+      {"-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-fvisibility=hidden",
+       "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-o", binary, (folder.path() / source->name).string(),
+       (folder.path() / fmi).string(), "-lm"},
+      folder.path());
   ZipArchive archive;
   archive.Add("modelDescription.xml", Description(code, model_name, guid, step));
   archive.Add("sources/" + header->name, header->text);

@@ -323,16 +323,16 @@ Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
   const std::string unit = columns.empty() ? "" : columns.front().unit;
   Figure both{.title = title, .x_label = "time [s]", .y_label = fmt::format("[{}]", unit)};
   Figure apart{
-      .title = "", .x_label = "time [s]", .y_label = fmt::format("theirs - ours [{}]", unit)};
+      .title = "", .x_label = "time [s]", .y_label = fmt::format("first - second [{}]", unit)};
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const SharedColumn& column = columns[i];
     const std::string name = WithoutUnit(column.label);
     CurveStyle style = DistinctStyle(i);
     style.shape = Shape::kNone;
-    Curve own{.label = name + ", ours", .style = style};
+    Curve own{.label = name + ", second", .style = style};
     Curve difference{.label = name, .style = style};
     style.dash = 1;
-    Curve other{.label = name + ", theirs", .style = style};
+    Curve other{.label = name + ", first", .style = style};
     for (std::size_t row = 0; row < ours.rows(); ++row) {
       own.x.push_back(ours.At(row, ours.time));
       own.y.push_back(ours.At(row, column.in_ours));

@@ -154,13 +154,22 @@ Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, cons
   return curve;
 }
 
-// Joins points by lines only if no curve has two of them at one x.
+// Joins points by lines only if no curve has two of them at one x. Dashes and widths, which lines
+// would show, then become colours and marks.
 void JoinPoints(Figure& figure) {
   const bool joins =
       figure.x_ticks.empty() && std::ranges::none_of(figure.curves, [](const Curve& curve) {
         return curve.points && std::ranges::adjacent_find(curve.x) != curve.x.end();
       });
-  for (Curve& curve : figure.curves) curve.line = joins || !curve.points;
+  std::set<std::pair<std::string, Shape>> seen;
+  bool is_distinct = true;
+  for (Curve& curve : figure.curves) {
+    curve.line = joins || !curve.points;
+    is_distinct &= curve.line || seen.emplace(curve.style.color, curve.style.shape).second;
+  }
+  if (is_distinct) return;
+  figure.legend.clear();
+  for (std::size_t i = 0; i < figure.curves.size(); ++i) figure.curves[i].style = DistinctStyle(i);
 }
 
 struct Range {
@@ -332,6 +341,14 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   ChooseScales(figure, wanted, is_series);
   Relabel(wanted, &figure);
   result.remarks = RemarksOn(rows, figure, mixed);
+  std::set<std::string> kinds;
+  for (const Record& row : rows) kinds.insert(row.Text("kind"));
+  const auto of_kind = std::ranges::count_if(
+      records, [&](const Record& record) { return kinds.contains(record.Text("kind")); });
+  if (const auto left_out = of_kind - std::ssize(rows); left_out > 0) {
+    result.remarks.push_back(fmt::format("{} of {} runs are not drawn: no value of {} or {}",
+                                         left_out, of_kind, wanted.x, wanted.y));
+  }
   return result;
 }
 namespace {

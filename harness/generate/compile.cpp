@@ -38,10 +38,12 @@ std::vector<std::string> Compiler() {
 
 }  // namespace
 
-std::string RunCompiler(const std::vector<std::string>& arguments, int seconds) {
+std::string RunCompiler(const std::vector<std::string>& arguments, const fs::path& folder,
+                        int seconds) {
   // "timeout" ends it politely, a second later in any case
   std::vector<std::string> words = {"timeout", "--kill-after=1", std::to_string(seconds)};
   const std::vector<std::string> compiler = Compiler();
+  if (!folder.empty()) words.insert(words.end(), {"env", "TMPDIR=" + folder.string()});
   words.insert(words.end(), compiler.begin(), compiler.end());
   words.insert(words.end(), arguments.begin(), arguments.end());
   const ProgramResult result = harness::RunProgram(words);
@@ -132,7 +134,7 @@ void Compile(const std::string& text, std::vector<std::string> arguments, const 
        {source.string(), std::string("-o"), library.string(), std::string("-lm")}) {
     arguments.push_back(word);
   }
-  RunCompiler(arguments);
+  RunCompiler(arguments, folder);
 }
 
 /// A kept library ends with the checksum of the bytes before it, which the loader does not read.

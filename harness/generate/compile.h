@@ -6,6 +6,7 @@
 // a file with a wrong checksum, is rejected. If the folder cannot be made, nothing is kept.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -31,8 +32,9 @@ inline constexpr const char* kCompilerFlags[] = {
 enum class Contraction { kNone, kFused };
 
 /// Output of the compiler with these arguments. Throws NotCovered (record.h) if there is no
-/// compiler, if it fails, or if it takes more than `seconds`.
-std::string RunCompiler(const std::vector<std::string>& arguments, int seconds = kCompilerSeconds);
+/// compiler, if it fails, or if it takes more than `seconds`. `folder` is for its temporary files.
+std::string RunCompiler(const std::vector<std::string>& arguments,
+                        const std::filesystem::path& folder = {}, int seconds = kCompilerSeconds);
 
 /// The function that a text defines (print_c.h); it stays loaded until the process ends.
 struct CompiledBranch {

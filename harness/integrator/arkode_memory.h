@@ -60,7 +60,7 @@ void UseOurOperations(N_Vector v, bool max_norm);
 /// A setting that ARKODE rejects is an error in the code, not an outcome of a run.
 inline void Require(int code, const char* what) {
   if (code != 0) {
-    throw std::logic_error(std::string("ARKODE refused ") + what);
+    throw std::logic_error(std::string("ARKODE rejected ") + what);
   }
 }
 

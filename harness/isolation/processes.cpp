@@ -186,7 +186,7 @@ void WriteAll(int descriptor, std::string_view text) {
 [[noreturn]] void Work(int answer, pid_t parent, const ProcessLimits& limits,
                        const std::function<std::string()>& work) {
   Interruption::LeaveToParent();
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ::prctl(PR_SET_PDEATHSIG, kRemoveAndEnd);
   if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // the parent died before the line above
   SetLimits(limits);
   ExitWithoutMemory(kMemoryExit, "");
@@ -207,6 +207,8 @@ void WriteAll(int descriptor, std::string_view text) {
   ::_exit(EXIT_SUCCESS);
 }
 
+constexpr double kEnd_s = 3.0;  ///< for a child that ends a program and removes its files
+
 struct Child {
   std::size_t piece = 0;
   pid_t pid = -1;
@@ -216,6 +218,7 @@ struct Child {
   ChildWatch watch;
   std::string text;
   std::string killed;  ///< reason, as text
+  Clock::time_point killed_at = {};
 
   /// Returns the time before which no limit can be exceeded and no check is needed [s].
   double Wait() const {
@@ -224,7 +227,10 @@ struct Child {
   }
 
   void KillIfOver() {
-    if (!killed.empty()) return;
+    if (!killed.empty()) {
+      if (SecondsSince(killed_at) > kEnd_s) ::kill(pid, SIGKILL);
+      return;
+    }
     if (limits.cpu_s > 0.0 && watch.cpu_s() >= limits.cpu_s) {
       killed = fmt::format("killed after {:.4g} s of CPU time", limits.cpu_s);
     } else if (watch.idle_s() >= limits.idle_s) {
@@ -232,17 +238,22 @@ struct Child {
     } else {
       return;
     }
-    ::kill(pid, SIGKILL);  // its pipe closes, which the next Wait() detects
+    killed_at = Clock::now();
+    ::kill(pid, kRemoveAndEnd);  // its pipe closes, which the next Wait() detects
   }
 };
 
-/// Running children; the destructor kills them.
+/// Running children; the destructor ends them.
 class Children {
  public:
   ~Children() {
+    for (const Child& child : running_) ::kill(child.pid, kRemoveAndEnd);
+    const Clock::time_point begin = Clock::now();
     for (const Child& child : running_) {
-      ::kill(child.pid, SIGKILL);
-      ::waitpid(child.pid, nullptr, 0);
+      while (::waitpid(child.pid, nullptr, WNOHANG) == 0) {
+        if (SecondsSince(begin) > kEnd_s) ::kill(child.pid, SIGKILL);
+        ::usleep(1000);
+      }
       ::close(child.answer);
     }
   }
@@ -326,7 +337,7 @@ ProcessResult ResultOf(Child child) {
   } else if (WIFEXITED(status) && WEXITSTATUS(status) == kMemoryExit) {
     result.ending = ProcessEnding::kOverMemory;
     result.text =
-        fmt::format("{} more than {} MiB", child.text.empty() ? "asked for" : child.text + ",",
+        fmt::format("{} more than {} MiB", child.text.empty() ? "requested" : child.text + ",",
                     child.limits.memory_mb);
   } else if (!child.killed.empty()) {
     result.ending = ProcessEnding::kOverTime;

@@ -99,7 +99,7 @@ void ReportAmbiguous(const JsonNode& root, const std::vector<const Kind*>& kinds
     const bool possible = kinds.empty() || std::ranges::find(kinds, &kind) != kinds.end();
     if (possible) expected.push_back(WithKeys(kind, kind.own, [](const auto&) { return true; }));
   }
-  root.FailAs(kinds.empty() ? "no key that tells the kind of a file"
+  root.FailAs(kinds.empty() ? "no key that identifies the file type"
                             : fmt::format("keys of {}", ListInWords(found)),
               fmt::format("those of one kind: {}", ListInWords(expected, "or")));
 }

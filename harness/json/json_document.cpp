@@ -333,7 +333,7 @@ std::string Hint(std::string_view text, std::size_t position, std::string_view w
   std::size_t at = position - 1;
   const char offending = text[at];
   if (offending == '/' || offending == '#') return " (comments are not allowed)";
-  if (offending == '\'') return " (strings stand in double quotes)";
+  if (offending == '\'') return " (strings need double quotes)";
   const std::string_view number = word.substr(word[0] == '-' || word[0] == '+' ? 1 : 0);
   if (number.starts_with("NaN") || number.starts_with("nan") || number.starts_with("Inf") ||
       number.starts_with("inf")) {

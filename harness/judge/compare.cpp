@@ -17,6 +17,7 @@
 #include "harness/record/noise.h"
 #include "harness/record/provenance.h"
 #include "harness/tables/table.h"
+#include "harness/text/words.h"
 
 namespace loopbench::harness {
 
@@ -93,11 +94,13 @@ Ruling CompareValues(const Pair& pair, const CompareOptions& options, Finding* f
 
 constexpr double kGap = 1.5;  ///< ratio that exceeds the usual noise of one machine
 
-/// Returns true if samples of at least three times are separated by the factor `gap`. Rank tests of
-/// few repetitions cannot decide among many times.
-bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh, double gap) {
+/// Returns true if samples are separated by the factor kGap `margin`. Rank tests of few repetitions
+/// cannot decide among many times. One or two times may both contain an interruption.
+bool AreApart(const std::vector<double>& base, const std::vector<double>& fresh, double margin) {
   constexpr std::size_t kFewest = 3;
-  if (std::min(base.size(), fresh.size()) < kFewest) return false;
+  constexpr double kGapOfFew = 4.0;
+  const bool is_few = std::min(base.size(), fresh.size()) < kFewest;
+  const double gap = (is_few ? kGapOfFew : kGap) * margin;
   const auto [base_least, base_most] = std::ranges::minmax(base);
   const auto [fresh_least, fresh_most] = std::ranges::minmax(fresh);
   return fresh_least > gap * base_most || base_least > gap * fresh_most;
@@ -134,7 +137,7 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
   const double faster = MannWhitney(base, lifted_fresh).p_greater;
   finding->p = std::min(1.0, 2.0 * std::min(slower, faster));
   finding->least_p = 2.0 * SmallestP(base.size(), fresh.size());
-  finding->is_apart = AreApart(base, fresh, kGap * margin);
+  finding->is_apart = AreApart(base, fresh, margin);
 }
 
 /// Returns the ruling for a missing or invalid measure; nothing if both sides have it.
@@ -222,9 +225,8 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
   for (std::size_t i = 0; i < times.size(); ++i) {
     Finding& finding = *times[i];
     finding.p = adjusted[i];
-    // two zero medians have no ratio and no difference
     const bool is_sure = finding.p <= options.alpha;
-    if ((is_sure || finding.is_apart) && !std::isnan(finding.ratio)) {
+    if (is_sure || finding.is_apart) {
       finding.judgement = finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter;
       finding.why = is_sure ? fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p)
                             : fmt::format("ratio {:.3f}, samples far apart", finding.ratio);
@@ -232,7 +234,7 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
       finding.judgement = Judgement::kNotMeasured;
     } else if (finding.least_p * tests > options.alpha) {
       finding.judgement = Judgement::kNotMeasured;
-      finding.why = fmt::format("too few repetitions to decide among {} times", times.size());
+      finding.why = "too few repetitions to decide among " + WithCount(times.size(), "time");
     } else if (finding.ratio > kGap || finding.ratio < 1.0 / kGap) {
       finding.judgement = Judgement::kNotMeasured;
       finding.why = fmt::format("ratio {:.3g} of medians, but samples overlap", finding.ratio);
@@ -290,7 +292,7 @@ int ComparisonReport::Count(Judgement judgement, std::string_view group) const {
 std::string ComparisonReport::Obstacle(const CompareOptions& options) const {
   std::vector<std::string> reasons;
   const auto count = [&reasons](const std::vector<std::string>& cases, const char* what) {
-    if (!cases.empty()) reasons.push_back(fmt::format("{} cases {}", cases.size(), what));
+    if (!cases.empty()) reasons.push_back(WithCount(cases.size(), "case") + " " + what);
   };
   if (!options.subset) count(only_base, "only in BASE");
   if (!options.added) count(only_fresh, "only in NEW");
@@ -303,7 +305,7 @@ std::string ComparisonReport::Obstacle(const CompareOptions& options) const {
   const bool no_time = std::ranges::all_of(
       times, [](const Finding* finding) { return finding->judgement == Judgement::kNotMeasured; });
   if (!times.empty() && no_time) {
-    reasons.push_back(fmt::format("{} times not comparable: {}", times.size(), times.front()->why));
+    reasons.push_back(WithCount(times.size(), "time") + " not comparable: " + times.front()->why);
   }
   const bool is_any = Count(Judgement::kNotMeasured) < static_cast<int>(findings.size());
   if (reasons.empty() && !is_any) reasons.emplace_back("too little in common");

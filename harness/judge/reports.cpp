@@ -206,7 +206,7 @@ std::string CountCells(const RobustnessMap& map) {
       text += fmt::format("{} {} {}", text.empty() ? "" : ",", count, ToString(state));
     }
   }
-  return fmt::format("{} cells:{}", total, text);
+  return WithCount(total, "cell") + ":" + text;
 }
 
 }  // namespace

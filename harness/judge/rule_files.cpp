@@ -146,7 +146,8 @@ const Fields<Check>& CheckFields() {
        {"tolerance", NumberSchema(kNotNegative), "Tolerance of within, around the threshold."},
        {"word", TextSchema(), "Word of is and is-not."},
        {"", By(Json::parse(kDemandRules), ReadDemand)},
-       {"failed_runs", Choice(&Check::failed_runs_hold, {"fail", "hold"}, "what a failed run does"),
+       {"failed_runs",
+        Choice(&Check::failed_runs_hold, {"fail", "hold"}, "the effect of a failed run"),
         "hold: runs that did not finish satisfy a check that expects failure."}});
   return fields;
 }

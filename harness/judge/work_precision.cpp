@@ -385,8 +385,8 @@ std::string ErrorLine(const WorkPrecision& work_precision) {
     line += " m";
   }
   if (bounds > 0) {
-    line += fmt::format("; {} row{} no larger error than that: the bound stands in their place",
-                        bounds, bounds == 1 ? " has" : "s have");
+    line += fmt::format("; {} row{} no larger error than that: the bound replaces {}", bounds,
+                        bounds == 1 ? " has" : "s have", bounds == 1 ? "it" : "them");
   }
   if (beyond > 0) {
     line += fmt::format("; {} row{} beyond the validity limit of the reference of their problem",

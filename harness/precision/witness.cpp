@@ -272,7 +272,7 @@ Certified<Space, S> Certify(const MechanismDescription& description,
                             const std::vector<double>& times, double cpu_s, PutBack put_back) {
   const S tightest = S(Tightest<S>(put_back)) * std::numeric_limits<S>::epsilon();
   Certified<Space, S> result;
-  result.witnesses = put_back == PutBack::kAtStages ? "gragg, stages put back," : "gragg";
+  result.witnesses = put_back == PutBack::kAtStages ? "gragg, stages projected," : "gragg";
   std::vector<double> followed = times;
   const auto follow = [&](const char* formulation, double factor, int fewer) {
     const WitnessOptions<S> options{formulation, S(factor) * tightest, fewer, put_back, cpu_s};

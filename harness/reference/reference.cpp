@@ -265,7 +265,7 @@ std::optional<Reference> ReadReference(const std::filesystem::path& path, const 
   if (!std::filesystem::exists(path)) return std::nullopt;
   const auto refuse = [&](const std::string& why) {
     throw std::runtime_error(
-        fmt::format("{}: {} (remove it: it is made anew)", path.string(), why));
+        fmt::format("{}: {} (remove it: it is computed again)", path.string(), why));
   };
   Record record;
   try {

@@ -355,7 +355,7 @@ std::string SourcesOf(const ReportData& data) {
     text += "<h3>What is not in this page</h3>\n" + List(data.remarks);
   }
   text +=
-      "<p class=\"soft\">Curves are drawn with uPlot, under the MIT License; its text stands in "
+      "<p class=\"soft\">Curves are drawn with uPlot, under the MIT License; its text is in "
       "the "
       "source of this page.</p>\n";
   return text + "</section>\n";

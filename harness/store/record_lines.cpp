@@ -382,7 +382,7 @@ void RequireEqual(const Record& known, const std::filesystem::path& known_file, 
       known_file.string(), fresh_file.string(), known.Text("id"), known.Text("mechanism"),
       known.Text("formulation"), key, Shown(known, key), Shown(fresh, key),
       other_library ? "they come from two mathematical libraries: merge one of them"
-                    : "one of the stores is not what it says"));
+                    : "one of the stores is inconsistent"));
 }
 
 }  // namespace

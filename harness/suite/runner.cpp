@@ -102,8 +102,8 @@ void Progress::Draw() {
   drawn_ = Clock::now();
   const double left = SecondsToGo();
   std::string line =
-      fmt::format("{} {}/{}  {:.0f} s gone", what_, done_, pieces_.size(), SecondsSince(begin_));
-  if (left >= 0.0) line += fmt::format(", about {:.0f} s to go", std::ceil(left));
+      fmt::format("{} {}/{}  elapsed {:.0f} s", what_, done_, pieces_.size(), SecondsSince(begin_));
+  if (left >= 0.0) line += fmt::format(", about {:.0f} s left", std::ceil(left));
   if (!running_.empty()) {
     const Running& oldest = running_.front();
     line +=
@@ -206,7 +206,7 @@ std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
   if (result.ending == ProcessEnding::kThrew) message = "threw: " + message;
   if (result.ending == ProcessEnding::kAnswered) {
     outcome = "invalid-result";
-    message = "its process answered what is not its record";
+    message = "the output of its process is not a record of this case";
     try {
       for (std::size_t start = 0; start < result.text.size();) {
         const std::size_t end = std::min(result.text.find('\n', start), result.text.size());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <string_view>
 #include <unordered_set>
@@ -52,8 +53,8 @@ void WarnOfJobs(int jobs, const std::vector<Experiment>& experiments) {
   }
   if (jobs <= processors) return;
   PrintError(
-      "warning: --jobs {} on {} processor{}: the runs take turns, and together they may ask "
-      "for {} times the memory of one\n",
+      "warning: --jobs {} on {} processor{}: the runs share processors, and together may use {} "
+      "times the memory of one\n",
       jobs, processors, processors == 1 ? "" : "s", jobs);
 }
 
@@ -303,14 +304,33 @@ std::string WithOwnHash(std::string text) {
   return text.replace(at + kChecksum.size(), kZeros.size(), Fnv1a(text));
 }
 
+namespace {
+
+void VerifyMechanism(const std::filesystem::path& file) {
+  if (const std::string text = ReadFile(file); WithOwnHash(text) == text) return;
+  throw ChangedFile(
+      fmt::format("{}: the file was changed after its run wrote it: its checksum differs; remove "
+                  "it: the same run writes it again",
+                  file.string()));
+}
+
+}  // namespace
+
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file) {
-  if (const std::string text = ReadFile(file); WithOwnHash(text) != text) {
-    throw ChangedFile(fmt::format(
-        "{}: the file was changed after its run wrote it: its checksum is not that of the file; "
-        "remove it: the same run writes it again",
-        file.string()));
-  }
+  VerifyMechanism(file);
   return ReadMechanism(file).description;
+}
+
+void VerifyFilesOf(const std::vector<Record>& records, const std::filesystem::path& store_file) {
+  std::set<std::filesystem::path> verified;
+  for (const Record& record : records) {
+    const std::filesystem::path mechanism = MechanismOf(record, store_file);
+    const std::filesystem::path trajectory = TrajectoryOf(record, store_file);
+    if (std::filesystem::exists(mechanism) && verified.insert(mechanism).second) {
+      VerifyMechanism(mechanism);
+    }
+    if (std::filesystem::exists(trajectory)) VerifyTrajectory(record, trajectory);
+  }
 }
 
 std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file) {

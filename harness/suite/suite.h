@@ -84,6 +84,10 @@ std::string WithOwnHash(std::string text);
 /// as ReadMechanism().
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file);
 
+/// Throws ChangedFile if a mechanism or trajectory next to a store's `file` was changed after its
+/// run wrote it. Missing files are valid.
+void VerifyFilesOf(const std::vector<Record>& records, const std::filesystem::path& store_file);
+
 /// Writes missing mechanism files for all problems with stored motion (references or trajectories).
 /// Omits mechanisms with parts of other programs, which files cannot express.
 void KeepMechanisms(const std::vector<Experiment>& experiments,

@@ -292,8 +292,8 @@ std::optional<std::string> HiddenWarnings(const Table& table, std::span<const Re
   const auto flagged =
       std::ranges::count_if(runs, [](const Record& run) { return IsFlagged(run, "outcome"); });
   if (flagged == 0 || Shows(table, "warnings")) return std::nullopt;
-  return fmt::format("{} of {} runs finished with warnings; column warnings says which and why",
-                     flagged, runs.size());
+  return fmt::format("{} of {} runs finished with warnings; see column warnings", flagged,
+                     runs.size());
 }
 
 // Returns notes for unreliable values if the chosen columns do not show this.
@@ -302,8 +302,8 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
   std::vector<std::string> notes;
   const auto failed = std::ranges::count_if(table.rows, HasFailed);
   if (failed > 0 && !shows("outcome")) {
-    notes.push_back(fmt::format("{} of {} runs did not finish; column outcome says which", failed,
-                                table.rows.size()));
+    notes.push_back(
+        fmt::format("{} of {} runs did not finish; see column outcome", failed, table.rows.size()));
   }
   const bool shows_errors = std::ranges::any_of(
       table.columns, [](const TableColumn& column) { return column.key.starts_with("error_"); });
@@ -311,8 +311,8 @@ std::vector<std::string> WhatColumnsHide(const Table& table) {
       table.rows, [](const Record& row) { return row.Number("error_over_uncertainty") <= 1.0; });
   if (shows_errors && within > 0) {
     notes.push_back(fmt::format(
-        "{} of {} runs are as near to a published series as that is accurate: it does not tell "
-        "them from the truth (column error_over_uncertainty, at most 1)",
+        "{} of {} runs are as near to a published series as that is accurate: it cannot "
+        "distinguish them from the truth (column error_over_uncertainty, at most 1)",
         within, table.rows.size()));
   }
   const bool unresolved = std::ranges::any_of(table.columns, [&](const TableColumn& column) {

@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "harness/text/run_program.h"
+#include "harness/text/terminal.h"
 
 namespace loopbench::harness {
 
@@ -137,7 +138,7 @@ void HearSignals() {
   struct sigaction end = {}, before = {};
   end.sa_handler = &RemoveAndEnd;
   end.sa_flags = SA_RESTART;
-  const auto signals = {SIGHUP, SIGINT, SIGTERM};
+  const auto signals = {SIGHUP, SIGINT, SIGTERM, kRemoveAndEnd};
   for (const int signal : signals) ::sigaddset(&end.sa_mask, signal);
   for (const int signal : signals) {
     ::sigaction(signal, nullptr, &before);
@@ -259,7 +260,9 @@ Destination DestinationOf(const fs::path& path, Onto onto) {
     Refuse(path, S_ISBLK(there.st_mode) ? "a block device" : "a socket");
   }
   for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
-    if (::fstat(stream, &other) == 0 && IdOf(other) == IdOf(there)) return {.stream = stream};
+    if (::fstat(stream, &other) != 0 || IdOf(other) != IdOf(there)) continue;
+    if (stream == STDOUT_FILENO && !S_ISCHR(there.st_mode)) KeepOutputForFile();
+    return {.stream = stream};
   }
   if (!S_ISREG(there.st_mode)) return {};
   {

@@ -1,6 +1,7 @@
 // Whole files, read and written at once, and their errors.
 #pragma once
 
+#include <csignal>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -65,8 +66,12 @@ std::string ReadFile(const std::filesystem::path& path);
 
 // Temporary files and folders of a command: none remains, however the command ends.
 
-/// Temporary file or folder. It is removed with its owner, and before SIGHUP, SIGINT or SIGTERM
-/// ends this process. A signal that is ignored or has a handler (processes.h) stays unchanged.
+/// The signal with which a parent ends a child process, whose temporary files are then removed.
+inline constexpr int kRemoveAndEnd = SIGUSR1;
+
+/// Temporary file or folder. It is removed with its owner, and before SIGHUP, SIGINT, SIGTERM or
+/// kRemoveAndEnd ends this process. A signal that is ignored or has a handler (processes.h) stays
+/// unchanged.
 class Unfinished {
  public:
   explicit Unfinished(const std::filesystem::path& path);

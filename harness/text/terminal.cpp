@@ -51,6 +51,7 @@ void ShowWide() { output_screen.width = 0; }
 namespace {
 
 int first_failure = 0;  ///< errno of the first failed write to standard output, or 0
+bool is_output_file = false;
 
 bool ReaderIsGone() {
   pollfd output = {STDOUT_FILENO, POLLOUT, 0};
@@ -70,7 +71,10 @@ void PrepareStreams() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
+void KeepOutputForFile() { is_output_file = true; }
+
 void PrintText(std::string_view text) {
+  if (is_output_file) return PrintErrorText(text);
   errno = 0;
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (!written && first_failure == 0) first_failure = errno;

@@ -45,6 +45,9 @@ void PrepareStreams();
 /// and machine formats. FinishOutput() reports a failed write.
 void PrintText(std::string_view text);
 
+/// From now on, PrintText() writes to standard error: a file of the command is standard output.
+void KeepOutputForFile();
+
 /// Writes to standard error; does nothing if that cannot be written.
 void PrintErrorText(std::string_view text);
 

@@ -42,7 +42,9 @@ std::string LetterOf(std::size_t index) {
 }
 
 std::string WithCount(std::size_t count, const std::string& word) {
-  return std::to_string(count) + " " + word + (count == 1 ? "" : "s");
+  const std::string number = std::to_string(count) + " ";
+  if (count == 1) return number + word;
+  return number + (word.ends_with('y') ? word.substr(0, word.size() - 1) + "ies" : word + "s");
 }
 
 int EditDistance(std::string_view a, std::string_view b) {

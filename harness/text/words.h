@@ -24,7 +24,7 @@ std::string ListInWords(const std::vector<std::string>& words, std::string_view 
 /// Returns "A", "B", ..., "Z", "A1", ...: a short name of the index-th of many things.
 std::string LetterOf(std::size_t index);
 
-/// Returns "1 run", "2 runs".
+/// Returns "1 run", "2 runs", "2 bodies".
 std::string WithCount(std::size_t count, const std::string& word);
 
 /// Returns the number of single-letter insertions, deletions, replacements and swaps of neighbours

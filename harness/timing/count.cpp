@@ -18,6 +18,7 @@
 #include "harness/text/files.h"
 #include "harness/text/numeric_option.h"
 #include "harness/text/terminal.h"
+#include "harness/text/words.h"
 #include "harness/timing/allocations.h"
 #include "harness/timing/subject.h"
 
@@ -112,7 +113,7 @@ int Count(const Options& options) {
     }
   }
   if (!options.out.empty()) WriteFileAtomically(options.out, lines);
-  Print("{} cases\n", part);
+  Print("{}\n", WithCount(part, "case"));
   return part == 0 ? 2 : 0;
 }
 

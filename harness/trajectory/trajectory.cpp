@@ -25,6 +25,8 @@ namespace loopbench::harness {
 
 namespace {
 
+constexpr std::size_t kBuffer = 1 << 20;
+constexpr const char* kPart = ".part";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// Returns the next cell of a line from `*at` and moves `*at` after its comma; past the line at the
@@ -89,7 +91,7 @@ TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : path_(pa
   bool has_time = false;
   for (std::size_t at = 0; at <= line_.size();) {
     const auto cell = NextCell(line_, &at, &room);
-    if (!cell) Refuse("a quotation mark without its end", "labels, quoted as RFC 4180 says");
+    if (!cell) Refuse("a quotation mark without its end", "labels, quoted by RFC 4180");
     const std::string label(Trimmed(*cell));
     if (!seen.insert(label).second)
       Refuse(fmt::format("\"{}\" twice", Excerpt(label)), "each label once");
@@ -116,7 +118,10 @@ bool TrajectoryReader::NextLine() {
 }
 
 bool TrajectoryReader::Next(std::vector<double>* row) {
-  if (!NextLine()) return false;
+  if (!NextLine()) {
+    if (!has_row_) Refuse("no row", "a motion");
+    return false;
+  }
   row->clear();
   std::string room;
   for (std::size_t at = 0; at <= line_.size();) {
@@ -150,8 +155,8 @@ void TrajectoryReader::RequireNumbers(const std::vector<double>& row,
 }
 
 void TrajectoryReader::Refuse(const std::string& found, const std::string& expected) const {
-  throw std::runtime_error(
-      fmt::format("{}:{}: found {}, expected {}", path_.string(), number_, found, expected));
+  throw std::runtime_error(fmt::format("{}:{}: found {}, expected {}", path_.string(),
+                                       std::max<std::size_t>(number_, 1), found, expected));
 }
 
 Trajectory ReadTrajectory(const std::filesystem::path& path) {
@@ -212,13 +217,6 @@ std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
                                      const std::string& id) {
   return store_file.parent_path() / "trajectories" / (id + ".csv");
 }
-namespace {
-
-constexpr std::size_t kBuffer = 1 << 20;
-constexpr const char* kPart = ".part";
-
-}  // namespace
-
 TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path,
                                    const std::vector<TrajectoryColumn>& columns,
                                    const std::vector<std::string>& notes, TrajectoryFormat format)
@@ -339,11 +337,14 @@ std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
       const std::filesystem::path from = TrajectoryOf(record, store);
       if (!IsAsWritten(record, from)) continue;
       is_there = true;
-      std::filesystem::path part = to;
-      part += ".part";
-      MakeFolderOf(part);
-      std::filesystem::copy_file(from, part, std::filesystem::copy_options::overwrite_existing);
-      std::filesystem::rename(part, to);
+      OutputFile copy(to, Onto::kAnyFile, kPart);
+      std::ifstream file(from, std::ios::binary);
+      for (std::string buffer(kBuffer, '\0');
+           file.read(buffer.data(), kBuffer), file.gcount() > 0;) {
+        copy.Write(std::string_view(buffer).substr(0, file.gcount()));
+      }
+      if (file.bad()) FailOn("read", from);
+      copy.Finish();
       break;
     }
     if (!is_there) missing.push_back(to.filename().string());

@@ -152,14 +152,14 @@ constexpr const char* kBody = R"(<header>
 <label><input type="checkbox" id="names" checked> names</label>
 <label><input type="checkbox" id="centres" checked> centres of mass</label>
 <label id="pathslabel"><input type="checkbox" id="paths"> paths of named points</label>
-<label><input type="checkbox" id="given"{3}> as the file says it, with open loops</label>
+<label><input type="checkbox" id="given"{3}> as in the file, with open loops</label>
 <button type="button" id="fit">Whole</button>
 <button type="button" id="theme">Dark</button>
 </div>
 </div>
 <p id="keys" class="soft keys">Drag to turn (in the plane: to move), wheel or two fingers to zoom, <kbd>Shift</kbd> and
 drag to move. Keys: arrows, <kbd>+</kbd> <kbd>-</kbd> <kbd>0</kbd>, <kbd>Space</kbd> plays, <kbd>n</kbd> next motion,
-<kbd>g</kbd> as the file says it, <kbd>t</kbd> light or dark.</p>
+<kbd>g</kbd> as in the file, <kbd>t</kbd> light or dark.</p>
 </div>
 <aside id="lists" aria-label="Parts"></aside>
 </main>
@@ -194,8 +194,7 @@ std::string ToHtml(const Picture& picture) {
   const std::string failure =
       picture.assembled
           ? ""
-          : "<p class=\"failed\" role=\"alert\">Not assembled, drawn as the file says "
-            "it: " +
+          : "<p class=\"failed\" role=\"alert\">Not assembled, drawn as in the file: " +
                 EscapeXml(picture.message) + "</p>\n";
   std::string page = PageHead(title);
   page += "</style>\n</head>\n<body>\n";
@@ -234,7 +233,7 @@ class Writer {
   }
 
   Table Bodies() const {
-    Table table{.title = picture_.assembled ? "Bodies, as assembled" : "Bodies, as the file says"};
+    Table table{.title = picture_.assembled ? "Bodies, as assembled" : "Bodies, as in the file"};
     table.columns = {{"name", "body"}};
     AddPlace("", "", &table);
     table.columns.push_back({"turn", picture_.planar ? "angle [rad]" : "turn [rad]"});
@@ -298,7 +297,7 @@ class Writer {
   Table Loops() const {
     Table table{.title = "Loops"};
     table.columns = {{"name", "cut joint"},
-                     {"gap", "open as the file says [m]"},
+                     {"gap", "open in the file [m]"},
                      {"turn", "[rad]"},
                      {"left", "assembled [m]"},
                      {"bodies", "bodies"}};

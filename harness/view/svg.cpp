@@ -474,7 +474,7 @@ class Document {
     constexpr std::size_t kMaxLines = 10, kMaxCharacters = 98;
     std::vector<std::string> lines;
     if (!picture_.assembled) {
-      lines = {"NOT ASSEMBLED, drawn as the file says it; red: what should meet", picture_.message};
+      lines = {"NOT ASSEMBLED, drawn as in the file; red: what should meet", picture_.message};
     }
     if (!picture_.freedom.empty()) lines.push_back("degrees of freedom: " + picture_.freedom);
     for (const PictureLoop& loop : picture_.loops) {
@@ -484,7 +484,7 @@ class Document {
       }
     }
     if (ghost)
-      lines.push_back("grey, dashed: as the file says it, before the assembly closed the loops");
+      lines.push_back("grey, dashed: as in the file, before the assembly closed the loops");
     // parts with equal text share a line
     std::vector<std::pair<std::string, std::string>> gone;
     for (const PictureItem& item : picture_.items) {

@@ -24,7 +24,7 @@
 #include "tests/contract/comparison.h"
 
 namespace loopbench::testing {
-namespace {
+namespace property_test {
 
 constexpr int kSamples = 300;  // in each space
 constexpr Real kLost = 1e-12L, kKept = 1e-4L;
@@ -322,5 +322,5 @@ TEST(PropertyTest, MechanismsOfAllKindsInSpace) {
   ExamineAll<Spatial>("all kinds", DrawnKinds::kAll);
 }
 
-}  // namespace
+}  // namespace property_test
 }  // namespace loopbench::testing

@@ -146,7 +146,7 @@ TEST_F(CacheTest, ACompilerThatHangsIsEndedAndNamed) {
   fs::permissions(script, fs::perms::owner_all);
   ::setenv("CC", script.c_str(), 1);
   try {
-    RunCompiler({"--version"}, 1);
+    RunCompiler({"--version"}, {}, 1);
     ADD_FAILURE() << "ended by itself";
   } catch (const NotCovered& why) {
     EXPECT_EQ(std::string(why.what()), script.string() + " took more than 1 s");

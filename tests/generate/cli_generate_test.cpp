@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <tinyxml2.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -200,6 +201,9 @@ TEST_F(GenerateTest, BadInputIsNamed) {
                {"no C compiler", "absent"});
   ExpectEnding(Call("generate four-bar.json --out code --fmu ."), 2, {"found a folder"});
   EXPECT_FALSE(fs::exists(folder_ / "code"));
+  ExpectEnding(Call("generate four-bar.json --out code --fmu code/../code/four_bar.c"), 2,
+               {"--fmu: found \"code/../code/four_bar.c\", expected a file other than"});
+  EXPECT_FALSE(fs::exists(folder_ / "code/four_bar.c"));
   EXPECT_FALSE(fs::exists(folder_ / "x.fmu"));
 }
 
@@ -401,6 +405,24 @@ TEST_F(GenerateTest, TheFmuIsValidAndMovesAsTheLibraryDoes) {
 }
 
 /// Cases of a sweep call compiled code together. One that crashes leaves the others their records.
+/// The compiler ends the program that called it, which works in a process of its own.
+TEST_F(GenerateTest, SignalsLeaveNoTemporaryFiles) {
+  Write("cc.sh",
+        "#!/bin/sh\ncase \"$*\" in *--version*) exec cc --version;; esac\necho > \"$TMPDIR/part\"\n"
+        "read pid < pid; kill -$SIGNAL $pid; exec sleep 9\n");
+  fs::permissions(folder_ / "cc.sh", fs::perms::owner_all);
+  Write("call.sh", "echo $$ > pid; exec \"$@\"\n");
+  fs::create_directory(folder_ / "tmp");
+  for (const std::string signal : {"TERM", "HUP", "INT"}) {
+    const Ending ending = Call("generate four-bar.json --out code --fmu x.fmu",
+                               "SIGNAL=" + signal + " CC=./cc.sh TMPDIR=$PWD/tmp sh call.sh");
+    EXPECT_GE(ending.code, 128) << ending.text;
+    // the child process may end after its parent
+    for (int i = 0; i < 500 && !fs::is_empty(folder_ / "tmp"); ++i) ::usleep(10'000);
+    EXPECT_TRUE(fs::is_empty(folder_ / "tmp")) << signal;
+  }
+}
+
 TEST_F(GenerateTest, CasesOfASweepShareCallsAndHaveTheBitsThatTheyHaveAlone) {
   Write("sweep.json", R"({"name": "sweep", "timing": {"repeats": 0}, "tolerances": [1e-6],
     "problems": [{"mechanism": ")" +

@@ -33,7 +33,7 @@ TEST_F(ComparisonCommands, CompareARunWithItselfAndWithAPlantedDrift) {
   }
   Expect("compare base worse", 1,
          {"worse", "four-bar odca", "drift_position_max [m]", "REGRESSION: 1"});
-  Expect("compare worse base", 0, {"better", "BETTER: 1 measures, none worse"});
+  Expect("compare worse base", 0, {"better", "BETTER: 1 measure, none worse"});
   Expect("compare base worse --only counts --only hashes", 0, {"NO CHANGE"});
   Expect("compare base worse --only times", 2, {"INCONCLUSIVE"});
   Expect("export-metrics base --format bmf", 0,
@@ -71,14 +71,16 @@ TEST_F(ComparisonCommands, APathIsNotComparedWithItself) {
 
 // Files of Google Benchmark name a machine only where the program wrote it.
 TEST_F(ComparisonCommands, TimesOfNoOrAnotherMachineAreNotComparable) {
-  const auto write = [this](const std::string& name, const std::string& machine, int time) {
+  std::string key = "machine";
+  const auto write = [&](const std::string& name, const std::string& machine, int time,
+                         int repetitions = 20) {
     std::string runs;
-    for (int i = 0; i < 20; ++i) {
+    for (int i = 0; i < repetitions; ++i) {
       const std::string ns = std::to_string(time * (100 + i % 3));
       runs += (i > 0 ? "," : "") + std::string(R"({"name":"a","cpu_time":)") + ns +
               ",\"real_time\":" + ns + "}";
     }
-    Write(name, "{\"context\":{" + (machine.empty() ? "" : "\"machine\":\"" + machine + "\"") +
+    Write(name, "{\"context\":{" + (machine.empty() ? "" : '"' + key + "\":\"" + machine + "\"") +
                     "},\"benchmarks\":[" + runs + "]}");
   };
   write("none.json", "", 1);
@@ -87,13 +89,28 @@ TEST_F(ComparisonCommands, TimesOfNoOrAnotherMachineAreNotComparable) {
   write("same-here.json", "here", 1);
   write("slow-here.json", "here", 10);
   write("slow-there.json", "there", 10);
-  const std::string unknown = "INCONCLUSIVE: 1 times not comparable: machine not known";
+  const std::string unknown = "INCONCLUSIVE: 1 time not comparable: machine not known";
   Expect("compare none.json slow-none.json", 2, {unknown});
   Expect("compare none.json slow-here.json --junit j.xml", 2, {unknown});
   EXPECT_NE(ReadFile(folder_ / "j.xml").find("errors=\"1\""), std::string::npos);
-  Expect("compare here.json slow-there.json", 2, {"1 times not comparable: another machine"});
-  Expect("compare here.json slow-here.json", 1, {"REGRESSION: 1 measures"});
+  Expect("compare here.json slow-there.json", 2, {"1 time not comparable: another machine"});
+  Expect("compare here.json slow-here.json", 1, {"REGRESSION: 1 measure"});
   Expect("compare here.json same-here.json", 0, {"NO CHANGE"});
+  // one repetition of each decides from a factor of 4 on
+  write("one.json", "here", 1, 1);
+  write("one-slower.json", "here", 3, 1);
+  write("one-slow.json", "here", 10, 1);
+  Expect("compare one.json one-slower.json", 2, {"too few repetitions"});
+  Expect("compare one.json one-slow.json", 1, {"ratio 10.000, samples far apart"});
+  write("zero.json", "here", 0);
+  Expect("compare here.json zero.json", 1, {"20 null or not positive"});
+  // other programs write the name of the host
+  key = "host_name";
+  write("host.json", "h", 1);
+  write("slow-host.json", "h", 10);
+  write("slow-other.json", "g", 10);
+  Expect("compare host.json slow-host.json", 1, {"REGRESSION"});
+  Expect("compare host.json slow-other.json", 2, {"another machine"});
 }
 
 TEST_F(ComparisonCommands, RefuseNumbersThatSwitchGatesOff) {
@@ -144,9 +161,9 @@ TEST_F(ComparisonCommands, NameEveryDifference) {
          {"not exported: accuracy tiny four-bar odca", "drift_position_max: found null"});
   ASSERT_EQ(Call("run tiny.json --out half --filter formulation=odca").code, 0);
   const std::string missing = "  accuracy tiny four-bar lagrange";
-  Expect("compare base half", 2, {"1 cases only in BASE:", missing});
-  Expect("compare half base", 2, {"1 cases only in NEW:", missing, "1 cases only in NEW"});
-  Expect("compare half base --added", 0, {"1 cases only in NEW:", missing, "NO CHANGE"});
+  Expect("compare base half", 2, {"1 case only in BASE:", missing});
+  Expect("compare half base", 2, {"1 case only in NEW:", missing, "1 case only in NEW"});
+  Expect("compare half base --added", 0, {"1 case only in NEW:", missing, "NO CHANGE"});
   Expect("compare base half --format csv", 2, {"only in BASE,accuracy tiny four-bar lagrange"});
 }
 
@@ -156,8 +173,9 @@ TEST_F(ComparisonCommands, NullSamplesEndTheComparison) {
         R"("series.wall_s":[null],"machine":"m","compiler":"c","flags":"f","libm":"l"})"
         "\n");
   fs::copy_file(folder_ / "null.jsonl", folder_ / "null2.jsonl");
-  Expect("compare null.jsonl null2.jsonl", 1,
-         {"different", "series.wall_s", "1 values (1 null or negative)", "expected finite times"});
+  Expect(
+      "compare null.jsonl null2.jsonl", 1,
+      {"different", "series.wall_s", "1 values (1 null or not positive)", "expected finite times"});
   Expect("export-metrics null.jsonl", 2,
          {"series.wall_s: found 1 values (1 null", "nothing to export"});
 }

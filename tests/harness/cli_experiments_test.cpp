@@ -103,11 +103,11 @@ TEST_F(CommandLineTest, PlanCountsCasesRunsAndTimings) {
                {"axis mass: 2 values", "2 combinations", "3 cases, 9 runs", "3 timings", "pilot",
                 "Estimated from"});
   ExpectEnding(Call("estimate sweep.json --filter formulation=lagrange"), 0,
-               {"1 cases, 1 runs", "1 timings"});
+               {"1 case, 1 run", "1 timing"});
   const Ending untimed = Call("estimate sweep.json --no-timing");
   ExpectEnding(untimed, 0, {"3 cases, 9 runs", " 0 timings"});
   EXPECT_EQ(untimed.text.find(", timings"), std::string::npos) << untimed.text;
-  ExpectEnding(Call("list sweep.json --filter formulation=lagrange"), 0, {"1 cases and 1 timings"});
+  ExpectEnding(Call("list sweep.json --filter formulation=lagrange"), 0, {"1 case and 1 timing"});
   ExpectEnding(Call("run sweep.json --filter formulation=lagrange --out few"), 0, {});
   EXPECT_EQ(ReadRecords(folder_ / "few").size(), 2u) << "a run and its timing";
   ExpectEnding(Call("run sweep.json --no-timing --out out"), 0, {});

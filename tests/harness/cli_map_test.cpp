@@ -54,7 +54,7 @@ TEST_F(MapCommandTest, GateFailsOnWhatMustHoldAndDoesNot) {
 }
 
 TEST_F(MapCommandTest, RefusesBadInput) {
-  ExpectEnding(Call("check map.json"), 0, {"robustness map of 1 rows and 2 methods"});
+  ExpectEnding(Call("check map.json"), 0, {"robustness map of 1 row and 2 methods"});
   ExpectEnding(Call("robustness nowhere --rules map.json"), 2, {"nowhere"});
   ExpectEnding(Call("robustness out --rules nowhere.json"), 2, {"nowhere.json"});
   ExpectEnding(

@@ -109,13 +109,13 @@ TEST_F(SimplifyTest, BodiesJointsAndPointsKeepTheirNames) {
 
 TEST_F(SimplifyTest, LimitsAreSaidByName) {
   ExpectEnding(Call("simplify light-rod-compressor.json --threshold light-links=0.001"), 0,
-               {"0.00138  no", "taken up to 0.001", "cannot be simplified: no idea applies"});
+               {"0.00138  no", "taken up to 0.001", "cannot be simplified: no rule applies"});
   ExpectEnding(Call("simplify excavator-arm.json --only stiff-springs"), 0, {"10.6    no"});
   ExpectEnding(
       Call("simplify excavator-arm.json --only stiff-springs --threshold stiff-springs=10"), 0,
       {"10.6    yes", "taken from 10"});
   ExpectEnding(Call("simplify light-rod-compressor.json --lump-mass none --only light-links"), 0,
-               {"0.02 kg are gone"});
+               {"0.02 kg removed"});
 }
 
 TEST_F(SimplifyTest, ErrorsAreDistancesOfPointsFromTheWholeModel) {
@@ -289,7 +289,7 @@ TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
   ExpectEnding(Call(judge + "1e-3"), 0,
                {"Compared with the certified motion of the full model", "full model",
                 "accepted at 0.001 m", "2 records in s/results.jsonl"});
-  ExpectEnding(Call(judge + "1e-9"), 0, {"refused at 1e-09 m"});
+  ExpectEnding(Call(judge + "1e-9"), 0, {"rejected at 1e-09 m"});
   const std::vector<Record> records = ReadRecords(folder_ / "s");
   ASSERT_EQ(records.size(), 4u);
   const Record &whole = records[0], &rod = records[1];
@@ -304,7 +304,7 @@ TEST_F(SimplifyTest, JudgesEachModelByTheErrorItCausesAndKeepsARecord) {
   EXPECT_GT(rod.Number("model_wall_ratio"), 0.0);
   ExpectEnding(Call("table s --kind models --where 'model_error>1e-9' --format csv --columns "
                     "model,model_error,model_accepts,model_verdict,model_wall_ratio"),
-               0, {"light-links,", "refused at 1e-09 m"});
+               0, {"light-links,", "rejected at 1e-09 m"});
   ExpectEnding(Call("table s --format latex"), 0, {"light-links"});
 }
 

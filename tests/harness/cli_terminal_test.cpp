@@ -160,15 +160,15 @@ TEST_F(CliTerminalTest, CtrlCKeepsWhatIsDoneAndSaysHowToGoOn) {
   const std::size_t first = seen.text.find("accuracy 0/4");
   ASSERT_NE(first, std::string::npos) << seen.text;
   EXPECT_NE(seen.text.find("now four-bar", first), std::string::npos) << seen.text;
-  EXPECT_NE(seen.text.find("s to go", first), std::string::npos) << seen.text;
-  EXPECT_NE(seen.text.find("3 records are kept in o ut/results.jsonl, 3 of them of this run"),
+  EXPECT_NE(seen.text.find("s left", first), std::string::npos) << seen.text;
+  EXPECT_NE(seen.text.find("3 records kept in o ut/results.jsonl, 3 of them of this run"),
             std::string::npos)
       << seen.text;
   std::vector<std::string> warnings;
   EXPECT_EQ(ReadRecords(store, &warnings).size(), 3u);
   EXPECT_TRUE(warnings.empty());
   // the command that it says, word for word
-  const std::string say = "to go on: ";
+  const std::string say = "to resume: ";
   const std::size_t begin = seen.text.find(say) + say.size();
   const std::string command = seen.text.substr(begin, seen.text.find('\n', begin) - begin);
   const TerminalEnding again = OnTerminal("cd '" + folder_.string() + "' && " + command, 100);
@@ -190,7 +190,7 @@ TEST_F(CliTerminalTest, EveryLineOfProgressFitsTheTerminal) {
     }
   }
   EXPECT_GT(lines, 2u);
-  EXPECT_EQ(Call("run tiny.json --out other").text.find("s gone"), std::string::npos);
+  EXPECT_EQ(Call("run tiny.json --out other").text.find("elapsed"), std::string::npos);
 }
 
 }  // namespace cli_terminal_test

@@ -108,12 +108,12 @@ TEST_F(CommandLineTest, UnreachableAssemblyIsARowAndNoError) {
 TEST_F(CommandLineTest, ListShowsEveryCase) {
   ExpectEnding(Call("list tiny.json"), 0,
                {"tiny: two cases", "four-bar", "odca", "lagrange", "2 cases and 0 timings"});
-  ExpectEnding(Call("list tiny.json --filter formulation=odca"), 0, {"1 cases and 0 timings"});
+  ExpectEnding(Call("list tiny.json --filter formulation=odca"), 0, {"1 case and 0 timings"});
 }
 
 TEST_F(CommandLineTest, CheckCountsWhatSoundFilesHold) {
   ExpectEnding(Call("check tiny.json four-bar.json"), 0, {"2 cases", "3 bodies, 4 joints"});
-  ExpectEnding(Call("check claims.json"), 0, {"claims.json: 1 claims"});
+  ExpectEnding(Call("check claims.json"), 0, {"claims.json: 1 claim"});
 }
 
 TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
@@ -182,7 +182,8 @@ TEST_F(CommandLineTest, FreeFiguresAreDrawnAndMistakesRefused) {
                {"wrote figures/energy_error_max-over-steps.pdf"});
   ExpectEnding(Call("plot out --out figures --format pdf"), 0, {"figures to figures"});
   EXPECT_TRUE(fs::exists(folder_ / "figures/drift-four-bar-0.5s-rtol-1e-06.pdf"));
-  ExpectEnding(Call("plot out --out w.svg --x steps"), 2, {"--x KEY and --y KEY"});
+  ExpectEnding(Call("plot out --out w.svg --x steps"), 2, {"found --x KEY without --y KEY"});
+  ExpectEnding(Call("plot out --out w.svg --title t"), 2, {"need --x KEY and --y KEY"});
   ExpectEnding(Call("plot out --out w.svg --x step --y steps"), 2,
                {"--x: found \"step\"", "did you mean \"steps\""});
   ExpectEnding(Call("plot out --out w.svg --x steps --y steps --format pdf"), 2,

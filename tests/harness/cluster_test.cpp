@@ -62,7 +62,7 @@ TEST_F(Cluster, PartsAreMergedToWhatOneRunGives) {
   EXPECT_FALSE(fs::exists(folder_ / "parts/whole"));
   EXPECT_EQ(Part("3").code, 0);
   ExpectEnding(Part("3"), 0, {"ran 0 cases"});  // a second time: nothing is left
-  ExpectEnding(Call("collect parts"), 0, {"6 records of 4 stores are 6 cases"});
+  ExpectEnding(Call("collect parts"), 0, {"6 records of 4 stores: 6 cases"});
   // a run writes cases as they end, long ones first; a merge in the order of the experiment
   std::vector<std::string> merged = Lines("parts/whole"), whole = Lines("whole");
   EXPECT_NE(merged.front().find("odca"), std::string::npos);
@@ -94,7 +94,7 @@ TEST_F(Cluster, AMergeIsThereWhenItIsWhole) {
     ExpectEnding(Call("collect parts"), 2, {"in use by process "});
     ::close(other);
   }
-  ExpectEnding(Call("collect parts"), 0, {"2 records of 2 stores are 2 cases"});
+  ExpectEnding(Call("collect parts"), 0, {"2 records of 2 stores: 2 cases"});
   EXPECT_TRUE(is_merged());
   ExpectEnding(Call("collect parts"), 0, {"is there already"});
 }
@@ -139,7 +139,7 @@ TEST_F(Cluster, APathMayHoldWhatSlurmAndShellsRead) {
       Call("submit six.json --tasks 2 --no-timing --no-queue --out 'a b%j #'"), 0,
       {"each part: sh " + quoted + "/part.sh' K; then: loopbench collect " + quoted + "'\n"});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out 'a b%j #'"), 2,
-               {"to go on with it: loopbench submit --resubmit --out " + quoted + "'\n"});
+               {"to resume it: loopbench submit --resubmit --out " + quoted + "'\n"});
   ExpectEnding(Call("", "sh 'a b%j #/part.sh' 1 2>&1; exit $?;"), 0, {"ran 3 cases"});
   const std::string text = ReadFile(folder_ / "a b%j #/collect.sh");
   EXPECT_NE(text.find("#SBATCH --output=\"" + folder_.string() + "/a b%%j #/logs/collect.log\"\n"),
@@ -178,8 +178,9 @@ TEST_F(Cluster, AgainTakesWhatTheFolderSays) {
   for (const char* option : {"--tasks 7", "--jobs 1", "--time 1", "--partition p", "--sbatch=--a",
                              "--filter a=b", "--set /a=b", "--no-timing", "--isolate"}) {
     const std::string name = std::string(option).substr(0, std::string(option).find_first_of(" ="));
-    ExpectEnding(Call(std::string("submit --resubmit --out parts ") + option), 2,
-                 {"--resubmit: found " + name + " beside it, expected none: the folder knows"});
+    ExpectEnding(
+        Call(std::string("submit --resubmit --out parts ") + option), 2,
+        {"--resubmit: found " + name + " beside it, expected none: the folder contains them"});
   }
   fs::remove(folder_ / "parts/part.sh");  // of a submit that was killed
   ExpectEnding(Call("submit --resubmit --no-queue --out parts"), 0,
@@ -200,7 +201,7 @@ TEST_F(Cluster, ACaseOfTwoFilesIsOneCaseOfOnePart) {
   ExpectEnding(Call(submit + " --out parts"), 0, {"9 cases in 4 parts"});
   for (const char* k : {"1", "2", "3", "4"}) EXPECT_EQ(Part(k).code, 0);
   ExpectEnding(Call("status parts --json"), 0, {"\"cases\":9", "\"done\":9", "\"to_do\":0"});
-  ExpectEnding(Call("collect parts"), 0, {"9 records of 4 stores are 9 cases"});
+  ExpectEnding(Call("collect parts"), 0, {"9 records of 4 stores: 9 cases"});
 }
 
 TEST_F(Cluster, OfSubmitsAtOnceOneMakesTheFolder) {

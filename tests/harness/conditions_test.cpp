@@ -113,7 +113,7 @@ TEST_F(ConditionsProgram, ChooseRecordsByWhatTheyMeasured) {
 
 TEST_F(ConditionsProgram, ChooseCasesByTheirKeysAlone) {
   ExpectEnding(Call("list tiny.json --filter 'rtol<1e-5' --filter 'formulation!=odca'"), 0,
-               {"1 cases"});
+               {"1 case"});
   ExpectEnding(Call("run tiny.json --out out --filter 'rtol>1e-5'"), 2,
                {"no case matches rtol>1e-5"});
   ExpectEnding(Call("estimate tiny.json --filter 'horizon>=0.5'"), 0, {"2 cases"});

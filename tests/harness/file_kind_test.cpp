@@ -92,7 +92,7 @@ TEST_F(FileKindTest, AnAmbiguousFileIsAnsweredWithWhatWasFound) {
                 "(\"bodies\", \"joints\") or an experiment (\"problems\", \"methods\")");
   for (const char* text :
        {"{}", "{\"benchmarks\": []}", "{\"name\": \"x\"}", "{\"title\": \"x\"}"}) {
-    EXPECT_NE(MessageOf(text).find("found no key that tells the kind of a file"), std::string::npos)
+    EXPECT_NE(MessageOf(text).find("found no key that identifies the file type"), std::string::npos)
         << text;
   }
 }

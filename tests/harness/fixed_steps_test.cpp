@@ -228,7 +228,7 @@ TEST_F(FixedStepsProgram, StandInEveryTableAndNowhereElse) {
     "timing": {"repeats": 1, "cases": true}})");
   ExpectEnding(Call("list steps.json"), 0, {"integrator", "step [s]", "4 cases and 4 timings"});
   ExpectEnding(Call("explain steps.json"), 0, {"ode45, verner", "fixed steps", "of each case"});
-  ExpectEnding(Call("estimate steps.json"), 0, {"1 tolerances, 1 fixed steps, 2 integrators"});
+  ExpectEnding(Call("estimate steps.json"), 0, {"1 tolerance, 1 fixed step, 2 integrators"});
   ExpectEnding(Call("run steps.json --out out"), 0, {"ran 8 cases", "step [s]", "verner"});
   ExpectEnding(
       Call("table out --where step=0.05 --columns integrator,rtol,step,steps --format csv"), 0,

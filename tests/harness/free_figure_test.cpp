@@ -7,7 +7,9 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "harness/text/files.h"
@@ -208,6 +210,30 @@ TEST(FreeFigure, PointsThatShareAnXAreNotJoinedAndTheRemarkSaysWhatIsMixed) {
   ASSERT_EQ(result.remarks.size(), 1u);
   EXPECT_TRUE(result.remarks[0].starts_with("curves mix values of formulation;"))
       << result.remarks[0];
+}
+
+// Levels differ by the dashes of their lines.
+TEST(FreeFigure, CloudsOfPointsDifferByColourAndMark) {
+  std::vector<Record> runs;
+  for (const char* level : {"acceleration", "velocity", "projection"}) {
+    for (const double drift : {1.0, 2.0}) {
+      runs.push_back(RunOf("odca", 1e-6, drift));
+      runs.back().Set("enforcement", std::string(level));
+    }
+  }
+  runs.push_back(RunOf("odca", 1e-8, 1.0));
+  runs.back().Set("drift_position_max", Value());
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.group = "enforcement";
+  const FreeFigureResult result = MakeFreeFigure(runs, wanted);
+  std::set<std::pair<std::string, Shape>> styles;
+  for (const Curve& curve : result.figure.curves) {
+    EXPECT_FALSE(curve.line);
+    styles.emplace(curve.style.color, curve.style.shape);
+  }
+  EXPECT_EQ(styles.size(), 3u);
+  EXPECT_EQ(result.remarks.back(),
+            "1 of 7 runs are not drawn: no value of rtol or drift_position_max");
 }
 
 TEST(FreeFigure, TextsOnTheHorizontalAxisAreNamedTicks) {

@@ -69,8 +69,8 @@ TEST(Memory, ThatCannotBeHadIsRefusedByName) {
         [](std::size_t) { return ProcessLimits{.cpu_s = 10.0, .memory_mb = 64.0}; },
         [&](std::size_t, const ProcessResult& ended) { result = ended; });
     EXPECT_EQ(result.ending, ProcessEnding::kOverMemory);
-    EXPECT_EQ(result.text, numbers == 1e9 ? "a matrix asks for 8 GB, more than 64 MiB"
-                                          : "a matrix asks for 8e+21 GB, more than 64 MiB");
+    EXPECT_EQ(result.text, numbers == 1e9 ? "a matrix requires 8 GB, more than 64 MiB"
+                                          : "a matrix requires 8e+21 GB, more than 64 MiB");
     EXPECT_LT(result.cpu_s, 1.0);
   }
   RequireDense("a small matrix", 1e4);
@@ -125,7 +125,7 @@ Words With(Words words, const std::string& word) {
 TEST_F(CommandLineTest, FormulationsTooDenseForTheirLimitsSaySo) {
   if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
   const Words why = {"multipliers are dense", "matrices of 4000 constraints and 4001 speeds",
-                     "asks for 1.28 GB", "more than 200 MiB"};
+                     "requires 1.28 GB", "more than 200 MiB"};
   Write("large.json", OnFamily(R"({"family": "ladder", "windows": 2000})",
                                R"({"cpu_s": 10, "memory_mb": 200})", "plain"));
   ExpectEnding(Call("run large.json --out out"), 0, {"ran 1 case (1 not finished)"});
@@ -140,8 +140,8 @@ TEST_F(CommandLineTest, FormulationsTooDenseForTheirLimitsSaySo) {
                With(With(why,
                          "Pilot run stopped: ladder-2000 "
                          "lagrange/acceleration/joint/plain: memory-limit"),
-                    "1 cases, 1 runs"));
-  ExpectEnding(Call("check large.json"), 0, {"1 cases"});
+                    "1 case, 1 run"));
+  ExpectEnding(Call("check large.json"), 0, {"1 case"});
 }
 
 TEST_F(CommandLineTest, LargeStartsAndMultipliersAreSparse) {
@@ -159,14 +159,14 @@ TEST_F(CommandLineTest, StartsTooDenseForTheirLimitsSaySo) {
   if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
   const Words why = {"long: its loops are close to a position where they lose rank",
                      "the consistent start is dense", "4000 constraints by 4001 speeds",
-                     "asks for 0.384 GB", "more than 128 MiB"};
+                     "requires 0.384 GB", "more than 128 MiB"};
   Write("long.json", LadderFile(2000, 0.0));
   Write("large.json", R"({"name": "large", "problems": [{"mechanism": "long.json", "horizon": 0.5}],
     "methods": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": 1e-6,
     "limits": {"cpu_s": 10, "memory_mb": 128}, "timing": {"repeats": 0}})");
   ExpectEnding(Call("check large.json"), 2,
                With(why, "problem \"long\": its start was not assembled (memory-limit)"));
-  ExpectEnding(Call("check large.json --no-assembly"), 0, {"1 cases"});
+  ExpectEnding(Call("check large.json --no-assembly"), 0, {"1 case"});
   ExpectEnding(Call("explain long.json --memory-limit 128"), 2,
                With(why, "long.json: cut off (memory-limit)"));
   ExpectEnding(Call("check long.json --memory-limit 128"), 2, why);
@@ -180,7 +180,7 @@ TEST_F(CommandLineTest, PilotsAreCutOffByTheLimitOfTheirCase) {
                                R"({"cpu_s": 0.01, "memory_mb": 6000})", "rank-revealing"));
   ExpectEnding(
       Call("estimate large.json"), 0,
-      {"Pilot run stopped: chain-100000", "process-time-limit", "of CPU time", "1 cases, 1 runs"});
+      {"Pilot run stopped: chain-100000", "process-time-limit", "of CPU time", "1 case, 1 run"});
 }
 
 TEST_F(CommandLineTest, CheckAssemblesStarts) {

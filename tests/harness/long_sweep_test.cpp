@@ -101,7 +101,7 @@ TEST_F(LongSweeps, RunInGroupsGoOnAndAreSharded) {
     ExpectEnding(Call("run long.json --shard " + k + "/3 --out part" + k), 0, {});
     parts += " part" + k;
   }
-  ExpectEnding(Call("merge" + parts + " --out merged"), 0, {"of 3 stores are " + all + " cases"});
+  ExpectEnding(Call("merge" + parts + " --out merged"), 0, {"of 3 stores: " + all + " cases"});
   EXPECT_EQ(HashesOf("merged"), whole);
 }
 

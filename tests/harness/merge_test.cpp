@@ -52,8 +52,8 @@ TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
   CopyStore("whole", "cut",
             [](Record* record) { record->Set("outcome", std::string("time-limit")); });
   for (const fs::path& file : Files("cut/trajectories")) WriteFileAtomically(file, "t [s]\n0\n");
-  ExpectEnding(Call("merge cut whole --out m1"), 0, {"are 2 cases"});
-  ExpectEnding(Call("merge whole cut --out m2"), 0, {"are 2 cases"});
+  ExpectEnding(Call("merge cut whole --out m1"), 0, {": 2 cases"});
+  ExpectEnding(Call("merge whole cut --out m2"), 0, {": 2 cases"});
   ExpectTrajectories("m1", "whole");
   ExpectTrajectories("m2", "whole");
 
@@ -62,7 +62,7 @@ TEST_F(MergeCommandTest, TrajectoriesAreThoseOfTheRecordsThatAreKept) {
   fs::remove_all(folder_ / "bare/trajectories");
   for (const std::string order : {"whole bare --out m3", "bare whole --out m4"}) {
     const Ending merged = Call("merge " + order);
-    ExpectEnding(merged, 0, {"are 2 cases"});
+    ExpectEnding(merged, 0, {": 2 cases"});
     EXPECT_EQ(merged.text.find("warning"), std::string::npos) << merged.text;
     ExpectTrajectories(order.substr(order.size() - 2), "whole");
   }
@@ -81,7 +81,7 @@ TEST_F(MergeCommandTest, OneThatFailsLeavesNothing) {
   EXPECT_TRUE(Files("m").empty());
   // what one that was killed left
   Write("m/results.jsonl.merging", "{\"kind\":");
-  ExpectEnding(Call("merge a --out m"), 0, {"are 2 cases"});
+  ExpectEnding(Call("merge a --out m"), 0, {": 2 cases"});
   EXPECT_EQ(Files("m").size(), 1u);
   EXPECT_EQ(ReadRecords(folder_ / "m").size(), 2u);
 }
@@ -98,7 +98,7 @@ TEST_F(MergeCommandTest, OneAtATime) {
     const ResultStore run(folder_ / "m");  // that has no record yet
     ExpectEnding(Call("merge a --out m"), 2, {"m/results.jsonl'", "in use by process "});
   }
-  ExpectEnding(Call("merge a --out m"), 0, {"are 2 cases"});
+  ExpectEnding(Call("merge a --out m"), 0, {": 2 cases"});
 }
 
 TEST_F(MergeCommandTest, TheTargetIsLookedAtBeforeTheStores) {
@@ -148,7 +148,7 @@ TEST_F(MergeCommandTest, ALinkStaysOne) {
   ExpectEnding(Call("run tiny.json --out a"), 0, {});
   fs::create_directories(folder_ / "far/away");
   fs::create_symlink("far/away/m.jsonl", folder_ / "m.jsonl");
-  ExpectEnding(Call("merge a --out m.jsonl"), 0, {"are 2 cases"});
+  ExpectEnding(Call("merge a --out m.jsonl"), 0, {": 2 cases"});
   EXPECT_TRUE(fs::is_symlink(folder_ / "m.jsonl"));
   EXPECT_EQ(ReadRecords(folder_ / "far/away/m.jsonl").size(), 2u);
 }

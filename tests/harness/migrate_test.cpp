@@ -124,7 +124,7 @@ TEST_F(MigrateTest, OldRulesAreReadAfterwards) {
   std::string claims = kTinyClaims;
   claims.replace(claims.find("partially_reproduced"), 20, "only_under");
   EXPECT_EQ(Migrated("claims.json", claims), kTinyClaims);
-  ExpectEnding(Call("check map.json claims.json"), 0, {"robustness map of 1 rows and 1 methods"});
+  ExpectEnding(Call("check map.json claims.json"), 0, {"robustness map of 1 row and 1 method"});
 }
 
 TEST_F(MigrateTest, AnOldStoreIsReadAfterwards) {

@@ -87,13 +87,22 @@ TEST_F(OutputFiles, GoesToStandardOutputBehindWhatWasPrinted) {
   ExpectEnding(Call("run tiny.json --out out"), 0, {});
   for (const std::string out : {"/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"}) {
     const std::string table = "table out --format csv --out " + out;
-    ExpectEnding(Call("", "'" LOOPBENCH_BINARY "' " + table + " > text; exit $?;"), 0, {});
+    ExpectEnding(Call("", "'" LOOPBENCH_BINARY "' " + table + " > text 2> messages; exit $?;"), 0,
+                 {});
     const std::string text = ReadFile(At("text"));
     EXPECT_TRUE(text.starts_with("experiment,mechanism,")) << text;
-    ExpectPart(text, "wrote " + out);
+    EXPECT_EQ(text.find("wrote"), text.npos) << text;
+    ExpectPart(ReadFile(At("messages")), "wrote " + out);
     ExpectEnding(Call(table), 0, {"experiment,mechanism,", "wrote " + out});  // a pipe
   }
   ExpectEnding(Call("view four-bar.json --format svg --out /dev/stdout"), 0, {"<svg", "wrote"});
+  // messages go to standard error
+  const std::string svg =
+      Call("", "'" LOOPBENCH_BINARY
+               "' view four-bar.json --format svg --out /dev/stdout 2>err; exit $?;")
+          .text;
+  EXPECT_TRUE(svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 100);
+  EXPECT_EQ(ReadFile(At("err")).substr(0, 17), "wrote /dev/stdout");
 }
 
 TEST_F(OutputFiles, KeepsWhatAFileMayBe) {

@@ -256,7 +256,7 @@ TEST_F(Shards, TogetherAreTheWhole) {
     parts += " part" + k;
   }
   EXPECT_EQ(sum, 20u) << "no case in two shards";
-  ExpectEnding(Call("merge" + parts + " part2 --out merged"), 0, {"of 4 stores are 20 cases"});
+  ExpectEnding(Call("merge" + parts + " part2 --out merged"), 0, {"of 4 stores: 20 cases"});
   EXPECT_EQ(Hashes(folder_ / "merged"), Hashes(folder_ / "whole"));
   ExpectEnding(Call("run sweep.json --out merged"), 0, {"ran 0 cases, 20 reused"});
   EXPECT_EQ(TableOf(folder_ / "merged"), TableOf(folder_ / "whole"));
@@ -268,7 +268,7 @@ TEST_F(Shards, ThatDisagreeAreRefused) {
   other.Set("state_hash", std::string("0123456789abcdef"));
   ResultStore(folder_ / "b.jsonl").Append(other);
   ExpectEnding(Call("merge a b.jsonl --out c"), 2,
-               {"a and b.jsonl", "state_hash", "one of the stores is not"});
+               {"a and b.jsonl", "state_hash", "one of the stores is inconsistent"});
   EXPECT_FALSE(fs::exists(folder_ / "c/results.jsonl"));
 }
 

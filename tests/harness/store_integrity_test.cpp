@@ -263,15 +263,15 @@ TEST_F(StoreIntegrity, RecordsOfOneIdThatDifferStopAMerge) {
   const std::string id = records[0].Text("id");
   for (const std::string order : {"a drift.jsonl", "drift.jsonl a"}) {
     ExpectEnding(Call("merge " + order + " --out m"), 2,
-                 {" and ", "drift.jsonl", id, "drift_position_max", "123", "not what it says"});
+                 {" and ", "drift.jsonl", id, "drift_position_max", "123", "is inconsistent"});
   }
   ExpectEnding(Call("merge a series.jsonl --out m"), 2, {"series.drift"});
   ExpectEnding(Call("merge a more.jsonl --out m"), 2, {"has extra nothing in the first and 1"});
   EXPECT_FALSE(fs::exists(folder_ / "m"));
   // times differ from run to run, and a run that was cut short gives way
-  ExpectEnding(Call("merge a time.jsonl --out times"), 0, {"3 records of 2 stores are 2 cases"});
+  ExpectEnding(Call("merge a time.jsonl --out times"), 0, {"3 records of 2 stores: 2 cases"});
   for (const std::string order : {"a late.jsonl --out m1", "late.jsonl a --out m2"}) {
-    ExpectEnding(Call("merge " + order), 0, {"are 2 cases"});
+    ExpectEnding(Call("merge " + order), 0, {": 2 cases"});
   }
   EXPECT_EQ(Call("table m1 --format csv --columns outcome,steps").text.find("time-limit"),
             std::string::npos);

@@ -194,7 +194,7 @@ TEST(TrackRecords, NamesEveryValueThatIsNone) {
            {"steps", std::nan(""), "found nan"},
            {"steps", true, "found true"},
            {"instructions", std::int64_t{0}, "found 0, expected a finite number > 0"},
-           {"series.cpu_ns", sample, "found 3 values (1 null or negative)"}}) {
+           {"series.cpu_ns", sample, "found 3 values (1 null or not positive)"}}) {
     std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
     records.pop_back();
     records[0].Set(key, value);

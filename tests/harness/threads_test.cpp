@@ -23,7 +23,7 @@ TEST_F(CommandLineTest, ThreadsChangeNothingButTimes) {
     EXPECT_EQ(record.Text("state_hash"), hash);
   }
   EXPECT_EQ(with_threads, 2);
-  ExpectEnding(Call("list long.json --filter threads=2"), 0, {"threads", "1 cases"});
+  ExpectEnding(Call("list long.json --filter threads=2"), 0, {"threads", "1 case"});
   ExpectEnding(Call("list long.json --filter threads=3"), 2, {"no case matches"});
   ExpectEnding(Call("list long.json --filter thread=2"), 2, {"no such key", "threads"});
   ExpectEnding(Call("run long.json --no-timing --threads 3 --out three"), 0, {"ran 1 case"});

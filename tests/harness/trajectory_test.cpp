@@ -97,15 +97,14 @@ TEST_F(File, OfAnotherProgramIsReadWithWhatItHas) {
 
 TEST_F(File, ThatIsNoneIsRefusedWithItsPlace) {
   Write("");
-  EXPECT_EQ(Refusal().substr(0, 32), ":0: found no line of labels, exp");
+  EXPECT_EQ(Refusal().substr(0, 32), ":1: found no line of labels, exp");
   Write("x [m]\n1\n");
   EXPECT_EQ(Refusal(), ":1: found no column \"t [s]\", expected a column of times");
   Write("t [s],t [s]\n");
   EXPECT_EQ(Refusal(), ":1: found \"t [s]\" twice, expected each label once");
   Write("t [s],\"x\n1,2\n");
   EXPECT_EQ(Refusal(),
-            ":1: found a quotation mark without its end, expected labels, quoted as RFC "
-            "4180 says");
+            ":1: found a quotation mark without its end, expected labels, quoted by RFC 4180");
   Write("t [s],x\n0,1\n1\n");
   EXPECT_EQ(Refusal(), ":3: found 1 values, expected 2, as labels");
   Write("t [s],x\n0,0x10\n");
@@ -197,7 +196,7 @@ TEST_F(Command, MistakesOfOutputAreNamed) {
     EXPECT_FALSE(fs::exists(folder_ / "out"));
   };
   refused("{}", "/output: found no times, expected one of");
-  refused(R"({"step": 0.1, "number": 3})", "/output: found several ways to say times");
+  refused(R"({"step": 0.1, "number": 3})", "/output: found several definitions of times");
   refused(R"({"times": [1, 1]})", "/output/times: found times that do not rise");
   refused(R"({"accepted_steps": true, "exact": true})", "\"exact\" beside \"accepted_steps\"");
   refused(R"({"step": 1e-300})", "rows, expected at most 100000000");
@@ -410,6 +409,16 @@ TEST_F(Command, WhatIsMissingIsNamed) {
   EXPECT_FALSE(fs::exists(folder_ / "y.csv"));
 }
 
+TEST_F(Command, OptionsWithoutEffectAreRejected) {
+  Write("ours.csv", "t [s],joint:OA:angle [rad]\n0,0\n");
+  const std::string ours = "trajectory ours.csv ";
+  ExpectEnding(Call(ours + "--compare-with ours.csv --out x.csv"), 2, {"--compare-with", "--out"});
+  ExpectEnding(Call(ours + "--where rtol=1"), 2, {"--where: found a trajectory, 'ours.csv'"});
+  ExpectEnding(Call(ours + "--format jsonl"), 2, {"--format requires --out"});
+  ExpectEnding(Call(ours + "--every 2"), 2, {"--every requires --out"});
+  ExpectEnding(Call(ours + "--columns t"), 2, {"--columns: found neither --out"});
+}
+
 TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   WriteExperiment(R"({"number": 5, "quantities": ["joints", "bodies"]})", "four-bar.json");
   ExpectEnding(Call("run out.json --out out"), 0, {});
@@ -438,7 +447,7 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
       }
     }
     write(5, "", 0);
-    ExpectEnding(Call(command), 2, {"theirs.csv: found no row"});
+    ExpectEnding(Call(command), 2, {"theirs.csv:1: found no row"});
   }
   write(1, "nan");
   ExpectEnding(Call("trajectory ours.csv --compare-with theirs.csv"), 2,
@@ -446,7 +455,19 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   ExpectEnding(Call("trajectory theirs.csv --compare-with theirs.csv"), 2, {"found nan in"});
   // numbers whose energy is none
   write(1, "1e300");
-  ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not known"});
+  ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not checked"});
+  // columns of another unit are not compared
+  Write("degrees.csv", "t [s],joint:OA:angle [rad],joint:AB:angle [deg],x [m]\n0,0,0,0\n");
+  ExpectEnding(Call("trajectory degrees.csv --compare-with ours.csv"), 0,
+               {"2 columns only in degrees.csv, not compared: joint:AB:angle [deg], x [m]",
+                "only in ours.csv, not compared: "});
+  Write("empty.csv", "t [s],joint:OA:angle [rad]\n");
+  ExpectEnding(Call("trajectory empty.csv"), 2, {"empty.csv:1: found no row, expected a motion"});
+  ExpectEnding(Call("trajectory empty.csv --out copy.csv"), 2, {"empty.csv:1: found no row"});
+  EXPECT_FALSE(fs::exists(folder_ / "copy.csv"));
+  Write("latin.csv", "t [s],w\xFC [m]\n0,0\n");
+  ExpectEnding(Call("trajectory latin.csv --format jsonl --out x.jsonl"), 2,
+               {"latin.csv: label 2:1:3: found the byte FC, which is not UTF-8"});
   Write("early.csv", "t [s],joint:OA:angle [rad]\n-1,0\n0,0\n");
   ExpectEnding(Call("trajectory early.csv --compare-with ours.csv"), 0,
                {"1 of 2 rows are not compared"});
@@ -503,7 +524,7 @@ TEST_F(Command, MergeCarriesTrajectoriesAndAResumedRunLeavesNoParts) {
                {"not finished"});
   EXPECT_EQ(Files("crashed/trajectories").size(), 1u);
   fs::remove_all(folder_ / "one/trajectories");
-  ExpectEnding(Call("trajectory one"), 2, {"it is gone; run --rerun all makes it again"});
+  ExpectEnding(Call("trajectory one"), 2, {"missing; run --rerun all writes it"});
 }
 
 TEST_F(Command, OneLineReadsItInGnuplotAndPandas) {

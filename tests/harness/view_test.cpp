@@ -353,7 +353,7 @@ class ViewCommandLine : public CommandLineTest {};
 
 TEST_F(ViewCommandLine, WritesWhatIsAskedFor) {
   ExpectEnding(Call("view four-bar.json"), 0,
-               {"wrote four-bar.html", "3 bodies, 4 joints, 1 motions"});
+               {"wrote four-bar.html", "3 bodies, 4 joints, 1 motion"});
   ExpectEnding(Call("view four-bar.json --out a/b.svg --no-annotations"), 0, {"wrote a/b.svg"});
   EXPECT_TRUE(ReadFile(folder_ / "a/b.svg").starts_with("<?xml"));
   EXPECT_TRUE(ReadFile(folder_ / "four-bar.html").starts_with("<!doctype html>"));

@@ -281,7 +281,7 @@ TEST(ConstantPartsTest, ARunMustHaveShownThem) {
   run.travels["O"] = {1e-5, 0.0};
   EXPECT_EQ(FreezeConstantParts(d, run, {}).why_not, "nothing would move");
   run.travels["O"] = run.travels["A"] = {0.0, 1.0};
-  EXPECT_EQ(FreezeConstantParts(d, run, {}).why_not, "no joint stands still");
+  EXPECT_EQ(FreezeConstantParts(d, run, {}).why_not, "no joint is at rest");
 }
 
 TEST(ConstantPartsTest, NothingStopsThatMoves) {

@@ -38,7 +38,7 @@ const LoopbenchScene = (() => {
       this.poses = picture.start;
       this.ghosts = [];
       this.traces = [];          // paths of the picture's named points
-      this.gaps = false;         // how open loops are as the file says it
+      this.gaps = false;         // how open loops are in the file
       this.names = true;
       this.centres = true;
       this.highlight = new Set();  // items

@@ -139,8 +139,8 @@
     const redundant = loop.redundant.map((one) => 'redundant: ' + one);
     return {item: -1, loop, name: 'through ' + cut.name,
             text: [loop.gap > 1e-9 * picture.extent
-                ? 'open by ' + LoopbenchScene.number(loop.gap) + ' m as the file says it'
-                : 'closed as the file says it', ...redundant].join('; ')};
+                ? 'open by ' + LoopbenchScene.number(loop.gap) + ' m in the file'
+                : 'closed in the file', ...redundant].join('; ')};
   });
   list('Loops', loops, (entry, button) => {
     const on = button.getAttribute('aria-pressed') !== 'true';
@@ -154,7 +154,7 @@
   list('Joints', itemsOf('joint'), pickEntry);
   list('Forces', itemsOf('force'), pickEntry);
   if (picture.notes.length > 0) {
-    byId('lists').append(make('h2', {}, 'What a run leaves out, and what is not shown'),
+    byId('lists').append(make('h2', {}, 'Omitted by runs, and not drawn'),
                          ...picture.notes.map((note) => make('p', {class: 'soft'}, note)));
   }
 

@@ -15,7 +15,7 @@ void RequireDense(const std::string& what, double numbers) {
   if (granted) return;
   char size[32];
   std::snprintf(size, sizeof size, "%.3g GB", 1e-9 * bytes);
-  throw TooDense(what + " asks for " + size);
+  throw TooDense(what + " requires " + size);
 }
 
 }  // namespace loopbench

@@ -20,7 +20,7 @@ class TooDense : public std::bad_alloc {
 inline constexpr double kKeptReady = 2e7;
 
 /// Allocates memory for so many numbers at once and frees it untouched. A process without enough
-/// memory thus fails at once, not hours later. Throws TooDense with "`what` asks for N GB".
+/// memory thus fails at once, not hours later. Throws TooDense with "`what` requires N GB".
 void RequireDense(const std::string& what, double numbers);
 
 }  // namespace loopbench

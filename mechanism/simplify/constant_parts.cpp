@@ -86,7 +86,7 @@ class Freezing {
         least = candidate;
         break;
       }
-      if (least == nullptr) return "no joint stands still";
+      if (least == nullptr) return "no joint is at rest";
       least->taken = false;
       least->why = "held, it would stop joint \"" + name + "\", which moves";
     }
@@ -119,7 +119,7 @@ class Freezing {
       any = true;
       sets.Unite(joint.from.body, joint.to.body);
     }
-    if (!any) return "no joint stands still";
+    if (!any) return "no joint is at rest";
     if (sets.AllStandStill()) return "nothing would move";
     attachments_ = Attachments(d_, sets, starts_);
     result_.parts = {MergeRigidBodies(d_, attachments_, &renumbering_)};

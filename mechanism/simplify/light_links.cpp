@@ -138,7 +138,7 @@ std::string LumpingRemainder(const BodyDescription& body, const Link& link, Lump
   std::string text = "body \"" + body.name + "\" with its own inertia " +
                      NumberText(in_plane ? inertia : across, 4) +
                      " kg m^2 across the rod; two lumps have " + NumberText(lumped, 4);
-  if (left > 0.0) text += "; " + NumberText(left, 4) + " kg are gone";
+  if (left > 0.0) text += "; " + NumberText(left, 4) + " kg removed";
   return text;
 }
 

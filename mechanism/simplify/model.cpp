@@ -83,7 +83,7 @@ Simplified Uncoupled(const MechanismDescription& description, const ShortRun& ru
   if (description.couplings.empty() && !has_rotor) return rule(description, run, options);
   Simplified result;
   result.parts = {description};
-  result.why_not = "the rule does not know couplings and rotors";
+  result.why_not = "the rule does not support couplings and rotors";
   return result;
 }
 

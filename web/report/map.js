@@ -84,7 +84,7 @@ const LoopbenchMap = (() => {
 
     explain(group, row, cell, c) {
       const lines = [
-        ['what decided', cell.reason || cell.limit || (cell.state === 'holds' ? 'all measures as demanded' : '')],
+        ['deciding value', cell.reason || cell.limit || (cell.state === 'holds' ? 'all measures as demanded' : '')],
         ['number', cell.number],
         ['runs', cell.holding + ' of ' + cell.records + ' hold' + (cell.records < cell.cases ? ', ' + cell.cases + ' expected' : '')],
         ['demanded of every run', row.demands.join('; ')],

@@ -112,7 +112,7 @@ const LoopbenchPlots = (() => {
       super();
       Object.assign(this, {plot, table, clock, rows: [], chosen: -1, hovered: -1, range: null, logX: false, logY: true});
       const log = (name, label) => check(label, this[name], (on) => { this[name] = on; this.range = null; this.rebuild(); });
-      const y = log('logY', 'log ' + plot.title.split(' ')[0].toLowerCase()), x = log('logX', 'log time');
+      const y = log('logY', 'log y: ' + plot.name), x = log('logX', 'log x: time');
       this.boxes = {x: x.box, y: y.box};
       this.stage = make('div', {class: 'plot', tabindex: '0', role: 'img'});
       this.stage.addEventListener('keydown', (event) => this.press(event));

@@ -1,7 +1,8 @@
 #include "mechanism/loops/row_choice.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <utility>
 
@@ -10,6 +11,7 @@ namespace loopbench {
 RowChoice::RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int total)
     : rows_(rows),
       left_(rows),
+      scale_(rows.size() > 0 ? rows.rowwise().norm().maxCoeff() : 0.0),
       quotas_(std::move(quotas)),
       joint_of_(static_cast<std::size_t>(rows.rows())),
       is_taken_(joint_of_.size(), false),
@@ -40,7 +42,7 @@ void RowChoice::Take(int row) {
   const double norm = left_.row(row).norm();
   order_.push_back({row, norm});
   least_ = std::min(least_, norm);
-  if (!(norm > 0.0)) return;
+  if (!(norm > 1e-12 * scale_)) return;  // rounding
   const Eigen::RowVectorXd unit = left_.row(row) / norm;
   // twice: the remainder of nearly dependent rows must be orthogonal, too
   for (int pass = 0; pass < 2; ++pass) {
@@ -77,39 +79,38 @@ void RowChoice::TakeBest(int total) {
 
 void RowChoice::DropDependent() {
   std::vector<Taken> order = order_;
-  const double scale = rows_.rowwise().norm().maxCoeff();
   std::erase_if(order, [&](const Taken& one) {
-    return one.norm <= kDependent * scale && MayChange(one.row);
+    return one.norm <= kDependent * scale_ && MayChange(one.row);
   });
   if (order.size() < order_.size()) TakeAgain(order);
 }
 
 RowChoice::Projection RowChoice::OntoTaken() const {
   const auto size = static_cast<Eigen::Index>(order_.size());
-  Eigen::MatrixXd taken(size, rows_.cols());
-  for (Eigen::Index k = 0; k < size; ++k) taken.row(k) = rows_.row(order_[k].row);
-  Eigen::MatrixXd gram = taken * taken.transpose();
-  gram.diagonal().array() += 1e-12 * gram.trace();  // rows that may not change may be dependent
-  Projection onto;
-  onto.inverse = gram.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
-  const Eigen::MatrixXd along = rows_ * taken.transpose();
-  onto.T = along * onto.inverse;
-  onto.rest = rows_.rowwise().squaredNorm() - along.cwiseProduct(onto.T).rowwise().sum();
-  return onto;
+  if (size == 0) return {Eigen::MatrixXd(rows_.rows(), 0), {}};
+  Eigen::MatrixXd taken(rows_.cols(), size);
+  for (Eigen::Index k = 0; k < size; ++k) taken.col(k) = rows_.row(order_[k].row).transpose();
+  // not by the Gram matrix: it squares the ratio of small rows to large ones
+  const Eigen::MatrixXd inverse =
+      Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(taken).pseudoInverse();
+  return {rows_ * inverse.transpose(), inverse.rowwise().squaredNorm()};
 }
 
 bool RowChoice::Augment(double tolerance) {
   const Projection onto = OntoTaken();
-  const double least = tolerance * tolerance * rows_.rowwise().squaredNorm().maxCoeff();
+  const double least = tolerance * scale_;
   constexpr int kNone = -1, kNotReached = -2;
   std::vector<int> before(is_taken_.size(), kNotReached), leaves(is_taken_.size(), kNone);
   std::vector<int> reached;
   for (int row = 0; row < rows_.rows(); ++row) {
-    if (is_taken_[row] || !MayChange(row) || !(onto.rest[row] > least)) continue;
+    if (is_taken_[row] || !MayChange(row) || !(left_.row(row).norm() > least)) continue;
     reached.push_back(row);
     before[row] = kNone;
   }
-  std::ranges::stable_sort(reached, std::greater(), [&](int row) { return onto.rest[row]; });
+  // of equals, rounding aside, the first one, so that all formulations choose alike
+  std::ranges::stable_sort(reached, std::greater(), [&](int row) {
+    return std::round(1e6 * left_.row(row).norm() / scale_);
+  });
   for (std::size_t next = 0; next < reached.size(); ++next) {
     const int row = reached[next];
     if (HasRoom(joint_of_[row])) {
@@ -147,8 +148,9 @@ void RowChoice::Exchange() {
       for (int row = 0; row < rows_.rows(); ++row) {
         if (joint_of_[row] != joint_of_[one.row] || is_taken_[row] || !MayChange(row)) continue;
         // of volume, squared
-        const double gain = onto.T(row, k) * onto.T(row, k) + onto.rest[row] * onto.inverse(k, k);
-        if (!(gain > most)) continue;
+        const double gain =
+            onto.T(row, k) * onto.T(row, k) + left_.row(row).squaredNorm() * onto.inverse[k];
+        if (!(gain > most * (1.0 + 1e-6))) continue;
         most = gain;
         out = &one;
         in = row;

@@ -36,10 +36,10 @@ class RowChoice {
     int row;
     double norm;  ///< that it had left
   };
-  /// All rows as T times the rows taken, and a rest orthogonal to these.
+  /// All rows as T times the rows taken, and a rest in left_.
   struct Projection {
-    Eigen::MatrixXd inverse, T;  ///< inverse Gram matrix of the rows taken
-    Eigen::VectorXd rest;        ///< squared norms
+    Eigen::MatrixXd T;
+    Eigen::VectorXd inverse;  ///< diagonal of the inverse Gram matrix of the rows taken
   };
   static constexpr double kDependent = 1e-6;  ///< share of the largest norm
 
@@ -63,6 +63,7 @@ class RowChoice {
   Projection OntoTaken() const;
 
   Eigen::MatrixXd rows_, left_;  ///< left_: rows less their parts along those taken
+  double scale_;                 ///< the largest norm of a row
   std::vector<Taken> order_;
   std::vector<Quota> quotas_;
   std::vector<std::size_t> joint_of_;  ///< index into the quotas, by row

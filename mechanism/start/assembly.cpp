@@ -114,7 +114,8 @@ class Assembler {
              change.norm() > kSmallChange * start_.u.norm();
     };
     bool fits = misfit <= least;
-    const bool is_rounding = !fits && is_rounded();
+    const bool is_rounding = !fits && misfit <= 100.0 * description_.accuracy * size &&
+                             mechanism_.num_u() > 0 && is_rounded();
     fits = fits || (is_rounding && misfit <= description_.accuracy * size);
     start_.u = start_.u.cwiseProduct(units_.columns);
     start_.speed_residual = InSi(left, units);

@@ -79,8 +79,8 @@ class Conflict {
     constexpr double kHint = 100.0;
     if (!(unmet_.accuracy < kHint * description_.accuracy)) return "";
     char hint[64];
-    std::snprintf(hint, sizeof hint, "; it closes with an \"accuracy\" of %.1e",
-                  1.05 * unmet_.accuracy);
+    std::snprintf(hint, sizeof hint, "; %s with an \"accuracy\" of %.1e",
+                  unmet_.speeds ? "they fit" : "it closes", 1.05 * unmet_.accuracy);
     return hint;
   }
 

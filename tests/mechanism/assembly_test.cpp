@@ -55,6 +55,23 @@ TEST(AssemblyTest, AFourBarIsAssembledFromGuesses) {
   EXPECT_EQ(start.u, VectorX<double>::Zero(3));
 }
 
+/// A bar welded to Ground by one joint, and hinged to it by another with a speed.
+TEST(AssemblyTest, SpeedsOfWhatCannotMoveAreInconsistent) {
+  const Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  for (const double speed : {1.0, 1e-8}) {
+    MechanismDescription d;
+    d.name = "welded";
+    d.bodies.push_back(Bar("bar", 1.0, 1.0, 1.0));
+    d.joints = {Revolute("W", 0, origin, 1, origin), Revolute("R", 0, origin, 1, origin)};
+    d.joints[0].type = JointType::kWeld;
+    d.joints[1].cut = true;
+    d.initial.speeds = {{1, {speed}}};
+    const Joints mechanism(d, Coordinates::kJoint);
+    const Start<double> start = Assemble<Planar>(d, mechanism);
+    EXPECT_EQ(start.outcome, Outcome::kInconsistentStart) << start.message;
+  }
+}
+
 TEST(AssemblyTest, ConsistentDataAreLeftAsTheyAre) {
   for (int n : {3, 10, 50}) {
     const MechanismDescription d = Chain(n);

@@ -260,7 +260,7 @@ TEST(RoundedInput, SpeedsThatDoNotFitNameTheAccuracyWithWhichTheyDo) {
   };
   const std::string message = start().message;
   EXPECT_NE(message.find("no speeds that fit"), std::string::npos) << message;
-  const std::string hint = "it closes with an \"accuracy\" of ";
+  const std::string hint = "they fit with an \"accuracy\" of ";
   const std::size_t at = message.find(hint);
   ASSERT_NE(at, std::string::npos) << message;
   description.accuracy = std::stod(message.substr(at + hint.size()));

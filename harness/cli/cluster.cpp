@@ -314,7 +314,8 @@ void RequireNothingElse(const std::vector<std::string>& given) {
   const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
   for (const std::string& option : given) {
     if (may_stand.contains(option)) continue;
-    Reject("--resubmit: found {} beside it, expected none: the folder contains them", option);
+    Reject("--resubmit: found {} beside it, expected none: the folder contains the options",
+           option);
   }
 }
 

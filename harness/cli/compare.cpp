@@ -156,10 +156,13 @@ void NoteOrigins(const std::string& side, const std::vector<Record>& records,
   std::set<std::string> lines;
   for (const Record& record : records) {
     const Origin origin = OriginOf(record);
-    lines.insert(origin.machine.empty() && origin.compiler.empty()
-                     ? side + ": origin not recorded"
-                     : fmt::format("{}: commit {}, {}, {}, {}, libm {}", side, origin.commit,
-                                   origin.machine, origin.compiler, origin.flags, origin.libm));
+    std::vector<std::string> parts = {origin.machine, origin.compiler, origin.flags};
+    if (!origin.commit.empty()) parts.insert(parts.begin(), "commit " + origin.commit);
+    if (!origin.libm.empty()) parts.push_back("libm " + origin.libm);
+    std::erase(parts, "");
+    const bool is_known = !origin.machine.empty() || !origin.compiler.empty();
+    lines.insert(side + ": " +
+                 (is_known ? fmt::format("{}", fmt::join(parts, ", ")) : "origin not recorded"));
   }
   notes.insert(notes.end(), lines.begin(), lines.end());
 }

@@ -413,9 +413,10 @@ int GenerateHere(const GenerateCommand& command) {
   } catch (const generate::NotCovered& why) {
     throw ConfigError(command.mechanism.string() + ": cannot be generated: " + why.what());
   }
+  std::error_code ignored;
+  const auto archive = std::filesystem::weakly_canonical(command.fmu, ignored);
   for (const exchange::CodeFile& part : code.files) {
-    using std::filesystem::weakly_canonical;
-    if (weakly_canonical(command.out / part.name) != weakly_canonical(command.fmu)) continue;
+    if (archive.empty() || weakly_canonical(command.out / part.name, ignored) != archive) continue;
     Reject("--fmu: found \"{}\", expected a file other than the generated code",
            command.fmu.string());
   }

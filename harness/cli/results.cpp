@@ -280,6 +280,7 @@ int PrintMap(const MapCommand& command, const Typed& typed) {
   if (command.store.extension() == ".csv") return RedrawMap(rules, command);
   const std::vector<Record> records = LoadSome(command.store);
   RequireOneContent(records, command.store, "robustness");
+  VerifyFilesOf(records, StoreFile(command.store));
   const RobustnessMap map = MakeRobustnessMap(rules, records);
   if (!command.gate.empty()) RequireDemands(map, command.rules);
   Table table = MapTable(map);

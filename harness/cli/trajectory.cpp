@@ -4,6 +4,7 @@
 #include <iterator>
 #include <numbers>
 #include <ranges>
+#include <set>
 
 #include "harness/cli/commands.h"
 #include "harness/json/json_document.h"
@@ -75,7 +76,8 @@ int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to
       command.format == "jsonl" ? TrajectoryFormat::kJsonLines : TrajectoryFormat::kCsv;
   for (std::size_t i = 0; format == TrajectoryFormat::kJsonLines && i < columns.size(); ++i) {
     if (const std::string fault = EncodingFault(columns[i].Label()); !fault.empty()) {
-      Reject<std::runtime_error>("{}: label {}:{}", from.string(), chosen[i] + 1, fault);
+      Reject<std::runtime_error>("{}: label {}, byte {}", from.string(), chosen[i] + 1,
+                                 fault.substr(2));
     }
   }
   notes.insert(notes.end(), reader.notes().begin(), reader.notes().end());
@@ -215,27 +217,31 @@ void RequireFinite(double number, const std::string& label, double t,
                              file.string(), number, label, t, other.string());
 }
 
-/// Names the columns of a trajectory that the other one lacks, for example by another unit.
+/// Names the columns of a trajectory whose indices are not in `compared`, for example those of
+/// another unit.
 void NoteOthers(const Trajectory& trajectory, const std::filesystem::path& path,
-                const Trajectory& other, std::vector<std::string>& notes) {
+                const std::set<std::size_t>& compared, std::vector<std::string>& notes) {
   constexpr std::size_t kMaxNamed = 6;
   std::vector<std::string> labels;
-  for (const TrajectoryColumn& column : trajectory.columns) {
-    const std::string label = column.kind.empty() ? column.component : column.Label();
-    const auto is_same = [&label](const TrajectoryColumn& one) {
-      return (one.kind.empty() ? one.component : one.Label()) == label;
-    };
-    if (std::ranges::none_of(other.columns, is_same)) labels.push_back(label);
+  for (std::size_t i = 0; i < trajectory.columns.size(); ++i) {
+    const TrajectoryColumn& column = trajectory.columns[i];
+    if (i == trajectory.time || compared.contains(i)) continue;
+    labels.push_back(column.kind.empty() ? column.component : column.Label());
   }
   if (labels.empty()) return;
-  AddNote(notes, "{} only in {}, not compared: {}{}", WithCount(labels.size(), "column"),
-          path.string(), fmt::join(labels | std::views::take(kMaxNamed), ", "),
+  AddNote(notes, "{} of {} not compared: {}{}", WithCount(labels.size(), "column"), path.string(),
+          fmt::join(labels | std::views::take(kMaxNamed), ", "),
           labels.size() > kMaxNamed ? ", ..." : "");
 }
 
 int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   const Trajectory ours = ReadTrajectory(command.ours), theirs = ReadTrajectory(command.source);
   std::vector<SharedColumn> shared = SharedColumns(ours, theirs);
+  std::set<std::size_t> in_ours, in_theirs;
+  for (const SharedColumn& column : shared) {
+    in_ours.insert(column.in_ours);
+    in_theirs.insert(column.in_theirs);
+  }
   std::erase_if(shared, [&](const SharedColumn& column) {
     return !command.columns.empty() &&
            std::ranges::none_of(command.columns, [&](const std::string& start) {
@@ -288,8 +294,8 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
     AddNote(table.notes, "{} of {} rows are not compared: {} has no such times",
             theirs.rows() - most, theirs.rows(), command.ours.string());
   }
-  NoteOthers(ours, command.ours, theirs, table.notes);
-  NoteOthers(theirs, command.source, ours, table.notes);
+  NoteOthers(ours, command.ours, in_ours, table.notes);
+  NoteOthers(theirs, command.source, in_theirs, table.notes);
   if (between > 0) {
     AddNote(
         table.notes,

@@ -16,7 +16,7 @@ std::string NameOr(const XmlElement& element, const std::string& otherwise) {
 /// 0 (engine_core_constraint.c).
 void AddClosure(const XmlElement& equality, MjcfModel* model) {
   const bool is_weld = equality.tag() == "weld";
-  const bool turns = !is_weld || equality.Number("torquescale", 1.0) == 0.0;
+  const bool is_ball = !is_weld || equality.Number("torquescale", 1.0) == 0.0;
   const auto& rest = model->draft->at_rest;
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
   FrameOn first, second;
@@ -42,14 +42,15 @@ void AddClosure(const XmlElement& equality, MjcfModel* model) {
     first.X.p = equality.Required("anchor", "3 numbers").Vector();
     second.X = rest[second.body].Inverse() * rest[first.body] * first.X;
   }
-  for (const char* name : {"anchor", "relpose"}) equality.Attribute(name);  // not used with sites
-  if (turns) {
+  equality.Attribute("anchor");  // not used with sites
+  if (is_weld) equality.Attribute("relpose");
+  if (is_ball) {
     first.X.q.setIdentity();
     second.X.q.setIdentity();
   }
   const std::string name = NameOr(equality, equality.tag()) + model->Suffix();
   model->draft->AddLoop(equality, model->draft->NameLater(name),
-                        turns ? JointType::kSpherical : JointType::kWeld, first, second);
+                        is_ball ? JointType::kSpherical : JointType::kWeld, first, second);
 }
 
 /// Returns the coefficients of `polycoef`; missing ones have their defaults.
@@ -165,7 +166,11 @@ bool AddTendonEquality(const XmlElement& equality, const std::vector<XmlElement>
     return AddCoupling(equality, name, CoefficientsOf(tendons[0], *model), others, model);
   }
   const auto ends = is_pair ? std::nullopt : StraightEnds(tendons[0], *model);
-  if (!ends || ends->first.body == ends->second.body) {
+  if (ends && ends->first.body == ends->second.body) {
+    draft->DropWhole(equality, "both ends are on one body", PolynomialOf(equality)[0] != 0.0);
+    return false;
+  }
+  if (!ends) {
     draft->DropWhole(equality,
                      "only fixed tendons, and the length of one straight spatial tendon, are "
                      "constraints here: this is a freedom more than in the file",

@@ -25,7 +25,7 @@ constexpr DroppedReason kUrdfReasons[] = {
 
 /// Contents of <gazebo> without influence on the motion.
 constexpr DroppedReason kIdleGazebo = {
-    "plugin sensor visual collision material preserveFixedJoint disableFixedJointLumping "
+    "sensor visual collision material preserveFixedJoint disableFixedJointLumping "
     "provideFeedback selfCollide mu1 mu2 fdir1 kp kd maxVel minDepth maxContacts laserRetro",
     kOtherProgram};
 
@@ -49,7 +49,8 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   const XmlElement mass = inertial->RequiredChild("mass");
   const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
   const auto inertia = inertial->Child("inertia");
-  if (!inertia) return draft->ReadMassLater(body, [=] { inertial->RequiredChild("inertia"); });
+  if (!inertia)
+    return draft->ReadMassLater(body, [=] { inertial->RequiredChild("inertia"); });  // it moves
   const Eigen::Matrix3d I = InertiaOf([&](const char* name, bool is_moment) {
     return is_moment ? inertia->Required(name, "a number [kg m^2]").Number()
                      : inertia->Number(name, 0.0);
@@ -177,6 +178,9 @@ void AddMimic(const UrdfJoint& read, int follower, ImportDraft* draft) {
 /// Reads a <transmission>: Drake's inertia of a rotor, seen from the joint, is gear_ratio^2 times
 /// the given one.
 void ReadTransmission(const XmlElement& element, ImportDraft* draft) {
+  // other types are no part of Drake's models
+  const auto type = element.Content("type");
+  const bool is_simple = !type || type->text().find("SimpleTransmission") != std::string::npos;
   double inertia = 0.0;
   for (const XmlElement& actuator : element.Children({"actuator"})) {
     const auto value = [&](const char* tag, double otherwise, const Range& range) {
@@ -186,6 +190,7 @@ void ReadTransmission(const XmlElement& element, ImportDraft* draft) {
     const double ratio = value("drake:gear_ratio", 1.0, {});
     inertia += ratio * ratio * value("drake:rotor_inertia", 0.0, kNotNegative);
   }
+  if (!is_simple) inertia = 0.0;
   draft->DropWhole(element, inertia > 0.0 ? "only its rotor_inertia matters" : kNoActuators);
   if (inertia == 0.0) return;
   const XmlValue name = element.RequiredChild("joint").Required("name", "the name of a joint");

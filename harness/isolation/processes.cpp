@@ -186,6 +186,12 @@ void WriteAll(int descriptor, std::string_view text) {
 [[noreturn]] void Work(int answer, pid_t parent, const ProcessLimits& limits,
                        const std::function<std::string()>& work) {
   Interruption::LeaveToParent();
+  // an ignored or blocked signal survives exec
+  sigset_t end;
+  ::sigemptyset(&end);
+  ::sigaddset(&end, kRemoveAndEnd);
+  ::sigprocmask(SIG_UNBLOCK, &end, nullptr);
+  std::signal(kRemoveAndEnd, SIG_DFL);
   ::prctl(PR_SET_PDEATHSIG, kRemoveAndEnd);
   if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // the parent died before the line above
   SetLimits(limits);
@@ -207,7 +213,7 @@ void WriteAll(int descriptor, std::string_view text) {
   ::_exit(EXIT_SUCCESS);
 }
 
-constexpr double kEnd_s = 3.0;  ///< for a child that ends a program and removes its files
+constexpr double kEnd_s = 3.0;  ///< for a child to end its program and remove its files
 
 struct Child {
   std::size_t piece = 0;

@@ -226,7 +226,13 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
     Finding& finding = *times[i];
     finding.p = adjusted[i];
     const bool is_sure = finding.p <= options.alpha;
-    if (is_sure || finding.is_apart) {
+    if (std::isnan(finding.ratio)) {
+      finding.judgement = Judgement::kNotMeasured;
+      finding.why = "times of 0";
+    } else if (finding.ratio == 0.0 || std::isinf(finding.ratio)) {
+      finding.judgement = Judgement::kDifferent;
+      finding.why = "a time of 0 on one side";
+    } else if (is_sure || finding.is_apart) {
       finding.judgement = finding.ratio > 1.0 ? Judgement::kWorse : Judgement::kBetter;
       finding.why = is_sure ? fmt::format("ratio {:.3f}, p {:.2g}", finding.ratio, finding.p)
                             : fmt::format("ratio {:.3f}, samples far apart", finding.ratio);

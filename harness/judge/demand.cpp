@@ -16,7 +16,7 @@ bool EndsCase(std::string_view key) {
   return key == "case_id" || key == "id" || key == "version" || key == "outcome";
 }
 
-bool IsTime(double time) { return std::isfinite(time) && time > 0.0; }
+bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
 
 /// Group of a rule (`--only`, summary), and its valid values.
 struct FieldSet {
@@ -39,7 +39,7 @@ FieldSet FieldSetOf(Rule rule) {
     case Rule::kInstructions:
       return {"instructions", "a finite number > 0"};
     case Rule::kTime:
-      return {"times", "finite times > 0"};
+      return {"times", "finite times >= 0"};
     case Rule::kNone:
       break;
   }
@@ -97,8 +97,8 @@ std::string Shown(const Record& record, std::string_view key) {
   const auto* series = std::get_if<std::vector<double>>(value);
   if (series == nullptr) return record.Text(key);
   const auto unfit = std::ranges::count_if(*series, [](double time) { return !IsTime(time); });
-  return fmt::format("{} values{}", series->size(),
-                     unfit > 0 ? fmt::format(" ({} null or not positive)", unfit) : "");
+  return fmt::format("{}{}", WithCount(series->size(), "value"),
+                     unfit > 0 ? fmt::format(" ({} null or negative)", unfit) : "");
 }
 
 double CalibrationOf(const Record& record, std::string_view key) {

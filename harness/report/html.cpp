@@ -356,8 +356,7 @@ std::string SourcesOf(const ReportData& data) {
   }
   text +=
       "<p class=\"soft\">Curves are drawn with uPlot, under the MIT License; its text is in "
-      "the "
-      "source of this page.</p>\n";
+      "the source of this page.</p>\n";
   return text + "</section>\n";
 }
 

@@ -211,8 +211,7 @@ void Fill(const Work& work, ReportProblem* problem, std::vector<std::string>* re
   if (problem->paths.empty()) {
     problem->missing =
         "No motion of this problem could be read (omitted data are listed at the end of the "
-        "page); "
-        "with \"output\": {\"step\": 0.01} in the experiment a run keeps its own.";
+        "page); with \"output\": {\"step\": 0.01} in the experiment a run keeps its own.";
   }
 }
 

@@ -51,7 +51,7 @@ void ShowWide() { output_screen.width = 0; }
 namespace {
 
 int first_failure = 0;  ///< errno of the first failed write to standard output, or 0
-bool is_output_file = false;
+bool output_is_file = false;
 
 bool ReaderIsGone() {
   pollfd output = {STDOUT_FILENO, POLLOUT, 0};
@@ -71,10 +71,13 @@ void PrepareStreams() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-void KeepOutputForFile() { is_output_file = true; }
+void KeepOutputForFile() { output_is_file = true; }
+
+void PrintMessage(std::string_view text) {
+  output_is_file ? PrintErrorText(text) : PrintText(text);
+}
 
 void PrintText(std::string_view text) {
-  if (is_output_file) return PrintErrorText(text);
   errno = 0;
   const bool written = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
   if (!written && first_failure == 0) first_failure = errno;

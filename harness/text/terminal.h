@@ -45,8 +45,11 @@ void PrepareStreams();
 /// and machine formats. FinishOutput() reports a failed write.
 void PrintText(std::string_view text);
 
-/// From now on, PrintText() writes to standard error: a file of the command is standard output.
+/// From now on, Print() writes to standard error: a file of the command is standard output.
 void KeepOutputForFile();
+
+/// Writes a text for people to standard output, or to standard error after KeepOutputForFile().
+void PrintMessage(std::string_view text);
 
 /// Writes to standard error; does nothing if that cannot be written.
 void PrintErrorText(std::string_view text);
@@ -85,7 +88,7 @@ std::string Formatted(fmt::format_string<PrintedAs<Values>...> format, const Val
 /// terminal (EscapeTerminal).
 template <typename... Values>
 void Print(fmt::format_string<internal::PrintedAs<Values>...> format, const Values&... values) {
-  PrintText(internal::Formatted<Values...>(format, values...));
+  PrintMessage(internal::Formatted<Values...>(format, values...));
 }
 
 template <typename... Values>

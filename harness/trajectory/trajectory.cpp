@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <set>
@@ -296,16 +297,26 @@ std::filesystem::path TrajectoryOf(const Record& record, const std::filesystem::
   return TrajectoryPath(store_file, name.stem().string());
 }
 
+namespace {
+
+/// Reads a file of any size in blocks.
+void ForEachBlock(const std::filesystem::path& file,
+                  const std::function<void(std::string_view)>& use) {
+  std::ifstream in(file, std::ios::binary);
+  std::string block(kBuffer, '\0');
+  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
+    use(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
+  }
+  if (!in.eof()) FailOn("read", file);
+}
+
+}  // namespace
+
 void VerifyTrajectory(const Record& record, const std::filesystem::path& file) {
   const std::string expected = record.Text("trajectory_hash");
   if (expected.empty()) return;
   FnvHash hash;
-  std::ifstream in(file, std::ios::binary);
-  std::string block(std::size_t{1} << 20, '\0');
-  while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
-    hash.Add(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
-  }
-  if (!in.eof()) FailOn("read", file);
+  ForEachBlock(file, [&hash](std::string_view block) { hash.Add(block); });
   if (hash.Text() == expected) return;
   throw ChangedFile(
       fmt::format("{}: the file was changed after its run wrote it: found hash {}, expected {}; "
@@ -338,12 +349,7 @@ std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
       if (!IsAsWritten(record, from)) continue;
       is_there = true;
       OutputFile copy(to, Onto::kAnyFile, kPart);
-      std::ifstream file(from, std::ios::binary);
-      for (std::string buffer(kBuffer, '\0');
-           file.read(buffer.data(), kBuffer), file.gcount() > 0;) {
-        copy.Write(std::string_view(buffer).substr(0, file.gcount()));
-      }
-      if (file.bad()) FailOn("read", from);
+      ForEachBlock(from, [&copy](std::string_view block) { copy.Write(block); });
       copy.Finish();
       break;
     }

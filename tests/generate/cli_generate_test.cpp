@@ -405,24 +405,6 @@ TEST_F(GenerateTest, TheFmuIsValidAndMovesAsTheLibraryDoes) {
 }
 
 /// Cases of a sweep call compiled code together. One that crashes leaves the others their records.
-/// The compiler ends the program that called it, which works in a process of its own.
-TEST_F(GenerateTest, SignalsLeaveNoTemporaryFiles) {
-  Write("cc.sh",
-        "#!/bin/sh\ncase \"$*\" in *--version*) exec cc --version;; esac\necho > \"$TMPDIR/part\"\n"
-        "read pid < pid; kill -$SIGNAL $pid; exec sleep 9\n");
-  fs::permissions(folder_ / "cc.sh", fs::perms::owner_all);
-  Write("call.sh", "echo $$ > pid; exec \"$@\"\n");
-  fs::create_directory(folder_ / "tmp");
-  for (const std::string signal : {"TERM", "HUP", "INT"}) {
-    const Ending ending = Call("generate four-bar.json --out code --fmu x.fmu",
-                               "SIGNAL=" + signal + " CC=./cc.sh TMPDIR=$PWD/tmp sh call.sh");
-    EXPECT_GE(ending.code, 128) << ending.text;
-    // the child process may end after its parent
-    for (int i = 0; i < 500 && !fs::is_empty(folder_ / "tmp"); ++i) ::usleep(10'000);
-    EXPECT_TRUE(fs::is_empty(folder_ / "tmp")) << signal;
-  }
-}
-
 TEST_F(GenerateTest, CasesOfASweepShareCallsAndHaveTheBitsThatTheyHaveAlone) {
   Write("sweep.json", R"({"name": "sweep", "timing": {"repeats": 0}, "tolerances": [1e-6],
     "problems": [{"mechanism": ")" +
@@ -452,6 +434,24 @@ TEST_F(GenerateTest, CasesOfASweepShareCallsAndHaveTheBitsThatTheyHaveAlone) {
       EXPECT_EQ(record.Number("library_evaluations"), same->Number("library_evaluations"));
       EXPECT_GT(record.Number("cpu_s"), 0.0);
     }
+  }
+}
+
+/// The compiler ends the program that called it, which works in a process of its own.
+TEST_F(GenerateTest, SignalsLeaveNoTemporaryFiles) {
+  Write("cc.sh",
+        "#!/bin/sh\ncase \"$*\" in *--version*) exec cc --version;; esac\necho > \"$TMPDIR/part\"\n"
+        "read pid < pid; kill -$SIGNAL $pid; exec sleep 9\n");
+  fs::permissions(folder_ / "cc.sh", fs::perms::owner_all);
+  Write("call.sh", "echo $$ > pid; exec \"$@\"\n");
+  fs::create_directory(folder_ / "tmp");
+  for (const std::string signal : {"TERM", "HUP", "INT"}) {
+    const Ending ending = Call("generate four-bar.json --out code --fmu x.fmu",
+                               "SIGNAL=" + signal + " CC=./cc.sh TMPDIR=$PWD/tmp sh call.sh");
+    EXPECT_GE(ending.code, 128) << ending.text;
+    // the child process may end after its parent
+    for (int i = 0; i < 500 && !fs::is_empty(folder_ / "tmp"); ++i) ::usleep(10'000);
+    EXPECT_TRUE(fs::is_empty(folder_ / "tmp")) << signal;
   }
 }
 

@@ -172,7 +172,7 @@ TEST(ImportUrdf, PartsOfOtherProgramsChangeTheMotionIfTheyAct) {
     return std::ranges::any_of(imported.notes, &ImportNote::changes_motion);
   };
   EXPECT_FALSE(changes("<ros2_control name=\"x\"><joint name=\"j\"/></ros2_control>"));
-  EXPECT_FALSE(changes("<gazebo><plugin name=\"c\"/></gazebo>"));
+  EXPECT_TRUE(changes("<gazebo><plugin name=\"c\"/></gazebo>"));
   EXPECT_FALSE(
       changes("<gazebo reference=\"j\"><preserveFixedJoint>true</preserveFixedJoint></gazebo>"));
   EXPECT_TRUE(

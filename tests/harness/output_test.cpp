@@ -101,7 +101,15 @@ TEST_F(OutputFiles, GoesToStandardOutputBehindWhatWasPrinted) {
       Call("", "'" LOOPBENCH_BINARY
                "' view four-bar.json --format svg --out /dev/stdout 2>err; exit $?;")
           .text;
+  EXPECT_TRUE(svg.starts_with("<")) << svg.substr(0, 100);
   EXPECT_TRUE(svg.ends_with("</svg>\n")) << svg.substr(svg.size() - 100);
+  // also of commands that work in a process of their own
+  for (const auto& [command, begin] :
+       {std::pair{"count four-bar.json --format csv --out", "mechan"},
+        {"generate four-bar.json --out code --fmu", "PK"}}) {
+    const std::string call = std::string("'" LOOPBENCH_BINARY "' ") + command;
+    EXPECT_TRUE(Call("", call + " /dev/stdout 2>other; exit $?;").text.starts_with(begin)) << call;
+  }
   EXPECT_EQ(ReadFile(At("err")).substr(0, 17), "wrote /dev/stdout");
 }
 

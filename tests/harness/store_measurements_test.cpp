@@ -189,12 +189,12 @@ TEST(TrackRecords, NamesEveryValueThatIsNone) {
   for (const auto& [key, value, shown] : std::vector<std::tuple<std::string, Value, std::string>>{
            {"drift_position_max", std::string("oops"), "found \"oops\", expected a finite number"},
            {"drift_position_max", Value(), "found null"},
-           {"drift_position_max", std::vector<double>{1.0}, "found 1 values"},
+           {"drift_position_max", std::vector<double>{1.0}, "found 1 value"},
            {"drift_position_max", -1.0, "found -1"},
            {"steps", std::nan(""), "found nan"},
            {"steps", true, "found true"},
            {"instructions", std::int64_t{0}, "found 0, expected a finite number > 0"},
-           {"series.cpu_ns", sample, "found 3 values (1 null or not positive)"}}) {
+           {"series.cpu_ns", sample, "found 3 values (1 null or negative)"}}) {
     std::vector<Record> records = ParseBenchmarkJson(kBenchmarks, "b.json");
     records.pop_back();
     records[0].Set(key, value);

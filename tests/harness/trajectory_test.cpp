@@ -409,6 +409,24 @@ TEST_F(Command, WhatIsMissingIsNamed) {
   EXPECT_FALSE(fs::exists(folder_ / "y.csv"));
 }
 
+TEST_F(Command, ChangedFilesBesideAStoreFailGates) {
+  WriteExperiment(R"({"number": 5, "quantities": ["joints"]})", "four-bar.json");
+  ExpectEnding(Call("run out.json --out out"), 0, {});
+  for (const char* folder : {"mechanisms", "trajectories"}) {
+    fs::remove_all(folder_ / "copy");
+    fs::copy(folder_ / "out", folder_ / "copy", fs::copy_options::recursive);
+    ExpectEnding(Call("compare out copy"), 0, {"NO CHANGE"});
+    const fs::path file = Files(std::string("copy/") + folder).at(0);
+    std::string text = ReadFile(file);
+    const std::size_t digit = text.find_last_of("123456789");
+    text[digit] = text[digit] == '1' ? '2' : '1';
+    WriteFileAtomically(file, text);
+    for (const char* command : {"compare out copy", "check-claims copy --claims claims.json"}) {
+      ExpectEnding(Call(command), 2, {file.filename().string(), "changed after its run wrote it"});
+    }
+  }
+}
+
 TEST_F(Command, OptionsWithoutEffectAreRejected) {
   Write("ours.csv", "t [s],joint:OA:angle [rad]\n0,0\n");
   const std::string ours = "trajectory ours.csv ";
@@ -459,15 +477,15 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   // columns of another unit are not compared
   Write("degrees.csv", "t [s],joint:OA:angle [rad],joint:AB:angle [deg],x [m]\n0,0,0,0\n");
   ExpectEnding(Call("trajectory degrees.csv --compare-with ours.csv"), 0,
-               {"2 columns only in degrees.csv, not compared: joint:AB:angle [deg], x [m]",
-                "only in ours.csv, not compared: "});
+               {"2 columns of degrees.csv not compared: joint:AB:angle [deg], x [m]",
+                " of ours.csv not compared: "});
   Write("empty.csv", "t [s],joint:OA:angle [rad]\n");
   ExpectEnding(Call("trajectory empty.csv"), 2, {"empty.csv:1: found no row, expected a motion"});
   ExpectEnding(Call("trajectory empty.csv --out copy.csv"), 2, {"empty.csv:1: found no row"});
   EXPECT_FALSE(fs::exists(folder_ / "copy.csv"));
   Write("latin.csv", "t [s],w\xFC [m]\n0,0\n");
   ExpectEnding(Call("trajectory latin.csv --format jsonl --out x.jsonl"), 2,
-               {"latin.csv: label 2:1:3: found the byte FC, which is not UTF-8"});
+               {"latin.csv: label 2, byte 3: found the byte FC, which is not UTF-8"});
   Write("early.csv", "t [s],joint:OA:angle [rad]\n-1,0\n0,0\n");
   ExpectEnding(Call("trajectory early.csv --compare-with ours.csv"), 0,
                {"1 of 2 rows are not compared"});

@@ -178,9 +178,9 @@ TEST_F(Cluster, AgainTakesWhatTheFolderSays) {
   for (const char* option : {"--tasks 7", "--jobs 1", "--time 1", "--partition p", "--sbatch=--a",
                              "--filter a=b", "--set /a=b", "--no-timing", "--isolate"}) {
     const std::string name = std::string(option).substr(0, std::string(option).find_first_of(" ="));
-    ExpectEnding(
-        Call(std::string("submit --resubmit --out parts ") + option), 2,
-        {"--resubmit: found " + name + " beside it, expected none: the folder contains them"});
+    ExpectEnding(Call(std::string("submit --resubmit --out parts ") + option), 2,
+                 {"--resubmit: found " + name +
+                  " beside it, expected none: the folder contains the options"});
   }
   fs::remove(folder_ / "parts/part.sh");  // of a submit that was killed
   ExpectEnding(Call("submit --resubmit --no-queue --out parts"), 0,

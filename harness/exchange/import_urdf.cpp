@@ -49,8 +49,9 @@ void ReadInertial(const XmlElement& link, int body, ImportDraft* draft) {
   const XmlElement mass = inertial->RequiredChild("mass");
   const double kg = mass.Required("value", "a number [kg]").Number(kNotNegative);
   const auto inertia = inertial->Child("inertia");
-  if (!inertia)
-    return draft->ReadMassLater(body, [=] { inertial->RequiredChild("inertia"); });  // it moves
+  if (!inertia) {  // an error if the link moves
+    return draft->ReadMassLater(body, [=] { inertial->RequiredChild("inertia"); });
+  }
   const Eigen::Matrix3d I = InertiaOf([&](const char* name, bool is_moment) {
     return is_moment ? inertia->Required(name, "a number [kg m^2]").Number()
                      : inertia->Number(name, 0.0);

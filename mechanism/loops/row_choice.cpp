@@ -27,7 +27,9 @@ RowChoice::RowChoice(const Eigen::MatrixXd& rows, std::vector<Quota> quotas, int
   in_quotas = std::min(in_quotas, total);
   TakeBest(in_quotas);
   DropDependent();
-  while (std::ssize(order_) < in_quotas && (Augment(0.1) || Augment(kDependent))) {
+  // rows as different as possible first: a path of large elements of T, if there is one
+  constexpr double kLarge = 0.1;
+  while (std::ssize(order_) < in_quotas && (Augment(kLarge) || Augment(kDependent))) {
   }
   TakeBest(in_quotas);
   Exchange();
@@ -42,7 +44,7 @@ void RowChoice::Take(int row) {
   const double norm = left_.row(row).norm();
   order_.push_back({row, norm});
   least_ = std::min(least_, norm);
-  if (!(norm > 1e-12 * scale_)) return;  // rounding
+  if (!(norm > kRounding * scale_)) return;
   const Eigen::RowVectorXd unit = left_.row(row) / norm;
   // twice: the remainder of nearly dependent rows must be orthogonal, too
   for (int pass = 0; pass < 2; ++pass) {

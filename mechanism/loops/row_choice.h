@@ -41,7 +41,9 @@ class RowChoice {
     Eigen::MatrixXd T;
     Eigen::VectorXd inverse;  ///< diagonal of the inverse Gram matrix of the rows taken
   };
-  static constexpr double kDependent = 1e-6;  ///< share of the largest norm
+  /// Shares of the largest norm. Positions close to about 1e-10 of their size, so dependent rows
+  /// keep remainders of this share: kDependent is larger. Sums leave less than kRounding.
+  static constexpr double kRounding = 1e-12, kDependent = 1e-6;
 
   bool HasRoom(std::size_t joint) const { return taken_[joint] < quotas_[joint].keep; }
   bool MayChange(int row) const {

@@ -114,7 +114,7 @@ class Assembler {
              change.norm() > kSmallChange * start_.u.norm();
     };
     bool fits = misfit <= least;
-    const bool is_rounding = !fits && misfit <= 100.0 * description_.accuracy * size &&
+    const bool is_rounding = !fits && misfit < kHintFactor * description_.accuracy * size &&
                              mechanism_.num_u() > 0 && is_rounded();
     fits = fits || (is_rounding && misfit <= description_.accuracy * size);
     start_.u = start_.u.cwiseProduct(units_.columns);

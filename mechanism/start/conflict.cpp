@@ -76,8 +76,7 @@ class Conflict {
 
  private:
   std::string Hint() const {
-    constexpr double kHint = 100.0;
-    if (!(unmet_.accuracy < kHint * description_.accuracy)) return "";
+    if (!(unmet_.accuracy < kHintFactor * description_.accuracy)) return "";
     char hint[64];
     std::snprintf(hint, sizeof hint, "; %s with an \"accuracy\" of %.1e",
                   unmet_.speeds ? "they fit" : "it closes", 1.05 * unmet_.accuracy);

@@ -14,6 +14,9 @@ struct OfCutJoint {
   int joint, component;
 };
 
+/// A message names an accuracy of the input that is larger than the stated one by less than this.
+inline constexpr double kHintFactor = 100.0;
+
 /// Residuals of a failed assembly: a number per constraint row, then one per coupling and one per
 /// entry of `extra`.
 struct UnsatisfiedConstraints {

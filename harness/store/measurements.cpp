@@ -142,11 +142,6 @@ Record ReadContext(const JsonNode& root) {
   for (const char* key : {"machine", "compiler", "flags", "libm", "commit"}) {
     if (const std::string text = AnyText(*context, key); !text.empty()) record.Set(key, text);
   }
-  // other programs of Google Benchmark name their host only
-  if (const std::string host = AnyText(*context, "host_name");
-      record.Text("machine").empty() && !host.empty()) {
-    record.Set("machine", "host " + host);
-  }
   if (const auto load = context->Optional("load_avg")) {
     const std::vector<JsonNode> loads = load->Elements("numbers");
     if (!loads.empty()) record.Set("load_average", loads.front().Number());

@@ -49,7 +49,7 @@ constexpr Budget kBudgets[] = {
     {"harness/text",            { 1653,  13,   0},   900},
     {"harness/json",            { 2004,   9,   1},  1300},
     {"harness/record",          { 1515,  10,   3},  1200},
-    {"harness/store",           { 1661,   8,   3},  1300},
+    {"harness/store",           { 1656,   8,   3},  1300},
     {"harness/config",          { 6315,  24,  11},  4000},
     {"harness/analysis",        { 2127,   8,   9},  1200},
     {"harness/generate",        { 2437,  12,   7},  1230},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 7833,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92755, 486, 242}, 62000}
+    {"",                        {92750, 486, 242}, 62000}
 };
 // clang-format on
 

@@ -40,7 +40,7 @@ class BenchIn final : public TrialBench {
       one->start = Assemble<Space>(description_, one->mechanism);
       if (one->start.outcome == Outcome::kFinished) continue;
       throw std::runtime_error(
-          fmt::format("the start cannot be assembled: {}", one->start.message));
+          fmt::format("the initial assembly fails: {}", one->start.message));
     }
   }
 

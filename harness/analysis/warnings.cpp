@@ -404,9 +404,12 @@ bool IsCertified(const Record& record) {
          IsNearReference(record);
 }
 
-/// Returns true if a requested finer run differs by more than kMaxTolerances.
+/// Returns true if the finer run of the case differs by more than kMaxTolerances, or with fixed
+/// steps by more than kMaxFixedError.
 bool IsFarFromFinerRun(const Record& record) {
-  const double most = kMaxTolerances * ToleranceOf(record) + kRoundOffShare;
+  const double most = record.Number("step") > 0.0
+                          ? kMaxFixedError
+                          : kMaxTolerances * ToleranceOf(record) + kRoundOffShare;
   return record.Find("refinement_difference") != nullptr &&
          !(record.Number("refinement_difference") <= most);
 }

@@ -185,7 +185,7 @@ MechanismFile ReadWhole(const SimplifyCommand& command) {
   std::string why;
   MechanismDescription assembled = WithAssembledStart(file.description, &why);
   if (!why.empty()) {
-    Reject("{}: its start cannot be assembled: {}", command.mechanism.string(), why);
+    Reject("{}: its initial assembly fails: {}", command.mechanism.string(), why);
   }
   if (command.assembled) file.description = std::move(assembled);
   return file;

@@ -409,9 +409,10 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
             "relative tolerance."},
            {"integration", Object(&File::integration, IntegrationFields())},
            {"refine", Bool(&File::refine),
-            "If true, every case with a tolerance runs again at a tenth of it. Records then "
-            "contain refinement_difference, the largest difference of final poses. A difference "
-            "above 1000 tolerances sets the warning refinement."},
+            "If true, every case runs again, at a tenth of its tolerance or half its step. Records "
+            "then contain refinement_difference, the largest difference of final poses. A "
+            "difference above 1000 tolerances, or above 0.01 with fixed steps, sets the warning "
+            "refinement. Cases with fixed steps and no reference always run again."},
            {"integrator", Integrators(),
             "Integrators: profiles (Runge-Kutta pairs with norm and controller), tables of ARKODE "
             "by "

@@ -59,7 +59,7 @@ class Maker {
     if (!at_start) return std::move(model_);
     const Start<double> start = Assemble<Space>(description_, mechanism);
     if (start.outcome != Outcome::kFinished) {
-      throw std::runtime_error("its start cannot be assembled: " + start.message);
+      throw std::runtime_error("its initial assembly fails: " + start.message);
     }
     model_.q.assign(start.q.begin(), start.q.end());
     model_.u.assign(start.u.begin(), start.u.end());

@@ -21,6 +21,7 @@
 #include <fstream>
 #include <memory>
 #include <new>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -349,10 +350,12 @@ ProcessResult ResultOf(Child child) {
     result.ending = ProcessEnding::kOverTime;
     result.text = child.killed;
   } else {
-    result.ending = ProcessEnding::kCrashed;
-    result.text = WIFSIGNALED(status) ? fmt::format("ended by signal {} ({})", WTERMSIG(status),
-                                                    ::strsignal(WTERMSIG(status)))
-                                      : fmt::format("left with exit code {}", WEXITSTATUS(status));
+    const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    constexpr int kFromOutside[] = {SIGKILL, SIGTERM, SIGINT, SIGHUP, SIGQUIT};
+    const bool was_killed = std::ranges::find(kFromOutside, signal) != std::end(kFromOutside);
+    result.ending = was_killed ? ProcessEnding::kKilled : ProcessEnding::kCrashed;
+    result.text = signal == 0 ? fmt::format("left with exit code {}", WEXITSTATUS(status))
+                              : fmt::format("ended by signal {} ({})", signal, ::strsignal(signal));
   }
   return result;
 }
@@ -384,9 +387,17 @@ void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int
                     const std::function<void(std::size_t, const ProcessResult&)>& done,
                     const ProcessNews& news) {
   Children children;
+  std::vector<std::size_t> killed;  // to be started again
+  std::set<std::size_t> started_again;
   for (;;) {
     while (children.size() < static_cast<std::size_t>(jobs)) {
-      const std::optional<std::size_t> piece = next();
+      std::optional<std::size_t> piece;
+      if (killed.empty()) {
+        piece = next();
+      } else {
+        piece = killed.back();
+        killed.pop_back();
+      }
       if (!piece) break;
       children.Start(*piece, limits(*piece), [&work, piece] { return work(*piece); });
       if (news.started) news.started(*piece);
@@ -394,7 +405,12 @@ void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int
     if (children.size() == 0) return;
     for (Child& child : children.Wait()) {
       const std::size_t piece = child.piece;
-      done(piece, ResultOf(std::move(child)));
+      const ProcessResult result = ResultOf(std::move(child));
+      if (result.ending == ProcessEnding::kKilled && started_again.insert(piece).second) {
+        killed.push_back(piece);
+      } else {
+        done(piece, result);
+      }
     }
     Interruption::Check();
     if (news.waited) news.waited();

@@ -108,7 +108,8 @@ std::optional<std::string> PlantedFault(const Record& keys);
 enum class ProcessEnding {
   kAnswered,    ///< returned a text
   kThrew,       ///< an exception left the work; `text` is its message
-  kCrashed,     ///< ended by a signal, or left through exit()
+  kCrashed,     ///< ended by a signal of its own, or left through exit()
+  kKilled,      ///< ended twice by a signal that others send, such as SIGKILL
   kOverTime,    ///< killed after its CPU time or a long sleep
   kOverMemory,  ///< requested more memory than allowed
 };

@@ -109,9 +109,11 @@ ErrorReference WriteCertificateOf(const ExperimentProblem& problem, const Case& 
 
 bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Outcome::kFinished); }
 
-/// The largest difference of final poses from a run at a tenth of the tolerance; infinite where
-/// that run does not finish.
+/// The largest difference of final poses from a run at a tenth of the tolerance, or at half the
+/// fixed step; infinite where that run does not finish.
 void WriteRefinement(const Experiment& experiment, Case entry, SideBySide* beside, Record& record) {
+  entry.step /= 2.0;
+  if (entry.step > 0.0) entry.limits.steps *= 2;
   entry.rtol /= 10.0;
   entry.atol /= 10.0;
   if (entry.atols) {
@@ -205,7 +207,9 @@ Record RunCase(const Experiment& experiment, const Case& entry, const Reference*
     record.Set("position_goal", std::max(goal, kRedundantOpen * link));
   }
 
-  if (experiment.refine && entry.rtol > 0.0 && !IsPeer(record) && HasFinished(record)) {
+  // fixed steps have no tolerance to be judged by
+  const bool is_unjudged = entry.step > 0.0 && held.series == nullptr && held.reference == nullptr;
+  if ((experiment.refine || is_unjudged) && !IsPeer(record) && HasFinished(record)) {
     WriteRefinement(experiment, entry, beside, record);
   }
 

@@ -302,7 +302,7 @@ TEST_F(ConvertTest, RefusesByNameAndWritesNothing) {
   // bars that do not reach each other
   EditMechanism("\"C\": [1.5, 0.0]", "\"C\": [9.0, 0.0]");
   ExpectEnding(Call("export-mechanism four-bar.json --to mjcf"), 2,
-               {"four-bar.json: its start cannot be assembled: four-bar: "});
+               {"four-bar.json: its initial assembly fails: four-bar: "});
   EXPECT_FALSE(fs::exists(folder_ / "four-bar.xml"));
 }
 

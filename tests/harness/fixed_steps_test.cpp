@@ -109,6 +109,24 @@ TEST(FixedSteps, ShorterOnesAreMoreAccurate) {
   EXPECT_GT(coarse, 24.0 * fine) << coarse << " " << fine;
 }
 
+/// Its energy is right to 1 %. The run at half the step tells that the final pose is not.
+TEST(FixedSteps, WithoutAReferenceAreJudgedByHalfTheStep) {
+  const Experiment experiment = ParseExperiment(
+      R"({"name": "e", "problems": [{"mechanism": "spinning-crank.json", "horizon": 10}],
+          "methods": [{"formulation": "odca", "enforcement": "projection"}],
+          "tolerances": 1e-10, "fixed_steps": [0.025, 0.01]})",
+      kConfigs / "mechanisms/e.json");
+  const std::vector<Case> cases = Expand(experiment);
+  const Record exact = RunCase(experiment, cases[0]), coarse = RunCase(experiment, cases[1]),
+               fine = RunCase(experiment, cases[2]);
+  EXPECT_GT(DifferenceOf(exact, coarse).largest, 0.03);
+  EXPECT_EQ(coarse.Text("warnings"), "refinement");
+  // the run at half the step has a 32nd of the error, by its order
+  EXPECT_NEAR(coarse.Number("refinement_difference"), DifferenceOf(exact, coarse).largest, 0.005);
+  EXPECT_LT(DifferenceOf(exact, fine).largest, 0.01);
+  EXPECT_EQ(fine.Text("warnings"), "");
+}
+
 TEST(TimingOfCases, EveryAccuracyRowHasATimingRowOfItsKeys) {
   const Experiment experiment = FourBar(
       R"({"formulation": ["odca", "lagrange"], "enforcement": ["acceleration", "projection"]})",

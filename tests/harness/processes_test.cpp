@@ -9,12 +9,14 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "harness/text/cpu_time.h"
+#include "harness/text/files.h"
 #include "harness/text/run_program.h"
 
 namespace loopbench::harness {
@@ -78,13 +80,29 @@ TEST(ProcessesTest, EachEndingHasItsName) {
              3, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
   EXPECT_EQ(results.at(0).ending, ProcessEnding::kThrew);
   EXPECT_EQ(results.at(0).text, "a reason");
-  EXPECT_EQ(results.at(1).ending, ProcessEnding::kCrashed);
+  EXPECT_EQ(results.at(1).ending, ProcessEnding::kKilled);
   EXPECT_NE(results.at(1).text.find("signal 9"), std::string::npos);
   EXPECT_EQ(results.at(2).ending, ProcessEnding::kCrashed);
   EXPECT_NE(results.at(2).text.find("exit code 7"), std::string::npos);
   EXPECT_EQ(results.at(3).ending, ProcessEnding::kOverTime);
   EXPECT_NE(results.at(3).text.find("0.5 s asleep"), std::string::npos) << results.at(3).text;
   EXPECT_EQ(results.at(4).text, "fine");
+}
+
+/// The operator, or the system for lack of memory, ends a process: no result of its work.
+TEST(ProcessesTest, AKilledProcessStartsOnceMore) {
+  const std::filesystem::path mark = std::filesystem::path(testing::TempDir()) / "killed";
+  const auto results = RunAll({[&] {
+                                 if (!std::filesystem::exists(mark)) {
+                                   WriteFileAtomically(mark, "");
+                                   ::raise(SIGTERM);
+                                 }
+                                 return std::string("done");
+                               },
+                               [] { return std::string("fine"); }},
+                              1);
+  EXPECT_EQ(results.at(0).text, "done");
+  EXPECT_EQ(results.at(1).text, "fine");
 }
 
 TEST(ProcessesTest, WaitingForAProgramIsNoSleep) {

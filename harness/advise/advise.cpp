@@ -39,8 +39,7 @@ class BenchIn final : public TrialBench {
     for (auto* one : {&joint_, &absolute_}) {
       one->start = Assemble<Space>(description_, one->mechanism);
       if (one->start.outcome == Outcome::kFinished) continue;
-      throw std::runtime_error(
-          fmt::format("the initial assembly fails: {}", one->start.message));
+      throw std::runtime_error(fmt::format("the initial assembly fails: {}", one->start.message));
     }
   }
 

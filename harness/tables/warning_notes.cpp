@@ -56,9 +56,9 @@ const Reason kReasons[] = {
     {kRefinementWarning, "finer tolerances do not converge to one final state",
      [](const Record& row) {
        if (row.Find("refinement_difference") != nullptr) {
-         return fmt::format("{:.1e} of a link or rad from the run at {}",
-                            row.Number("refinement_difference"),
-                            row.Number("step") > 0.0 ? "half its step" : "a tenth of its tolerance");
+         return fmt::format(
+             "{:.1e} of a link or rad from the run at {}", row.Number("refinement_difference"),
+             row.Number("step") > 0.0 ? "half its step" : "a tenth of its tolerance");
        }
        return fmt::format("{} steps, state {}", row.Text("steps"), row.Text("state_hash"));
      }},

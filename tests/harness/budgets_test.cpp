@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 7833,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92776, 486, 242}, 62000}
+    {"",                        {92775, 486, 242}, 62000}
 };
 // clang-format on
 

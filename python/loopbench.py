@@ -28,8 +28,8 @@ class Error(RuntimeError):
 def _call(program, *arguments):
     try:
         done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True)
-    except FileNotFoundError:
-        raise Error(f"{program}: no such program") from None
+    except OSError as error:
+        raise Error(f"{program}: cannot be run: {error.strerror}") from None
     if done.returncode != 0:
         raise Error(done.stderr.strip() or f"{program} ended with status {done.returncode}")
 
@@ -60,9 +60,11 @@ class Mechanism:
         `integrator`, are keys of experiments; `fixed_steps` replaces `rtol`. `attrs["record"]` of the frame contains drift, energy
         error, outcome and warnings. Raises Error if the run does not finish.
         """
-        integrator = keys.get("integrator")
+        integrator, data = keys.get("integrator"), (keys.get("reference") or {}).get("published_data")
         if isinstance(integrator, str) and integrator.endswith(".json"):
             keys["integrator"] = str(pathlib.Path(integrator).resolve())
+        if isinstance(data, str):
+            keys["reference"] = {**keys["reference"], "published_data": str(pathlib.Path(data).resolve())}
         experiment = {
             "name": "python",
             "problems": [{"mechanism": str(self.path), "horizon": horizon}],
@@ -73,9 +75,13 @@ class Mechanism:
         }
         with tempfile.TemporaryDirectory() as folder:
             file, store = pathlib.Path(folder, "python.json"), pathlib.Path(folder, "out")
-            file.write_text(json.dumps(experiment))
+            file.write_text(json.dumps(experiment, default=lambda number: number.item()))
             _run("run", file, "--out", store, "--no-timing")
-            record = read_store(store).iloc[0].dropna()
+            records = read_store(store)
+            records = records[records["kind"] == "accuracy"]
+            if len(records) != 1:
+                raise Error(f"found {len(records)} cases, expected one; `loopbench run` runs several")
+            record = records.iloc[0].dropna()
             if record["outcome"] != "finished":
                 raise Error(f"{record['outcome']}: {record.get('message', '')}")
             (rows,) = pathlib.Path(store, "trajectories").glob("*.csv")
@@ -147,5 +153,5 @@ class RightHandSide:
 
 def read_store(folder):
     """Returns the records of a store, a row per case, in a column per key (docs/reference/records.md)."""
-    lines = pathlib.Path(folder, "results.jsonl").read_text().splitlines()
-    return pd.json_normalize([json.loads(line) for line in lines])
+    with open(pathlib.Path(folder, "results.jsonl"), encoding="utf-8") as lines:
+        return pd.json_normalize([json.loads(line) for line in lines])

@@ -67,6 +67,16 @@ class Motion(unittest.TestCase):
         self.assertEqual(motion.attrs["record"]["integrator"], "midpoint")
         self.assertEqual(motion.attrs["record"]["steps"], 100)
 
+    def test_reference_and_limits(self):
+        mechanism = loopbench.Mechanism(FOUR_BAR)
+        record = mechanism.simulate(np.int64(1), step=np.float32(0.5), reference={}).attrs["record"]
+        self.assertEqual(record["kind"], "accuracy")
+        self.assertLess(record["error_position_max"], 1e-6)
+        with self.assertRaisesRegex(loopbench.Error, "step-limit"):
+            mechanism.simulate(1.0, reference={}, limits={"steps": 3})
+        with self.assertRaisesRegex(loopbench.Error, "found 2 cases"):
+            mechanism.simulate(1.0, tolerances=[1e-5, 1e-6])
+
     def test_store(self):
         with tempfile.TemporaryDirectory() as folder:
             experiment = pathlib.Path(folder, "e.json")
@@ -80,7 +90,7 @@ class Motion(unittest.TestCase):
     def test_messages(self):
         with self.assertRaisesRegex(loopbench.Error, "no-such.json"):
             loopbench.Mechanism("no-such.json")
-        with self.assertRaisesRegex(loopbench.Error, "no-such-cc: no such program"):
+        with self.assertRaisesRegex(loopbench.Error, "no-such-cc: cannot be run"):
             loopbench.Mechanism(FOUR_BAR).compile(cc="no-such-cc")
         with self.assertRaisesRegex(loopbench.Error, "formulation.*odca"):
             loopbench.Mechanism(FOUR_BAR).simulate(1.0, "newton")

@@ -188,6 +188,7 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
   if (!best.warnings.empty()) Print("  flagged: {}\n", best.warnings);
   Print("Dominant error: {}.\n", WhatLimits(best, reference.Certified().position));
   const auto next = std::ranges::find_if(advice.finalists, [&](const Trial& trial) {
+    if (advice.reached && command.error > 0.0 && trial.error > command.error) return false;
     return trial.choice.integrator != best.choice.integrator ||
            trial.choice.method.formulation != best.choice.method.formulation;
   });

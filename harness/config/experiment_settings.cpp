@@ -229,7 +229,7 @@ void RequireOutput(const JsonNode& node, ExperimentFile& file) {
   if (!output || !file.output) return;
   if (file.compile.islands) {
     output->FailAs("output of parts that run on their own",
-                   "\"islands\": false in \"compile\": rows are of the whole mechanism");
+                   "\"islands\": false in \"preprocess\": rows are of the whole mechanism");
   }
   double longest = 0.0;
   for (const ExperimentProblem& problem : file.problems) {

@@ -122,12 +122,18 @@ SweepAxis ReadAxis(const JsonNode& node, ExperimentFields& fields, std::set<std:
   return axis;
 }
 
-/// Reports repeated combinations, which would repeat cases.
+/// Reports repeated combinations, which would repeat cases. 1 and 1.0 are equal.
 void CheckDistinct(const JsonNode& node, const SweepGroup& group) {
   std::set<std::string> known;
   for (std::size_t i = 0; i < group.count(); ++i) {
     std::string all;
-    for (const SweepAxis& axis : group.axes) all += Compact(Json(Compact(axis.values[i])));
+    for (const SweepAxis& axis : group.axes) {
+      const Json& value = axis.values[i];
+      all += Compact(value.is_number_integer() && value == Json(value.get<double>())
+                         ? Json(value.get<double>())
+                         : Json(Compact(value)));
+      all += ' ';
+    }
     if (known.insert(all).second) continue;
     const std::string values = group.axes.size() == 1 ? Compact(group.axes.front().values[i])
                                                       : fmt::format("the values number {}", i);

@@ -211,6 +211,39 @@ void ChooseScales(Figure& figure, const FreeFigure& wanted, bool is_series) {
   figure.log_y = choose('y', y);
 }
 
+/// Splits curves at points that a logarithmic axis cannot show, and removes curves without others.
+/// Returns the number of these points.
+std::ptrdiff_t LeaveGaps(Figure& figure) {
+  const Axis x{.logarithmic = figure.log_x}, y{.logarithmic = figure.log_y};
+  std::ptrdiff_t omitted = 0;
+  std::vector<Curve> parts;
+  for (const Curve& curve : figure.curves) {
+    Curve part = curve;
+    part.x.clear();
+    part.y.clear();
+    const auto end_part = [&] {
+      if (part.x.empty() && part.crosses.empty()) return;
+      parts.push_back(part);
+      part.label.clear();
+      part.crosses.clear();
+      part.x.clear();
+      part.y.clear();
+    };
+    for (std::size_t i = 0; i < curve.x.size(); ++i) {
+      if (x.CanShow(curve.x[i]) && y.CanShow(curve.y[i])) {
+        part.x.push_back(curve.x[i]);
+        part.y.push_back(curve.y[i]);
+      } else {
+        ++omitted;
+        end_part();
+      }
+    }
+    end_part();
+  }
+  figure.curves = std::move(parts);
+  return omitted;
+}
+
 using Group = std::pair<std::string, std::vector<Record>>;  // label and members
 
 /// Groups rows that are sorted by `keys`.
@@ -257,12 +290,16 @@ void Relabel(const FreeFigure& wanted, Figure* figure) {
 }
 
 std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& figure,
-                                   const std::set<std::string>& mixed) {
+                                   std::set<std::string> mixed) {
   std::vector<std::string> remarks;
   // a joined curve may include several tolerances; a cloud of points needs a choice
   const bool is_cloud = std::ranges::any_of(
       figure.curves, [](const Curve& curve) { return curve.points && !curve.line; });
-  if (is_cloud && !mixed.empty()) {
+  if (!is_cloud)
+    std::erase_if(mixed, [](const std::string& key) {
+      return key == "rtol" || key == "atol" || key == "step";
+    });
+  if (!mixed.empty()) {
     remarks.push_back(
         fmt::format("curves mix values of {}; --group KEY,KEY separates and "
                     "--where KEY=VALUE selects them",
@@ -339,8 +376,14 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   }
   JoinPoints(figure);
   ChooseScales(figure, wanted, is_series);
+  const std::ptrdiff_t omitted = is_series ? 0 : LeaveGaps(figure);
   Relabel(wanted, &figure);
   result.remarks = RemarksOn(rows, figure, mixed);
+  if (omitted > 0) {
+    result.remarks.push_back(
+        fmt::format("{} of {} runs cannot be drawn on logarithmic axes: {} or {} is not positive",
+                    omitted, rows.size(), wanted.x, wanted.y));
+  }
   std::set<std::string> kinds;
   for (const Record& row : rows) kinds.insert(row.Text("kind"));
   const auto of_kind = std::ranges::count_if(

@@ -435,7 +435,12 @@ ValueType TypeOf(std::string_view key) {
   return measure == nullptr ? kAny : measure->type;
 }
 
-bool IsReserved(std::string_view name) { return FindMeasure(name) != nullptr; }
+bool IsReserved(std::string_view name) {
+  // columns that work-precision and JSON tables add
+  constexpr std::string_view kOfTables[] = {"cost",    "error",      "front",
+                                            "problem", "provenance", "reason"};
+  return FindMeasure(name) != nullptr || std::ranges::find(kOfTables, name) != std::end(kOfTables);
+}
 
 std::string_view Describe(ValueType type) {
   switch (type) {

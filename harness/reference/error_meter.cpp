@@ -48,7 +48,9 @@ void ErrorMeter::Write(Record& record) const {
   for (const Distance& distance : distances_) {
     const bool moves = distance.speed > kMoves * largest.speed;
     if (moves) late = std::max(late, std::abs(distance.late));
-    shape = std::max(shape, moves ? distance.shape : distance.position);
+    // no shift at all is one that counts
+    shape =
+        std::max(shape, moves ? std::min(distance.shape, distance.position) : distance.position);
   }
   if (times_[at_.back()] == reference_.times.back()) {
     record.Set("error_position_end", error.back());

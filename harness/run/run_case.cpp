@@ -442,7 +442,7 @@ class Runner {
     options.atols = AtolsOf(case_, description_, *formulation);
     const StepObserver observe = [&](double t, std::span<double> y_and_work) {
       const std::span<double> y = y_and_work.first(n), work = y_and_work.subspan(n);
-      const bool restart = formulation->BeginStep(t, y);
+      const bool restart = formulation->BeginStep(t, y_and_work);
       // components may have another meaning
       if (restart) options.atols = AtolsOf(case_, description_, *formulation);
       // a failing derivative fails again in the integrator's next call, which gives the outcome;

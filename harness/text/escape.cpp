@@ -225,11 +225,12 @@ std::string EscapeCsv(std::string_view raw) {
 
 std::string QuoteGnuplot(std::string_view text) {
   // Double quotes, because every special character can be written by its number there. In single
-  // quotes, gnuplot 5.4 reads two apostrophes in a row as the end of the string.
+  // quotes, gnuplot 5.4 reads two apostrophes in a row as the end of the string. It reads three
+  // octal digits, or four if the first is 0: more digits may follow.
   std::string quoted = "\"";
   for (const char c : EscapeTerminal(text)) {
     const bool special = c == '"' || c == '\\' || c == '`' || c == '\'' || c == '@' || c == '$';
-    quoted += special ? fmt::format("\\{:03o}", c) : std::string(1, c);
+    quoted += special ? fmt::format("\\{:04o}", c) : std::string(1, c);
   }
   return quoted + '"';
 }

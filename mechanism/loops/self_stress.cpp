@@ -266,7 +266,9 @@ bool SelfStress<Space, S>::Factor(Kinematics<Space, S>& kinematics) {
   if (mechanism_->is_redundant()) Turn(kinematics);
   // Rows within the accuracy: speeds err by T^2, accelerations by T^3 times the rounding.
   const S most = mechanism_->is_redundant() ? S(10) : S(2);
-  return d_ == 0 || (pivot >= S(1e-4) && W_.topRows(r_).cwiseAbs().maxCoeff() <= most);
+  // without imposed rows T is empty
+  const bool is_small = d_ == 0 || r_ == 0 || W_.topRows(r_).cwiseAbs().maxCoeff() <= most;
+  return is_small && (d_ == 0 || pivot >= S(1e-4));
 }
 
 template <class Space, class S>

@@ -100,23 +100,26 @@ class Assembler {
       ClearFixed(given_u_, &change);
       start_.u += change;
     }
-    const VectorX<double> left = target - J * start_.u;
+    VectorX<double> left = target - J * start_.u;
     const double misfit = left.template lpNorm<Eigen::Infinity>(), least = 1e-10 * size;
-    // Speeds that miss by the accuracy of the input fit, unless a small change makes them exact:
-    // then the given ones contradict each other. Redundant constraints that are rounded leave no
-    // motion, or no speeds at all.
-    const auto is_rounded = [&] {
+    const double accuracy = description_.accuracy * size;
+    bool fits = misfit <= least;
+    const bool is_rounding = !fits && mechanism_.num_u() > 0 && misfit < kHintFactor * accuracy;
+    if (is_rounding) {
+      // Given speeds are rounded if a small change of all makes them exact. Otherwise redundant
+      // constraints are: these leave no motion, or no speeds at all.
       constexpr double kSmallChange = 0.01;
       const VectorX<double> change =
           LeastSquares(LoopRows(kinematics_, units_, units, given_cut_, none), mechanism_.name())
               .Smallest(left);
-      return (left - J * change).template lpNorm<Eigen::Infinity>() > least ||
-             change.norm() > kSmallChange * start_.u.norm();
-    };
-    bool fits = misfit <= least;
-    const bool is_rounding = !fits && misfit < kHintFactor * description_.accuracy * size &&
-                             mechanism_.num_u() > 0 && is_rounded();
-    fits = fits || (is_rounding && misfit <= description_.accuracy * size);
+      const VectorX<double> after = left - J * change;
+      fits = misfit <= accuracy;
+      if (fits && after.template lpNorm<Eigen::Infinity>() <= least &&
+          change.norm() <= kSmallChange * start_.u.norm()) {
+        start_.u += change;
+        left = after;
+      }
+    }
     start_.u = start_.u.cwiseProduct(units_.columns);
     start_.speed_residual = InSi(left, units);
     if (fits) return;

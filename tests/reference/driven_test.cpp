@@ -158,6 +158,9 @@ TEST_P(Driven, AJumpOfSpeedActsByImpulses) {
   ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   EXPECT_NEAR(speed, -0.5 / (0.25 + 0.1), 1e3 * kRtol);
   EXPECT_LE(run.energy_error, 1e4 * kRtol) << "the drive supplies the work of the impulse";
+  const Experiment experiment = Single({.description = d, .observe = {}, .canonical = ""});
+  const Record record = RunCase(experiment, CaseOf(experiment, d.name, GetParam(), kRtol, 0.4));
+  EXPECT_LE(record.Number("energy_error_max"), 1e4 * kRtol) << "as runs count it";
 }
 
 /// Without a state, positions follow from the time alone, also if the last stage had another time.

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <vector>
 
+#include "harness/analysis/warnings.h"
 #include "mechanism/description/joint_frames.h"
 #include "tests/reference/cases.h"
 
@@ -147,6 +148,36 @@ INSTANTIATE_TEST_SUITE_P(Mechanisms, Overconstrained,
                          ::testing::Values("bennett", "goldberg", "sarrus", "four-bar-in-space",
                                            "three-cranks"),
                          [](const auto& one) { return WithoutDashes(one.param); });
+
+/// No row of the second hinge is imposed: a rank of 0.
+TEST(RankZero, ADoorOnTwoHingesSwingsAsOnOne) {
+  const auto door = [](const std::string& hinges) {
+    return ParseMechanism(R"({"name": "door", "space": "spatial", "gravity": [0.0, 0.0, -9.81],
+        "bodies": [{"name": "door", "mass": 1.0, "inertia": 0.1, "com": [0.3, 0.0, 0.0]}],
+        "joints": [)" + hinges +
+                              "]}",
+                          "door.json");
+  };
+  const std::string low = R"({"name": "low", "type": "revolute", "from": {"body": "ground"},
+                              "to": {"body": "door"}, "axis": [0.0, 1.0, 0.0]})",
+                    high = R"({"name": "high", "type": "revolute", "axis": [0.0, 1.0, 0.0],
+                               "from": {"body": "ground", "at": [0.0, 1.0, 0.0]},
+                               "to": {"body": "door", "at": [0.0, 1.0, 0.0]}})";
+  const MechanismFile one = door(low), two = door(low + ", " + high);
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+      for (const Enforcement level :
+           {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
+        const Method method = At(formulation, level, set);
+        const Record record = RunProblem(two, method, 1e-9, 1.0);
+        EXPECT_EQ(record.Text("outcome"), "finished") << ToString(method);
+        EXPECT_EQ(record.Text("warnings"), "") << ToString(method);
+        const Record hinged = RunProblem(one, At(formulation, level), 1e-9, 1.0);
+        EXPECT_LT(DifferenceOf(record, hinged).largest, 1e3 * 1e-9) << ToString(method);
+      }
+    }
+  }
+}
 
 /// It oscillates past the positions in which two of its cranks are in line with the plate: eight
 /// periods.

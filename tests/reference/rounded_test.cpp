@@ -248,6 +248,29 @@ TEST(RoundedInput, DrivenLinkagesExchangeNoEnergyPerTurn) {
   }
 }
 
+/// Speeds of all joints of a four-bar in a file of six digits and more.
+TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
+  MechanismDescription description =
+      ReadMechanism(kConfigs / "mechanisms/four-bar.json").description;
+  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  description.initial.speeds = {{0, {2.0}}};
+  const Start<double> exact = Assemble<Planar>(description, mechanism);
+  ASSERT_EQ(exact.outcome, Outcome::kFinished);
+  ASSERT_EQ(exact.u.size(), 3);
+  for (const double unit : {1e-6, 1e-8, 1e-3}) {
+    description.initial.speeds.clear();
+    for (int j = 0; j < 3; ++j) {
+      description.initial.speeds.push_back({j, {std::round(exact.u[j] / unit) * unit}});
+    }
+    const Start<double> start = Assemble<Planar>(description, mechanism);
+    EXPECT_EQ(start.outcome == Outcome::kFinished, unit < 1e-3) << start.message;
+    EXPECT_EQ(start.message.find("they fit with an") == std::string::npos, unit < 1e-3);
+    if (unit == 1e-3) continue;
+    EXPECT_LT((start.u - exact.u).lpNorm<Eigen::Infinity>(), unit);
+    EXPECT_LT(start.speed_residual, 64 * std::numeric_limits<double>::epsilon());
+  }
+}
+
 /// Four decimals: the position closes with the default accuracy, but the given speed does not fit.
 TEST(RoundedInput, SpeedsThatDoNotFitNameTheAccuracyWithWhichTheyDo) {
   MechanismDescription description =

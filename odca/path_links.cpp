@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "mechanism/loops/loop_solver.h"
-#include "odca/body_graph.h"
+#include "odca/join_order.h"
 
 namespace loopbench::odca::pins {
 

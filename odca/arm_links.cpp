@@ -13,6 +13,12 @@ Side SideOf(const Joint<Spatial, double>& joint, int body) {
   return joint.from == body ? joint.X_PF : joint.X_QM;
 }
 
+GroundSide OnGround(const Mechanism<Spatial, double>& mechanism,
+                    const Joint<Spatial, double>& joint) {
+  const Side side = SideOf(joint, kGround);
+  return {side, -(side.R.transpose() * mechanism.gravity())};
+}
+
 /// Maps the motion of the centre of mass to a handle, in its axes and in the order of its rows.
 Matrix6 ShiftTo(const Side& side) {
   constexpr int kComponent[kAll] = {0, 1, 3, 4, 5, 2};
@@ -90,7 +96,9 @@ bool FindClosings(const Mechanism<Spatial, double>& mechanism, const std::vector
     }
     ArmClosing& closing = arms.closings.emplace_back();
     closing.kind = *joint.kind;
-    if (joint.from == kGround || joint.to == kGround) closing.ground = SideOf(joint, kGround);
+    if (joint.from == kGround || joint.to == kGround) {
+      closing.ground = OnGround(mechanism, joint);
+    }
   }
   return true;
 }
@@ -102,7 +110,7 @@ Arm FollowArm(const Mechanism<Spatial, double>& mechanism, int step, const std::
     return mechanism.joints()[mechanism.tree()[one].joint];
   };
   Arm arm;
-  arm.ground = SideOf(joint_of(step), kGround);
+  arm.ground = OnGround(mechanism, joint_of(step));
   while (step >= 0) {
     const int child = mechanism.tree()[step].child, next = beyond[child];
     const Side side_1 = SideOf(joint_of(step), child);
@@ -124,6 +132,10 @@ Arm FollowArm(const Mechanism<Spatial, double>& mechanism, int step, const std::
 
 }  // namespace
 
+bool SinesOfJoints(const double* angles, int count, double* sines, double* cosines) {
+  return SinesAndCosines(angles, count, sines, cosines);
+}
+
 Arms FindArms(const Mechanism<Spatial, double>& mechanism) {
   const auto is_plain = [](const Joint<Spatial, double>& joint) {
     return joint.num_drives == 0 && joint.num_released == 0 &&
@@ -135,7 +147,6 @@ Arms FindArms(const Mechanism<Spatial, double>& mechanism) {
       !FindBeyond(mechanism, beyond) || !FindClosings(mechanism, beyond, closing_of, arms)) {
     return {};
   }
-  arms.gravity = mechanism.gravity();
   for (int first = 0; first < static_cast<int>(mechanism.tree().size()); ++first) {
     if (mechanism.tree()[first].parent != kGround) continue;
     arms.arms.push_back(FollowArm(mechanism, first, beyond, closing_of));

@@ -1,10 +1,26 @@
-#include "odca/assembly_sweep.h"
-
+// O-DCA for planar mechanisms of revolute joints (pins) with branches: trees, several loops on one
+// body, grids, and for all with forces other than gravity. Computes rates directly from joint
+// coordinates and speeds, like path_sweep.cpp for paths, along an assembly tree (plan.h).
+//
+//   angles and speeds of bodies   along the spanning tree (tree_angles.h)
+//   violations of cut joints      along the same tree
+//   up, matrices                  zeta of each body, then X, W and zeta of each join
+//   up and down, vectors          zeta_i3, then forces: once, or twice where speeds are completed
+//
+// A handle is a joint side that is still open, with the two rows of a pin's D (two_handle.h). A
+// body has as many handles as pins, and Y (67) is a row of blocks of zeta. A tree pin on Ground is
+// a property of its body, not a joint of an assembly, as in two_handle.h.
+//
+// A join factors X = L D L^T, two rows of one pin at a time. It keeps L and W = D^-1 L^-1 Y. The
+// rank of a pin that closes a loop is uncertain under the condition for paths: then the general
+// sweep decides.
 #include <algorithm>
 #include <cmath>
 
 #include "mechanism/algebra/known_size.h"
-#include "odca/sines.h"
+#include "mechanism/loops/loop_solver.h"
+#include "odca/path_links.h"
+#include "odca/tree_angles.h"
 
 /// Behind the parameters of a lambda: its captures must not go through memory.
 #define LOOPBENCH_INLINED __attribute__((always_inline))
@@ -12,6 +28,11 @@
 namespace loopbench::odca::pins {
 
 namespace {
+
+/// A pin of the tree on Ground: a property of its body.
+bool HoldsBody(const Joint<Planar, double>& joint) {
+  return joint.in_tree() && (joint.from == kGround || joint.to == kGround);
+}
 
 /// A moment of F about the point that the arm leads from.
 double Moment(const Vector2<double>& arm, const Vector2<double>& F) {
@@ -42,321 +63,627 @@ LOOPBENCH_INLINE auto WithRows(int pins, const Call& call) {
 
 }  // namespace
 
-template <GapKind kGap>
-bool AssemblySweep::Turn() {
-  const int places = static_cast<int>(angle_.size());
-  if (!SinesAndCosines(angle_.data(), places, sine_.data(), cosine_.data())) return false;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const Body& body = bodies_[i];
-    const double s = sine_[i], c = cosine_[i];
-    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
-      const Vector& arm = handles_[h];
-      arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
-    }
-  }
-  if (!cuts_.empty()) Close<kGap>();
-  return true;
-}
+class AssemblySweep final : public ShortCut<Planar> {
+ public:
+  static std::unique_ptr<AssemblySweep> Make(const Mechanism<Planar, double>& mechanism,
+                                             const Plan& plan);
 
-/// A cut joint is imposed at a point of Q; there the arm of P ends (two_handle.h).
-template <GapKind kGap>
-void AssemblySweep::Close() {
-  const auto leads = [&](int body, int handle) {
-    const Vector r = Scaled(bodies_[body].link.radius, arm_[handle]);
-    return Point<double>{r, Cross(speed_[body], r)};
+  bool IsUsable(const Kinematics<Planar, double>& kinematics) override {
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      angle_[i] = kinematics.poses()[i + 1].angle;
+      speed_[i] = 0.0;
+    }
+    return Turn<true>() && Assemble();
+  }
+
+ private:
+  using Vector = Vector2<double>;
+  using Matrix = Matrix2<double>;
+
+  struct Body {
+    Link<double> link;  ///< arms belong to handles
+    int first_handle = 0, handles = 0;
+    int first_block = 0;  ///< of zeta
+    Vector stand = {};    ///< position of a fixed point of reference, if any
+    Vector centre = {};   ///< of mass, from the point of reference, in axes of the body
   };
-  for (const Step& step : steps_) {
-    reference_[step.child] = reference_[step.parent] + leads(step.parent, step.parent_handle) -
-                             leads(step.child, step.child_handle);
-  }
-  for (CutJoint& cut : cuts_) {
-    const auto at = [&](int body, int handle) {
-      return body < 0 ? Point<double>{cut.ground, {}} : reference_[body] + leads(body, handle);
-    };
-    const Point<double> gap = at(cut.body_Q, cut.Q) - at(cut.body_P, cut.P);
-    cut.w_P = cut.body_P < 0 ? 0.0 : speed_[cut.body_P];
-    cut.v = kGap == GapKind::kSpeeds ? RelativeVelocity(cut.w_P, gap) : gap.p;
-    if (cut.body_P >= 0) {
-      arm_[cut.P] = arm_[cut.P] + Scaled(1.0 / bodies_[cut.body_P].link.radius, gap.p);
-    }
-  }
-}
-
-Correction<double> AssemblySweep::LargestGap() const {
-  double largest = 0.0;
-  for (const CutJoint& cut : cuts_) {
-    largest = std::max(largest, cut.v.x * cut.v.x + cut.v.y * cut.v.y);
-  }
-  return {.shift = std::sqrt(largest)};
-}
-
-bool AssemblySweep::Assemble() {
-  operations_ += of_matrices_;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const Body& body = bodies_[i];
-    const Vector* arm = arm_.data() + body.first_handle;
-    Matrix* zeta = zeta_.data() + body.first_block;
-    for (int k = 0; k < body.handles; ++k) {
-      for (int j = 0; j < body.handles; ++j) {  // (1-4): 1/m + t t^T / I, t = z x r
-        *zeta++ = {body.link.mobility + arm[j].y * arm[k].y, -(arm[j].y * arm[k].x),
-                   -(arm[j].x * arm[k].y), body.link.mobility + arm[j].x * arm[k].x};
-      }
-    }
-  }
-  for (const Node& node : nodes_) {
-    if (!WithRows(node.pins, [&](auto rows) { return Join(node, rows); })) return false;
-  }
-  return true;
-}
-
-/// Y = C zeta of a pin at a handle of a child (67).
-LOOPBENCH_INLINE AssemblySweep::Matrix AssemblySweep::ResponseAt(const Node& node, const Pin& pin,
-                                                                 const Side& at) const {
-  const Matrix* zeta = zeta_.data() + node.blocks[at.child] + node.handles[at.child] * at.place;
-  Matrix Y = {0.0, 0.0, 0.0, 0.0};
-  if (pin.Q.place >= 0 && pin.Q.child == at.child) Y = zeta[pin.Q.place];
-  if (pin.P.place >= 0 && pin.P.child == at.child) Y = Y - zeta[pin.P.place];
-  return Y;
-}
-
-/// X = Y C^T of one pin (16). Both sides may be on one assembly.
-LOOPBENCH_INLINE Symmetric2<double> AssemblySweep::Across(const Node& node, const Pin& pin) const {
-  const auto block = [&](const Side& row, const Side& column) -> const Matrix& {
-    const int child = row.child;
-    return zeta_[node.blocks[child] + row.place + node.handles[child] * column.place];
+  /// Effect of forces other than gravity on a body alone.
+  struct Applied {
+    Vector a = {};       ///< acceleration of the point of reference
+    double alpha = 0.0;  ///< sqrt(I) times angular acceleration
   };
-  Symmetric2<double> X = {0.0, 0.0, 0.0};
-  for (const Side* side : {&pin.Q, &pin.P}) {
-    if (side->place < 0) continue;
-    const Matrix& own = block(*side, *side);
-    X = X + Symmetric2<double>{own.xx, own.xy, own.yy};
-  }
-  if (pin.P.place < 0 || pin.Q.place < 0 || pin.P.child != pin.Q.child) return X;
-  const Matrix& QP = block(pin.Q, pin.P);
-  return X + Symmetric2<double>{-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy)};
-}
-
-/// X = Y C^T (16, 66) is factored pin by pin. Rows of L are columns of W of the pins.
-template <class Rows>
-bool AssemblySweep::Join(const Node& node, Rows rows) {
-  const int n = rows;
-  const Pin* pins = pins_.data() + node.first_pin;
-  const Side* kept = kept_.data() + node.first_kept;
-  Factored2<double>* factors = factors_.data() + node.first_pin;
-  double *U = U_.data(), *W = W_.data() + node.matrix;
-  const double* L = W + 2 * n * node.kept;
-  // two columns of U and W in the rows of the first pins, from columns of X or Y
-  const auto reduce = [&](int place, int num_pins, const auto& block) LOOPBENCH_INLINED {
-    double *ux = U + 2 * n * place, *uy = ux + n;
-    double *wx = W + 2 * n * place, *wy = wx + n;
-    for (int i = 0; i < num_pins; ++i) {
-      const Matrix Y = block(pins[i]);
-      const double *Lx = L + 2 * n * i, *Ly = Lx + n;
-      const auto column = [&](double* u, double* w, double x, double y) LOOPBENCH_INLINED {
-        u[2 * i] = x - Dot(Lx, u, 2 * i);
-        u[2 * i + 1] = y - Dot(Ly, u, 2 * i);
-        const Vector solved = factors[i].Solve(u[2 * i], u[2 * i + 1]);
-        w[2 * i] = solved.x;
-        w[2 * i + 1] = solved.y;
-      };
-      column(ux, wx, Y.xx, Y.yx);
-      column(uy, wy, Y.xy, Y.yy);
-    }
+  /// A joint of the tree between two bodies: position of the child.
+  struct Step {
+    int parent = 0, child = 0;                ///< bodies
+    int parent_handle = 0, child_handle = 0;  ///< handles at their common joint
   };
-  double slack = 0.0;
-  for (int i = 0; i < n / 2; ++i) {
-    reduce(node.kept + i, i, [&](const Pin& row) LOOPBENCH_INLINED {
-      Matrix X = {0.0, 0.0, 0.0, 0.0};
-      if (pins[i].Q.place >= 0) X = ResponseAt(node, row, pins[i].Q);
-      return pins[i].P.place < 0 ? X : X - ResponseAt(node, row, pins[i].P);
-    });
-    const double *Lx = L + 2 * n * i, *Ly = Lx + n;
-    const double *ux = U + 2 * n * (node.kept + i), *uy = ux + n;
-    Symmetric2<double> rest = Across(node, pins[i]);
-    rest.xx -= Dot(Lx, ux, 2 * i);
-    rest.xy -= Dot(Ly, ux, 2 * i);
-    rest.yy -= Dot(Ly, uy, 2 * i);
-    factors[i] = FactorsOf(rest, pins[i].limit, slack);
-    if (!(slack >= 0.0) || !(rest.xx + rest.yy > 0.0)) return false;
-  }
-  for (int e = 0; e < node.kept; ++e) {
-    reduce(e, n / 2,
-           [&](const Pin& row) LOOPBENCH_INLINED { return ResponseAt(node, row, kept[e]); });
-  }
-  Eliminate(node, rows);
-  return true;
-}
-
-/// Computes zeta of the remaining handles (26-28, 71).
-template <class Rows>
-LOOPBENCH_INLINE void AssemblySweep::Eliminate(const Node& node, Rows rows) {
-  const int n = rows;
-  const Side* kept = kept_.data() + node.first_kept;
-  Matrix* zeta = zeta_.data() + node.first_block;
-  const double *U = U_.data(), *W = W_.data() + node.matrix;
-  for (int f = 0; f < node.kept; ++f) {
-    const double *wx = W + 2 * n * f, *wy = wx + n;
-    for (int e = f; e < node.kept; ++e) {
-      const double *ux = U + 2 * n * e, *uy = ux + n;
-      Matrix Z = {0.0, 0.0, 0.0, 0.0};
-      const int child = kept[e].child;
-      if (child == kept[f].child) {
-        Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
-      }
-      Z = Z - Matrix{Dot(ux, wx, rows), Dot(ux, wy, rows), Dot(uy, wx, rows), Dot(uy, wy, rows)};
-      if (e == f) {
-        Z.yx = Z.xy;
-      } else {
-        zeta[f + node.kept * e] = Transpose(Z);
-      }
-      zeta[e + node.kept * f] = Z;
-    }
-  }
-}
-
-/// L^-1 (C b + c0) of all pins (68), b of the remaining handles, and s = D^-1 of the former (21).
-template <Pass kPass, class Rows>
-LOOPBENCH_INLINE void AssemblySweep::Up(const Node& node, Rows rows) {
-  const int n = rows;
-  const Side* kept = kept_.data() + node.first_kept;
-  const double *W = W_.data() + node.matrix, *L = W + 2 * n * node.kept;
-  double* s = s_.data() + 2 * node.first_pin;
-  for (int i = 0; i < n / 2; ++i) {
-    const Pin& pin = pins_[node.first_pin + i];
-    Vector sum = {0.0, 0.0};
-    if (pin.cut >= 0) {
-      const CutJoint& cut = cuts_[pin.cut];
-      if constexpr (kPass == Pass::kSpeeds) sum = cut.v;
-      if constexpr (kPass == Pass::kAccelerations) sum = -Cross(cut.w_P + cut.w_P, cut.v);  // (7)
-    }
-    if (pin.Q.place >= 0) sum = sum + b_[pin.Q.handle];
-    if (pin.P.place >= 0) sum = sum - b_[pin.P.handle];
-    s[2 * i] = sum.x - Dot(L + 2 * n * i, s, 2 * i);
-    s[2 * i + 1] = sum.y - Dot(L + 2 * n * i + n, s, 2 * i);
-  }
-  for (int e = 0; e < node.kept; ++e, W += 2 * n) {
-    Vector& b = b_[kept[e].handle];
-    b = b - Vector{Dot(W, s, rows), Dot(W + n, s, rows)};  // (29-30, 72)
-  }
-  for (int i = 0; i < n / 2; ++i) {
-    const Vector solved = factors_[node.first_pin + i].Solve(s[2 * i], s[2 * i + 1]);
-    s[2 * i] = solved.x;
-    s[2 * i + 1] = solved.y;
-  }
-}
-
-/// phi = -L^-T (s + W F) (17, 64), and forces on the handles of the pins.
-template <class Rows>
-LOOPBENCH_INLINE void AssemblySweep::Down(const Node& node, Rows rows) {
-  const int n = rows;
-  const Side* kept = kept_.data() + node.first_kept;
-  const double *W = W_.data() + node.matrix, *L = W + 2 * n * node.kept;
-  double* phi = s_.data() + 2 * node.first_pin;
-  const auto subtract = [&](const double* columns, auto size, const Vector& F) {
-    Repeat(size, [&](int r) { phi[r] -= columns[r] * F.x + columns[n + r] * F.y; });
+  /// A joint that is cut. On Ground there is no handle.
+  struct CutJoint {
+    int P = -1, Q = -1;            ///< handles
+    int body_P = -1, body_Q = -1;  ///< -1: Ground
+    Vector ground = {};            ///< the point there
+    Vector v = {};                 ///< relative velocity (two_handle.h), Q against P, or the gap
+    double w_P = 0.0;
   };
-  for (int r = 0; r < n; ++r) phi[r] = -phi[r];
-  for (int e = 0; e < node.kept; ++e) subtract(W + 2 * n * e, rows, F_[kept[e].handle]);
-  for (int i = n / 2 - 1; i >= 0; --i) {
-    const Pin& pin = pins_[node.first_pin + i];
-    const Vector force = {phi[2 * i], phi[2 * i + 1]};
-    subtract(L + 2 * n * i, 2 * i, force);
-    if (pin.Q.place >= 0) F_[pin.Q.handle] = force;
-    if (pin.P.place >= 0) F_[pin.P.handle] = -force;
-  }
-}
-
-void AssemblySweep::SetApplied(const Kinematics<Planar, double>& kinematics) {
-  ForcesBesideGravity<Planar, double>(kinematics, wrenches_);
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const Body& body = bodies_[i];
-    const double s = sine_[i], c = cosine_[i];
-    const Vector r = {body.centre.x * c - body.centre.y * s, body.centre.x * s + body.centre.y * c};
-    const Vector F = {wrenches_[i + 1].linear[0], wrenches_[i + 1].linear[1]};
-    applied_[i] = {Scaled(body.link.mobility, F),
-                   (wrenches_[i + 1].angular[0] + Moment(r, F)) / body.link.radius};
-  }
-}
-
-template <Pass kPass>
-void AssemblySweep::Solve() {
-  operations_ += of_vectors_;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const Body& body = bodies_[i];
-    const Applied applied = applied_.empty() ? Applied{} : applied_[i];
-    const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i] + applied.alpha;
-    const double gx = body.link.gx + applied.a.x, gy = body.link.gy + applied.a.y;
-    const double w2 = speed_[i] * speed_[i] * body.link.radius;
-    alpha_[i] = kPass == Pass::kSpeeds ? 0.0 : a;
-    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
-      const Vector& r = arm_[h];
-      b_[h] = kPass == Pass::kSpeeds ? Vector{0.0, 0.0}
-                                     : Vector{gx - a * r.y - w2 * r.x, gy + a * r.x - w2 * r.y};
-    }
-  }
-  for (const Node& node : nodes_) {
-    WithRows(node.pins, [&](auto rows) { Up<kPass>(node, rows); });
-  }
-  for (std::size_t n = nodes_.size(); n-- > 0;) {
-    WithRows(nodes_[n].pins, [&](auto rows) { Down(nodes_[n], rows); });
-  }
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const Body& body = bodies_[i];
-    double alpha = alpha_[i];
-    for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
-      alpha += Moment(arm_[h], F_[h]);
-    }
-    alpha_[i] = alpha / body.link.radius;
-  }
-}
-
-bool AssemblySweep::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>* kinematics,
-                             std::span<const double> q, std::span<const double> u,
-                             std::span<double> qdot, std::span<double> udot) {
-  using Numbers = Eigen::Map<const VectorX<double>>;
-  operations_ = 0;
-  if (!Place(GapKind::kSpeeds, q, u) || !Assemble()) return false;
-  const auto take_forces = [&] {
-    if (applied_.empty()) return;
-    kinematics->UpdatePosition(Numbers(q.data(), std::ssize(q)));
-    kinematics->UpdateVelocity(Numbers(qdot.data(), std::ssize(qdot)));
-    SetApplied(*kinematics);
+  /// One of a node's joints on one of its children.
+  struct Side {
+    int child = 0;
+    int place = -1;   ///< among its handles; -1: Ground
+    int handle = -1;  ///< in handles_
   };
-  if (speeds == SpeedsUsed::kGiven) {
-    std::ranges::copy(u, qdot.begin());
-    take_forces();
-    Solve<Pass::kAccelerations>();
-  } else {
-    Solve<Pass::kSpeeds>();
-    if (!tree_.ToJoints(alpha_.data(), u, qdot, *pool_)) return false;
+  struct Pin {
+    Side P, Q;
+    int cut = -1;        ///< in cuts_
+    double limit = 0.0;  ///< least response; 0 if it closes no loop
+  };
+  /// A join. Children's zeta are blocks by columns.
+  struct Node {
+    int blocks[2] = {0, 0}, handles[2] = {0, 0};  ///< first block and number of handles of each
+    int first_pin = 0, pins = 0;
+    int first_kept = 0, kept = 0;  ///< in kept_
+    int first_block = 0;           ///< of its own zeta
+    int matrix = 0;                ///< first number of W_
+  };
+
+  struct Layout;
+
+  bool Place(Sought sought, std::span<const double> q, std::span<const double> u) override {
+    tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
+    return sought == Sought::kPositions ? Turn<false>() : Turn<true>();
+  }
+  Correction<double> LargestGap() const override {
+    double largest = 0.0;
+    for (const CutJoint& cut : cuts_) {
+      largest = std::max(largest, cut.v.x * cut.v.x + cut.v.y * cut.v.y);
+    }
+    return {.shift = std::sqrt(largest)};
+  }
+  bool Find(Sought sought) override {
+    if (sought != Sought::kCompleted && !Assemble()) return false;
+    sought == Sought::kAccelerations ? Solve<Sought::kAccelerations>()
+    : sought == Sought::kCompleted   ? Solve<Sought::kCompleted>()
+                                     : Solve<Sought::kSpeeds>();
+    return true;
+  }
+  bool AddChange(std::span<const double> base, std::span<double> sum) override {
+    return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
+  }
+  void AddToSpeeds() override {
     for (std::size_t i = 0; i < bodies_.size(); ++i) speed_[i] += alpha_[i];
-    take_forces();
-    Solve<Pass::kCompleted>();
   }
-  return tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
-}
-
-bool AssemblySweep::IsUsable(const Kinematics<Planar, double>& kinematics) {
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    angle_[i] = kinematics.poses()[i + 1].angle;
-    speed_[i] = 0.0;
+  void TakeForces(Kinematics<Planar, double>& kinematics, std::span<const double> q,
+                  std::span<const double> u) override {
+    using Numbers = Eigen::Map<const VectorX<double>>;
+    if (applied_.empty()) return;
+    kinematics.UpdatePosition(Numbers(q.data(), std::ssize(q)));
+    kinematics.UpdateVelocity(Numbers(u.data(), std::ssize(u)));
+    ForcesBesideGravity<Planar, double>(kinematics, wrenches_);
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Body& body = bodies_[i];
+      const double s = sine_[i], c = cosine_[i];
+      const Vector r = {body.centre.x * c - body.centre.y * s,
+                        body.centre.x * s + body.centre.y * c};
+      const Vector F = {wrenches_[i + 1].linear[0], wrenches_[i + 1].linear[1]};
+      applied_[i] = {Scaled(body.link.mobility, F),
+                     (wrenches_[i + 1].angular[0] + Moment(r, F)) / body.link.radius};
+    }
   }
-  return Turn<GapKind::kSpeeds>() && Assemble();
+
+  /// Bodies at moved angles. False for angles beyond kLargestAngle.
+  template <bool kOfSpeeds>
+  bool Turn() {
+    const int places = static_cast<int>(angle_.size());
+    if (!SinesAndCosines(angle_.data(), places, sine_.data(), cosine_.data())) return false;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Body& body = bodies_[i];
+      const double s = sine_[i], c = cosine_[i];
+      for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+        const Vector& arm = handles_[h];
+        arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
+      }
+    }
+    if (!cuts_.empty()) Close<kOfSpeeds>();
+    return true;
+  }
+
+  /// A cut joint is imposed at a point of Q; there the arm of P ends (two_handle.h).
+  template <bool kOfSpeeds>
+  void Close() {
+    const auto leads = [&](int body, int handle) {
+      const Vector r = Scaled(bodies_[body].link.radius, arm_[handle]);
+      return Point<double>{r, Cross(speed_[body], r)};
+    };
+    for (const Step& step : steps_) {
+      reference_[step.child] = reference_[step.parent] + leads(step.parent, step.parent_handle) -
+                               leads(step.child, step.child_handle);
+    }
+    for (CutJoint& cut : cuts_) {
+      const auto at = [&](int body, int handle) {
+        return body < 0 ? Point<double>{cut.ground, {}} : reference_[body] + leads(body, handle);
+      };
+      const Point<double> gap = at(cut.body_Q, cut.Q) - at(cut.body_P, cut.P);
+      cut.w_P = cut.body_P < 0 ? 0.0 : speed_[cut.body_P];
+      cut.v = kOfSpeeds ? RelativeVelocity(cut.w_P, gap) : gap.p;
+      if (cut.body_P >= 0) {
+        arm_[cut.P] = arm_[cut.P] + Scaled(1.0 / bodies_[cut.body_P].link.radius, gap.p);
+      }
+    }
+  }
+
+  bool Assemble() {
+    operations_ += of_matrices_;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Body& body = bodies_[i];
+      const Vector* arm = arm_.data() + body.first_handle;
+      Matrix* zeta = zeta_.data() + body.first_block;
+      for (int k = 0; k < body.handles; ++k) {
+        for (int j = 0; j < body.handles; ++j) {  // (1-4): 1/m + t t^T / I, t = z x r
+          *zeta++ = {body.link.mobility + arm[j].y * arm[k].y, -(arm[j].y * arm[k].x),
+                     -(arm[j].x * arm[k].y), body.link.mobility + arm[j].x * arm[k].x};
+        }
+      }
+    }
+    for (const Node& node : nodes_) {
+      if (!WithRows(node.pins, [&](auto rows) { return Join(node, rows); })) return false;
+    }
+    return true;
+  }
+
+  /// Y = C zeta of a pin at a handle of a child (67).
+  LOOPBENCH_INLINE Matrix ResponseAt(const Node& node, const Pin& pin, const Side& at) const {
+    const Matrix* zeta = zeta_.data() + node.blocks[at.child] + node.handles[at.child] * at.place;
+    Matrix Y = {0.0, 0.0, 0.0, 0.0};
+    if (pin.Q.place >= 0 && pin.Q.child == at.child) Y = zeta[pin.Q.place];
+    if (pin.P.place >= 0 && pin.P.child == at.child) Y = Y - zeta[pin.P.place];
+    return Y;
+  }
+
+  /// X = Y C^T of one pin (16). Both sides may be on one assembly.
+  LOOPBENCH_INLINE Symmetric2<double> Across(const Node& node, const Pin& pin) const {
+    const auto block = [&](const Side& row, const Side& column) -> const Matrix& {
+      const int child = row.child;
+      return zeta_[node.blocks[child] + row.place + node.handles[child] * column.place];
+    };
+    Symmetric2<double> X = {0.0, 0.0, 0.0};
+    for (const Side* side : {&pin.Q, &pin.P}) {
+      if (side->place < 0) continue;
+      const Matrix& own = block(*side, *side);
+      X = X + Symmetric2<double>{own.xx, own.xy, own.yy};
+    }
+    if (pin.P.place < 0 || pin.Q.place < 0 || pin.P.child != pin.Q.child) return X;
+    const Matrix& QP = block(pin.Q, pin.P);
+    return X + Symmetric2<double>{-(QP.xx + QP.xx), -(QP.xy + QP.yx), -(QP.yy + QP.yy)};
+  }
+
+  /// X = Y C^T (16, 66) is factored pin by pin. Rows of L are columns of W of the pins.
+  template <class Rows>
+  bool Join(const Node& node, Rows rows) {
+    const int n = rows;
+    const Pin* pins = pins_.data() + node.first_pin;
+    const Side* kept = kept_.data() + node.first_kept;
+    Factored2<double>* factors = factors_.data() + node.first_pin;
+    double *U = U_.data(), *W = W_.data() + node.matrix;
+    const double* L = W + 2 * n * node.kept;
+    // two columns of U and W in the rows of the first pins, from columns of X or Y
+    const auto reduce = [&](int place, int num_pins, const auto& block) LOOPBENCH_INLINED {
+      double *ux = U + 2 * n * place, *uy = ux + n;
+      double *wx = W + 2 * n * place, *wy = wx + n;
+      for (int i = 0; i < num_pins; ++i) {
+        const Matrix Y = block(pins[i]);
+        const double *Lx = L + 2 * n * i, *Ly = Lx + n;
+        const auto column = [&](double* u, double* w, double x, double y) LOOPBENCH_INLINED {
+          u[2 * i] = x - Dot(Lx, u, 2 * i);
+          u[2 * i + 1] = y - Dot(Ly, u, 2 * i);
+          const Vector solved = factors[i].Solve(u[2 * i], u[2 * i + 1]);
+          w[2 * i] = solved.x;
+          w[2 * i + 1] = solved.y;
+        };
+        column(ux, wx, Y.xx, Y.yx);
+        column(uy, wy, Y.xy, Y.yy);
+      }
+    };
+    double slack = 0.0;
+    for (int i = 0; i < n / 2; ++i) {
+      reduce(node.kept + i, i, [&](const Pin& row) LOOPBENCH_INLINED {
+        Matrix X = {0.0, 0.0, 0.0, 0.0};
+        if (pins[i].Q.place >= 0) X = ResponseAt(node, row, pins[i].Q);
+        return pins[i].P.place < 0 ? X : X - ResponseAt(node, row, pins[i].P);
+      });
+      const double *Lx = L + 2 * n * i, *Ly = Lx + n;
+      const double *ux = U + 2 * n * (node.kept + i), *uy = ux + n;
+      Symmetric2<double> rest = Across(node, pins[i]);
+      rest.xx -= Dot(Lx, ux, 2 * i);
+      rest.xy -= Dot(Ly, ux, 2 * i);
+      rest.yy -= Dot(Ly, uy, 2 * i);
+      factors[i] = FactorsOf(rest, pins[i].limit, slack);
+      if (!(slack >= 0.0) || !(rest.xx + rest.yy > 0.0)) return false;
+    }
+    for (int e = 0; e < node.kept; ++e) {
+      reduce(e, n / 2,
+             [&](const Pin& row) LOOPBENCH_INLINED { return ResponseAt(node, row, kept[e]); });
+    }
+    Eliminate(node, rows);
+    return true;
+  }
+
+  /// Computes zeta of the remaining handles (26-28, 71).
+  template <class Rows>
+  LOOPBENCH_INLINE void Eliminate(const Node& node, Rows rows) {
+    const int n = rows;
+    const Side* kept = kept_.data() + node.first_kept;
+    Matrix* zeta = zeta_.data() + node.first_block;
+    const double *U = U_.data(), *W = W_.data() + node.matrix;
+    for (int f = 0; f < node.kept; ++f) {
+      const double *wx = W + 2 * n * f, *wy = wx + n;
+      for (int e = f; e < node.kept; ++e) {
+        const double *ux = U + 2 * n * e, *uy = ux + n;
+        Matrix Z = {0.0, 0.0, 0.0, 0.0};
+        const int child = kept[e].child;
+        if (child == kept[f].child) {
+          Z = zeta_[node.blocks[child] + kept[e].place + node.handles[child] * kept[f].place];
+        }
+        Z = Z - Matrix{Dot(ux, wx, rows), Dot(ux, wy, rows), Dot(uy, wx, rows), Dot(uy, wy, rows)};
+        if (e == f) {
+          Z.yx = Z.xy;
+        } else {
+          zeta[f + node.kept * e] = Transpose(Z);
+        }
+        zeta[e + node.kept * f] = Z;
+      }
+    }
+  }
+
+  /// L^-1 (C b + c0) of all pins (68), b of the remaining handles, and s = D^-1 of the former (21).
+  template <Sought kSought, class Rows>
+  LOOPBENCH_INLINE void Up(const Node& node, Rows rows) {
+    const int n = rows;
+    const Side* kept = kept_.data() + node.first_kept;
+    const double *W = W_.data() + node.matrix, *L = W + 2 * n * node.kept;
+    double* s = s_.data() + 2 * node.first_pin;
+    for (int i = 0; i < n / 2; ++i) {
+      const Pin& pin = pins_[node.first_pin + i];
+      Vector sum = {0.0, 0.0};
+      if (pin.cut >= 0) {
+        const CutJoint& cut = cuts_[pin.cut];
+        if constexpr (kSought == Sought::kSpeeds) sum = cut.v;
+        if constexpr (kSought == Sought::kAccelerations)
+          sum = -Cross(cut.w_P + cut.w_P, cut.v);  // (7)
+      }
+      if (pin.Q.place >= 0) sum = sum + b_[pin.Q.handle];
+      if (pin.P.place >= 0) sum = sum - b_[pin.P.handle];
+      s[2 * i] = sum.x - Dot(L + 2 * n * i, s, 2 * i);
+      s[2 * i + 1] = sum.y - Dot(L + 2 * n * i + n, s, 2 * i);
+    }
+    for (int e = 0; e < node.kept; ++e, W += 2 * n) {
+      Vector& b = b_[kept[e].handle];
+      b = b - Vector{Dot(W, s, rows), Dot(W + n, s, rows)};  // (29-30, 72)
+    }
+    for (int i = 0; i < n / 2; ++i) {
+      const Vector solved = factors_[node.first_pin + i].Solve(s[2 * i], s[2 * i + 1]);
+      s[2 * i] = solved.x;
+      s[2 * i + 1] = solved.y;
+    }
+  }
+
+  /// phi = -L^-T (s + W F) (17, 64), and forces on the handles of the pins.
+  template <class Rows>
+  LOOPBENCH_INLINE void Down(const Node& node, Rows rows) {
+    const int n = rows;
+    const Side* kept = kept_.data() + node.first_kept;
+    const double *W = W_.data() + node.matrix, *L = W + 2 * n * node.kept;
+    double* phi = s_.data() + 2 * node.first_pin;
+    const auto subtract = [&](const double* columns, auto size, const Vector& F) {
+      Repeat(size, [&](int r) { phi[r] -= columns[r] * F.x + columns[n + r] * F.y; });
+    };
+    for (int r = 0; r < n; ++r) phi[r] = -phi[r];
+    for (int e = 0; e < node.kept; ++e) subtract(W + 2 * n * e, rows, F_[kept[e].handle]);
+    for (int i = n / 2 - 1; i >= 0; --i) {
+      const Pin& pin = pins_[node.first_pin + i];
+      const Vector force = {phi[2 * i], phi[2 * i + 1]};
+      subtract(L + 2 * n * i, 2 * i, force);
+      if (pin.Q.place >= 0) F_[pin.Q.handle] = force;
+      if (pin.P.place >= 0) F_[pin.P.handle] = -force;
+    }
+  }
+
+  template <Sought kSought>
+  void Solve() {
+    operations_ += of_vectors_;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Body& body = bodies_[i];
+      const Applied applied = applied_.empty() ? Applied{} : applied_[i];
+      const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i] + applied.alpha;
+      const double gx = body.link.gx + applied.a.x, gy = body.link.gy + applied.a.y;
+      const double w2 = speed_[i] * speed_[i] * body.link.radius;
+      alpha_[i] = kSought == Sought::kSpeeds ? 0.0 : a;
+      for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+        const Vector& r = arm_[h];
+        b_[h] = kSought == Sought::kSpeeds
+                    ? Vector{0.0, 0.0}
+                    : Vector{gx - a * r.y - w2 * r.x, gy + a * r.x - w2 * r.y};
+      }
+    }
+    for (const Node& node : nodes_) {
+      WithRows(node.pins, [&](auto rows) { Up<kSought>(node, rows); });
+    }
+    for (std::size_t n = nodes_.size(); n-- > 0;) {
+      WithRows(nodes_[n].pins, [&](auto rows) { Down(nodes_[n], rows); });
+    }
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const Body& body = bodies_[i];
+      double alpha = alpha_[i];
+      for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+        alpha += Moment(arm_[h], F_[h]);
+      }
+      alpha_[i] = alpha / body.link.radius;
+    }
+  }
+
+  std::vector<Body> bodies_;
+  std::vector<Vector> handles_;  ///< arms by radius in axes of the body, body after body
+  std::vector<Step> steps_;
+  std::vector<CutJoint> cuts_;
+  std::vector<Node> nodes_;
+  std::vector<Pin> pins_;
+  std::vector<Side> kept_;
+
+  std::vector<double> angle_, speed_, alpha_;  ///< by body, Ground's last, then padding of lanes
+  std::vector<double> sine_, cosine_;          ///< as in the line above
+  std::vector<Vector> arm_;                    ///< of handles, in ground axes, over radius
+  std::vector<Applied> applied_;               ///< by body; empty if only gravity acts
+  std::vector<Wrench<Planar, double>> wrenches_;
+  std::vector<Point<double>> reference_;  ///< of bodies
+  std::vector<Matrix> zeta_;
+  /// Two columns for each handle that stays, then of L^T for each pin if there are several. A
+  /// column has two numbers for each pin. U_ = L^-1 Y of one join has the same columns.
+  std::vector<double> W_, U_;
+  std::vector<Factored2<double>> factors_;  ///< D, by pin
+  std::vector<Vector> b_, F_;               ///< by handle: a join changes those that stay
+  std::vector<double> s_;                   ///< two for each pin; in the downward pass phi
+  TreeAngles<double> tree_;
+  long of_matrices_ = 0, of_vectors_ = 0;
+};
+
+struct AssemblySweep::Layout {
+  /// A body or an assembly during the layout of joins.
+  struct Assembly {
+    int handles = 0, first_block = 0, bodies = 1;
+    bool held = false;      ///< by Ground
+    std::vector<int> pins;  ///< of each handle the joint, twice its index, and one more at its Q
+  };
+
+  AssemblySweep& sweep;
+  const Mechanism<Planar, double>& mechanism;
+  const Plan& plan;
+  std::vector<int> handle_of = std::vector<int>(2 * mechanism.joints().size(), -1);  ///< as pins
+  std::vector<int> cut_of = std::vector<int>(mechanism.joints().size(), -1);
+  std::vector<Assembly> assemblies = std::vector<Assembly>(plan.num_nodes());
+  double most_work = static_cast<double>(plan.operations());
+  int handles = 0;
+  double blocks = 0.0, W = 0.0, most_U = 0.0, work = 0.0, vectors = 0.0;
+
+  /// Returns false if the general pass is less work, or places exceed an int.
+  bool Fits() const { return work + vectors <= most_work && blocks < 5e8 && W < 5e8; }
+  bool AddBodies() {
+    std::vector<std::vector<int>> joints_of_body(mechanism.num_bodies());
+    for (int j = 0; j < static_cast<int>(mechanism.joints().size()); ++j) {
+      const Joint<Planar, double>& joint = mechanism.joints()[j];
+      joints_of_body[joint.from].push_back(2 * j);
+      joints_of_body[joint.to].push_back(2 * j + 1);
+    }
+    for (int body = 1; body < mechanism.num_bodies(); ++body) {
+      if (!AddBody(body, joints_of_body[body])) return false;
+    }
+    return true;
+  }
+
+  bool AddBody(int index, const std::vector<int>& joints) {
+    const auto joint = [&](int side) -> const Joint<Planar, double>& {
+      return mechanism.joints()[side / 2];
+    };
+    Body body;
+    Assembly& assembly = assemblies[index - 1];
+    Vector origin = {0.0, 0.0};
+    const auto held =
+        std::ranges::find_if(joints, [&](int side) { return HoldsBody(joint(side)); });
+    assembly.held = held != joints.end();
+    if (assembly.held) {
+      origin = ArmOf(joint(*held), index);
+      body.stand = ArmOf(joint(*held), kGround);
+      body.centre = -origin;
+    }
+    body.link = MeasureLink(mechanism.bodies()[index], mechanism.gravity(),
+                            assembly.held ? &origin : nullptr);
+    body.first_handle = handles;
+    body.first_block = static_cast<int>(blocks);
+    for (const int side : joints) {
+      if (HoldsBody(joint(side))) continue;
+      handle_of[side] = handles++;
+      assembly.pins.push_back(side);
+      sweep.handles_.push_back(Scaled(1.0 / body.link.radius, ArmOf(joint(side), index) - origin));
+    }
+    body.handles = assembly.handles = handles - body.first_handle;
+    assembly.first_block = body.first_block;
+    blocks += static_cast<double>(body.handles) * body.handles;
+    work += 4.0 * body.handles * body.handles;
+    sweep.bodies_.push_back(body);
+    return Fits();
+  }
+
+  void AddSteps() {
+    for (const TreeStep& step : mechanism.tree()) {
+      if (step.parent == kGround) continue;
+      const int parent_side = mechanism.joints()[step.joint].from == step.parent ? 0 : 1;
+      sweep.steps_.push_back({.parent = step.parent - 1,
+                              .child = step.child - 1,
+                              .parent_handle = handle_of[2 * step.joint + parent_side],
+                              .child_handle = handle_of[2 * step.joint + 1 - parent_side]});
+    }
+    for (const int j : mechanism.constraints()) {
+      const Joint<Planar, double>& joint = mechanism.joints()[j];
+      cut_of[j] = static_cast<int>(sweep.cuts_.size());
+      sweep.cuts_.push_back({.P = handle_of[2 * j],
+                             .Q = handle_of[2 * j + 1],
+                             .body_P = joint.from - 1,
+                             .body_Q = joint.to - 1,
+                             .ground = ArmOf(joint, kGround)});
+    }
+  }
+
+  Pin MakePin(const PlanNode& planned, const NodeJoint& closed) const {
+    const auto side = [&](int handle, int pin) {
+      if (handle < 0) return Side{};
+      const int child = planned.handles[handle].child;
+      const Assembly& assembly = assemblies[planned.children[child]];
+      const auto place = std::ranges::find(assembly.pins, pin) - assembly.pins.begin();
+      return Side{child, static_cast<int>(place), handle_of[pin]};
+    };
+    return {side(closed.from, 2 * closed.index), side(closed.to, 2 * closed.index + 1),
+            cut_of[closed.index]};
+  }
+
+  /// Keeps the remaining handles, the first child's first.
+  void Keep(const PlanNode& planned, Node& node, Assembly& all) {
+    const auto closes = [&](int pin) {
+      return std::ranges::find(planned.joints, pin / 2, &NodeJoint::index) != planned.joints.end();
+    };
+    all.bodies = 0;
+    for (const int c : {0, 1}) {
+      if (planned.children[c] < 0) continue;
+      const Assembly& child = assemblies[planned.children[c]];
+      all.bodies += child.bodies;
+      all.held = all.held || child.held;
+      node.blocks[c] = child.first_block;
+      node.handles[c] = child.handles;
+      for (int place = 0; place < child.handles; ++place) {
+        if (closes(child.pins[place])) continue;
+        all.pins.push_back(child.pins[place]);
+        sweep.kept_.push_back({c, place, handle_of[child.pins[place]]});
+      }
+    }
+    const auto on_ground = [](const Pin& pin) { return pin.P.place < 0 || pin.Q.place < 0; };
+    all.held =
+        all.held || std::any_of(sweep.pins_.begin() + node.first_pin, sweep.pins_.end(), on_ground);
+    node.kept = all.handles = static_cast<int>(all.pins.size());
+  }
+
+  /// Multiply-adds and room of a join.
+  void Count(const Node& node) {
+    const double n = 2.0 * node.pins, d = 2.0 * node.kept;
+    blocks += static_cast<double>(node.kept) * node.kept;
+    work += n * n * n / 6.0 + n * n * d / 2.0 + n * d * d / 2.0;
+    vectors += 2.0 * n * (n + d);
+    W += n * (node.pins > 1 ? n + d : d);
+    most_U = std::max(most_U, n * (n + d));
+  }
+
+  /// A pin closes a loop if Ground holds both its sides, both are on one assembly, or the join has
+  /// several pins. The lighter side determines the response of one pin, all `bodies` of several.
+  void SetLimits(const PlanNode& planned, std::span<const int> joints, int bodies) {
+    const Assembly& one = assemblies[planned.children[0]];
+    Pin* pin = &sweep.pins_.back() + 1 - joints.size();
+    const bool on_ground = pin->P.place < 0 || pin->Q.place < 0;
+    bool closes = on_ground ? one.held : true;
+    int lighter = one.bodies;
+    if (planned.children[1] >= 0) {
+      const Assembly& other = assemblies[planned.children[1]];
+      closes = one.held && other.held;
+      lighter = std::min(lighter, other.bodies);
+    }
+    const bool several = joints.size() > 1;
+    if (!closes && !several) return;
+    const double share = ShareOfLimit(several ? bodies : lighter);
+    for (const int joint : joints) (pin++)->limit = share * LimitOf(mechanism, joint);
+  }
+
+  bool AddNode(const PlanNode& planned, Assembly& all) {
+    Node node;
+    node.first_pin = static_cast<int>(sweep.pins_.size());
+    node.first_kept = static_cast<int>(sweep.kept_.size());
+    std::vector<int> joints;
+    for (const NodeJoint& closed : planned.joints) {
+      if (HoldsBody(mechanism.joints()[closed.index])) continue;
+      sweep.pins_.push_back(MakePin(planned, closed));
+      joints.push_back(closed.index);
+    }
+    node.pins = static_cast<int>(joints.size());
+    if (node.pins == 0) {  // a body already held by Ground
+      all = std::move(assemblies[planned.children[0]]);
+      return true;
+    }
+    Keep(planned, node, all);
+    node.first_block = all.first_block = static_cast<int>(blocks);
+    node.matrix = static_cast<int>(W);
+    SetLimits(planned, joints, all.bodies);
+    Count(node);
+    sweep.nodes_.push_back(node);
+    return Fits();
+  }
+
+  bool AddNodes() {
+    for (int n = 0; n < plan.num_leaves(); ++n) {
+      const PlanSide& hold = plan.leaves()[n].hold;
+      if (hold.joint < 0 || HoldsBody(mechanism.joints()[hold.joint])) continue;
+      const Handle leaf{.body = n + 1};
+      const NodeJoint closed{
+          .index = hold.joint, .from = hold.at_Q ? -1 : 0, .to = hold.at_Q ? 0 : -1};
+      PlanNode node;
+      node.children[0] = n;
+      node.handles = std::span(&leaf, 1);
+      node.joints = std::span(&closed, 1);
+      Assembly all;
+      if (!AddNode(node, all)) return false;
+      assemblies[n] = std::move(all);
+    }
+    for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
+      if (!AddNode(plan.nodes()[n - plan.num_leaves()], assemblies[n])) return false;
+    }
+    return true;
+  }
+
+  void Resize() {
+    const auto places = static_cast<std::size_t>(mechanism.num_bodies() + kLanes - 1) / kLanes;
+    sweep.angle_.assign(places * kLanes, 0.0);
+    sweep.speed_ = sweep.alpha_ = sweep.sine_ = sweep.cosine_ = sweep.angle_;
+    sweep.arm_ = sweep.handles_;
+    for (const Body& body : sweep.bodies_) sweep.reference_.push_back({body.stand, {0.0, 0.0}});
+    if (!mechanism.forces().empty()) {
+      sweep.applied_.resize(sweep.bodies_.size());
+      sweep.wrenches_.resize(mechanism.num_bodies());
+    }
+    sweep.SetSize(mechanism.num_u(), mechanism.length(), 1);
+    sweep.zeta_.resize(static_cast<std::size_t>(blocks));
+    sweep.W_.resize(static_cast<std::size_t>(W));
+    sweep.U_.resize(static_cast<std::size_t>(most_U));
+    sweep.factors_.resize(sweep.pins_.size());
+    sweep.s_.assign(2 * sweep.pins_.size(), 0.0);
+    sweep.b_.assign(sweep.handles_.size(), {0.0, 0.0});
+    sweep.F_ = sweep.b_;
+    sweep.of_matrices_ = static_cast<long>(work);
+    sweep.of_vectors_ =
+        static_cast<long>(vectors + 8.0 * static_cast<double>(sweep.handles_.size()));
+  }
+};
+
+std::unique_ptr<AssemblySweep> AssemblySweep::Make(const Mechanism<Planar, double>& mechanism,
+                                                   const Plan& plan) {
+  if (!HasOnlyPins(mechanism)) return nullptr;
+  std::unique_ptr<AssemblySweep> sweep(new AssemblySweep);
+  Layout layout{*sweep, mechanism, plan};
+  if (!layout.AddBodies()) return nullptr;
+  layout.AddSteps();
+  if (!layout.AddNodes()) return nullptr;
+  layout.Resize();
+  std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
+  for (int body = 1; body < mechanism.num_bodies(); ++body) place_of[body] = body - 1;
+  sweep->tree_ =
+      TreeAngles<double>(mechanism, place_of, std::vector<double>(mechanism.num_bodies(), 0.0));
+  return sweep;
 }
 
-bool AssemblySweep::Place(GapKind kind, std::span<const double> q, std::span<const double> u) {
-  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  return kind == GapKind::kSpeeds ? Turn<GapKind::kSpeeds>() : Turn<GapKind::kPositions>();
-}
-
-bool AssemblySweep::FindChange(GapKind) {
-  if (!Assemble()) return false;
-  Solve<Pass::kSpeeds>();
-  return true;
-}
-
-bool AssemblySweep::AddChange(std::span<const double> base, std::span<double> sum) {
-  return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
+std::unique_ptr<ShortCut<Planar>> MakeAssemblySweep(const Mechanism<Planar, double>& mechanism,
+                                                    const Plan& plan) {
+  return AssemblySweep::Make(mechanism, plan);
 }
 
 }  // namespace loopbench::odca::pins

@@ -3,9 +3,6 @@
 #include <algorithm>
 
 #include "mechanism/algebra/instantiate.h"
-#include "odca/arm_sweep.h"
-#include "odca/assembly_sweep.h"
-#include "odca/path_sweep.h"
 
 namespace loopbench::odca {
 
@@ -50,16 +47,16 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
 }
 
 template <class Space, class S>
-void Odca<Space, S>::MakeShortCut([[maybe_unused]] const FormulationOptions& options) {
+void Odca<Space, S>::MakeShortCut(const FormulationOptions& options) {
   if constexpr (!std::is_same_v<S, double>) {
     return;
   } else if constexpr (std::is_same_v<Space, Spatial>) {
-    short_cut_ = arms::ArmSweep::Make(mechanism_, options.threads);
-  } else if (auto path = pins::PathSweep::Make(mechanism_, options.threads)) {
+    short_cut_ = arms::MakeArmSweep(mechanism_, options.threads);
+  } else if (auto path = pins::MakePathSweep(mechanism_, options.threads)) {
     if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
     short_cut_ = std::move(path);
   } else {
-    short_cut_ = pins::AssemblySweep::Make(mechanism_, plan_);
+    short_cut_ = pins::MakeAssemblySweep(mechanism_, plan_);
   }
 }
 
@@ -113,12 +110,9 @@ bool Odca<Space, S>::Accelerate(const Kinematics<Space, S>& kinematics, const Ve
 }
 
 template <class Space, class S>
-bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
-                                   [[maybe_unused]] Kinematics<Space, S>& kinematics,
-                                   [[maybe_unused]] std::span<const S> q,
-                                   [[maybe_unused]] std::span<const S> u,
-                                   [[maybe_unused]] std::span<S> qdot,
-                                   [[maybe_unused]] std::span<S> udot) {
+bool Odca<Space, S>::RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics,
+                                   std::span<const S> q, std::span<const S> u, std::span<S> qdot,
+                                   std::span<S> udot) {
   if constexpr (std::is_same_v<S, double>) {
     by_short_cut_ = lane_ != nullptr
                         ? lane_->Evaluate(speeds, q, u, qdot, udot)
@@ -130,9 +124,7 @@ bool Odca<Space, S>::RightHandSide([[maybe_unused]] SpeedsUsed speeds,
 }
 
 template <class Space, class S>
-std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<S> q,
-                                                     [[maybe_unused]] std::span<S> u,
-                                                     [[maybe_unused]] S goal) {
+std::optional<Correction<S>> Odca<Space, S>::Project(std::span<S> q, std::span<S> u, S goal) {
   if constexpr (std::is_same_v<S, double>) {
     if (short_cut_ != nullptr && tries_short_cut_) return short_cut_->Project(q, u, goal);
   }
@@ -140,7 +132,7 @@ std::optional<Correction<S>> Odca<Space, S>::Project([[maybe_unused]] std::span<
 }
 
 template <class Space, class S>
-void Odca<Space, S>::Start([[maybe_unused]] const Kinematics<Space, S>& kinematics) {
+void Odca<Space, S>::Start(const Kinematics<Space, S>& kinematics) {
   if constexpr (std::is_same_v<S, double>) {
     tries_short_cut_ = short_cut_ != nullptr && short_cut_->IsUsable(kinematics);
   }

@@ -19,10 +19,6 @@ std::vector<PlanJoint> PlanJoints(const Mechanism<Space, S>& mechanism);
 template <class Space, class S>
 Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options = {});
 
-namespace pins {
-class PathLane;
-}
-
 template <class Space, class S>
 class Odca final : public ConstraintSolver<Space, S> {
  public:
@@ -45,8 +41,7 @@ class Odca final : public ConstraintSolver<Space, S> {
   /// Any join that closes a loop may be regularized, also of tree joints.
   bool TakesWrenches() const override { return true; }
   void SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda) override;
-  /// In double, unless as published: for pins in the plane (path_sweep.h, assembly_sweep.h) and
-  /// arms of revolute joints in space (arm_sweep.h).
+  /// In double, unless as published: for pins in the plane and arms of revolute joints in space.
   bool RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics, std::span<const S> q,
                      std::span<const S> u, std::span<S> qdot, std::span<S> udot) override;
   /// In double, unless as published, as above.

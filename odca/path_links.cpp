@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "mechanism/loops/loop_solver.h"
-#include "odca/body_graph.h"
+#include "odca/join_order.h"
 
 namespace loopbench::odca::pins {
 
@@ -13,12 +13,6 @@ namespace {
 
 using Vector = Vector2<double>;
 constexpr Vector kNone = {0.0, 0.0};
-
-/// Returns the arm from a body's centre of mass to one of its joints, in body axes.
-Vector ArmOf(const Joint<Planar, double>& joint, int body) {
-  const auto& p = (joint.from == body ? joint.X_PF : joint.X_QM).p;
-  return {p[0], p[1]};
-}
 
 Vector Turned(const Vector& r, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
@@ -77,6 +71,11 @@ std::optional<PathLinks> MeasureInOrder(const Mechanism<Planar, double>& mechani
 }
 
 }  // namespace
+
+Vector ArmOf(const Joint<Planar, double>& joint, int body) {
+  const auto& p = (joint.from == body ? joint.X_PF : joint.X_QM).p;
+  return {p[0], p[1]};
+}
 
 std::vector<Path> FindPaths(int num_bodies, std::span<const PlanJoint> joints) {
   std::vector<int> to_ground(num_bodies, -1);

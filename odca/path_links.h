@@ -47,6 +47,9 @@ Link<double> MeasureLink(const Inertia<Planar, double>& inertia,
                          const Vector2<double>* before = nullptr,
                          const Vector2<double>* after = nullptr, double* axes = nullptr);
 
+/// Returns the place of a joint on one of its bodies: from the centre of mass, in body axes.
+Vector2<double> ArmOf(const Joint<Planar, double>& joint, int body);
+
 /// Returns true if all joints are pins with coordinates or constraints, as the passes over pins
 /// require.
 bool HasOnlyPins(const Mechanism<Planar, double>& mechanism);

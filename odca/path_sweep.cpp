@@ -1,190 +1,691 @@
-#include "odca/path_sweep.h"
-
+// O-DCA for planar mechanisms whose bodies form paths (path_links.h) of pins under gravity:
+// computes rates directly from joint coordinates and speeds, in the kernels of two_handle.h.
+//
+//   angles and speeds of bodies   along the spanning tree (tree_angles.h)
+//   violations of cut joints      along each path
+//   up, down                      chain_sweep.h
+//
+// Other mechanisms of the same shape can fill unused lanes. T = Lanes holds kLanes mechanisms, one
+// per lane; T = double holds one.
+//
+// Pins that close loops must not be degenerate: if FactorsOf() finds a suspicious one, the general
+// sweep decides. Its scale is the trace of the free response of the joint's two bodies, which is at
+// least the scale of loop_solver.h.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <utility>
+
+#include "mechanism/loops/loop_solver.h"
+#include "odca/chain_sweep.h"
+#include "odca/odca.h"
+#include "odca/path_links.h"
+#include "odca/tree_angles.h"
 
 namespace loopbench::odca::pins {
 
 namespace {
 
-/// range(first, size) over parts of `size` numbers.
-template <class Range>
-void ForRanges(WorkerPool& pool, std::size_t size, const Range& range) {
-  constexpr std::size_t kPart = 4096;
-  pool.ForEach(static_cast<int>((size + kPart - 1) / kPart), [&](int i) {
-    const std::size_t first = static_cast<std::size_t>(i) * kPart;
-    range(first, std::min(kPart, size - first));
-  });
+/// Shorter pieces are no faster than one body after another (measured with lanes of one).
+constexpr int kShortestPiece = 2;
+
+/// Their pieces are joined one after another.
+constexpr int kMaxGroups = 128;
+
+/// Returns true if points in each piece can be followed from its own first body: a pinned body
+/// precedes the first cut joint in it.
+bool PiecesStandAlone(const std::vector<Closure<double>>& closures, int pieces, int length) {
+  for (int start = 0; start < pieces * length; start += length) {
+    bool pinned = closures[start].follows == 0.0;
+    for (int k = start + 1; k < start + length; ++k) {
+      if (IsCut(closures[k]) && !pinned) return false;
+      pinned = pinned || closures[k].follows == 0.0;
+    }
+  }
+  return true;
+}
+
+/// Returns the longest length of so many such pieces, 0 for none. If a sequence of bodies repeats,
+/// like crank and coupler of a ladder, pieces of whole periods qualify: periods of up to eight
+/// bodies are found.
+int LengthOfPieces(const std::vector<Closure<double>>& closures, int pieces) {
+  constexpr int kTrials = 8;
+  const int longest = static_cast<int>(closures.size()) / pieces;
+  for (int length = longest; length >= std::max(kShortestPiece, longest - kTrials); --length) {
+    if (PiecesStandAlone(closures, pieces, length)) return length;
+  }
+  return 0;
+}
+
+/// Sets limits in the order of joins: a join closes a loop if both its sides are pinned to Ground.
+/// The lighter of two sides determines the response.
+void SetLimits(const Mechanism<Planar, double>& mechanism, int pieces, int length,
+               PathLinks& path) {
+  struct Side {
+    int bodies = 0;
+    bool pinned = false;
+    void operator+=(const Side& other) {
+      bodies += other.bodies;
+      pinned = pinned || other.pinned;
+    }
+  };
+  const auto body = [&](int k) { return Side{1, path.closures[k].follows == 0.0}; };
+  const auto join = [&](int k, Side& left, const Side& right) {
+    if (left.pinned && right.pinned) {
+      path.links[k].limit = ShareOfLimit(std::min(left.bodies, right.bodies)) *
+                            LimitOf(mechanism, path.path[k].before);
+    }
+    left += right;
+  };
+  Side all;
+  const int packed = pieces * length;
+  for (int start = 0; start < packed; start += length) {
+    Side piece = body(start);
+    for (int k = start + 1; k < start + length; ++k) join(k, piece, body(k));
+    join(start, all, piece);
+  }
+  for (int k = packed; k < static_cast<int>(path.links.size()); ++k) join(k, all, body(k));
+  path.end_limit *= ShareOfLimit(all.bodies);
+}
+
+/// Closure flags are equal in all lanes.
+bool Says(double truth) { return truth > 0.0; }
+bool Says(const Lanes& truth) { return truth[0] > 0.0; }
+
+/// Imposes a cut joint before a body at its point on Q (two_handle.h), seen from the body: moves
+/// its handle 1 if it is P, and sets the violation. `gap` leads from there to the body before it.
+template <bool kOfSpeeds, class T>
+LOOPBENCH_INLINE void SetGap(const Closure<T>& closure, const Point<T>& gap, const T& speed,
+                             const T& speed_before, TurnedLink<T>& at, T& largest) {
+  const T is_cut = closure.cut_here + closure.cut_before;
+  at.r1 = at.r1 + Scaled<T>(closure.cut_here * closure.inverse_radius, gap.p);
+  if constexpr (kOfSpeeds) {
+    at.gap_w = closure.cut_here * speed + closure.cut_before * speed_before;
+    at.gap_v = Scaled(is_cut, RelativeVelocity(at.gap_w, gap));
+  } else {
+    at.gap_v = Scaled(is_cut, gap.p);
+    largest = -Min<T>(-largest, -(at.gap_v.x * at.gap_v.x + at.gap_v.y * at.gap_v.y));
+  }
+}
+
+struct PathKind {
+  template <class T>
+  using Link = pins::Link<T>;
+  template <class T>
+  using Force = Vector2<T>;
+  template <class T>
+  using Assembly = TwoHandle<T>;
+  template <class T>
+  using Cut = pins::Cut<T>;
+  template <class T>
+  using EndCut = pins::EndCut<T>;
+
+  struct Shape : ChainNodes {
+    bool has_loops = false;                            ///< points are followed along it
+    bool loops_in_lanes = false;                       ///< so that closures of packs are asked for
+    bool ends_at_ground = false, ground_is_P = false;  ///< as in PathLinks
+
+    bool operator==(const Shape&) const = default;
+  };
+  /// Numbers that depend on the mechanism or on the state.
+  template <class T>
+  struct OfChain : Shape {
+    Vector2<T> end = {}, end_force = {};
+    Vector2<T> gap_v = {};  ///< as of TurnedLink, at that joint
+    T gap_w = {}, end_limit = {};
+  };
+  struct OfGroup {
+    int path = 0;
+    Closure<Lanes> starts = {};   ///< of its pieces' first bodies, which packs leave open
+    bool cuts_starts = false;     ///< any of these joints is cut
+    Lanes leads = Lanes{} + 1.0;  ///< 1: ends relative to a piece's start, 0: to its pin
+    bool in_turn = false;         ///< any piece starts and ends at the previous one's end
+    Point<Lanes> ends = {};       ///< of its pieces (TurnPacks())
+    double room = 0.0;
+    double largest = 0.0;  ///< square of the largest gap in it, of positions
+  };
+};
+
+template <class T>
+class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
+  using Sweep = ChainSweep<PathSweep<T>, PathKind, Planar, T>;
+  using Sweep::chains_, Sweep::groups_, Sweep::packs_, Sweep::cuts_, Sweep::singles_;
+  using Sweep::end_cuts_, Sweep::num_pieces_, Sweep::packed_, Sweep::operations_, Sweep::pool_;
+  using Sweep::kIsOne;
+  using typename Sweep::Chain, typename Sweep::Group;
+  friend Sweep;
+  template <class>
+  friend class PathSweep;
+
+ public:
+  static std::unique_ptr<PathSweep> Make(const Mechanism<Planar, double>& mechanism, int threads,
+                                         int bodies_of_group) {
+    if (!HasOnlyPins(mechanism) || !mechanism.forces().empty()) return nullptr;
+    std::vector<PathLinks> paths;
+    for (const Path& path : FindPaths(mechanism.num_bodies(), PlanJoints(mechanism))) {
+      std::optional<PathLinks> links = MeasurePath(mechanism, path);
+      if (!links) return nullptr;
+      paths.push_back(std::move(*links));
+    }
+    if (paths.empty()) return nullptr;
+    std::unique_ptr<PathSweep> sweep(new PathSweep);
+    sweep->Lay(mechanism, paths, bodies_of_group);
+    std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
+    std::vector<double> axes(mechanism.num_bodies(), 0.0);
+    for (std::size_t p = 0; p < paths.size(); ++p) {
+      for (std::size_t k = 0; k < paths[p].path.size(); ++k) {
+        const int body = paths[p].path[k].body;
+        place_of[body] = sweep->place(sweep->chains_[p], static_cast<int>(k));
+        axes[body] = paths[p].axes[k];
+      }
+    }
+    sweep->tree_ = TreeAngles<T>(mechanism, place_of, axes);
+    const int bodies = mechanism.num_bodies() - 1, useful = std::max(1, bodies / bodies_of_group);
+    sweep->Resize(bodies, mechanism.num_u(), mechanism.length(), std::min(threads, useful));
+    return sweep;
+  }
+
+  /// Returns null if the pieces of `one` fill the lanes.
+  static std::unique_ptr<PathSweep> InLanes(const PathSweep<double>& one) {
+    if (!one.groups_.empty()) return nullptr;
+    std::unique_ptr<PathSweep> sweep(new PathSweep);
+    for (const PathKind::Shape& path : one.chains_) sweep->chains_.push_back({path});
+    sweep->singles_.resize(one.singles_.size());
+    sweep->single_closures_.resize(one.single_closures_.size());
+    sweep->end_cuts_.resize(one.end_cuts_.size());
+    sweep->tree_ = TreeAngles<T>::Like(one.tree_);
+    sweep->Resize(one.singles_.size(), static_cast<int>(one.num_u()), 1.0, 1);
+    for (int lane = 0; lane < kLanes; ++lane) sweep->SetConstants(lane, one);
+    return sweep;
+  }
+
+  /// Copies the constants of `one` into a lane. Returns false, without change, if its shape
+  /// differs.
+  bool SetMechanism(int lane, const PathSweep<double>& one) {
+    const auto same_closure = [](const Closure<T>& a, const Closure<double>& b) {
+      return a.follows[0] == b.follows && a.cut_here[0] == b.cut_here &&
+             a.cut_before[0] == b.cut_before;
+    };
+    if (!std::ranges::equal(chains_, one.chains_, std::equal_to<PathKind::Shape>()) ||
+        !std::ranges::equal(single_closures_, one.single_closures_, same_closure) ||
+        !tree_.SetOffsets(lane, one.tree_)) {
+      return false;
+    }
+    SetConstants(lane, one);
+    return true;
+  }
+
+  TruthOf<T> Place(Sought sought, std::span<const T> q, std::span<const T> u) override {
+    tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
+    if constexpr (kIsOne) {
+      if (sought == Sought::kPositions) return TurnAll<false>();
+    }
+    return TurnAll<true>();
+  }
+  Correction<double> LargestGap() const override {
+    double largest = -Smallest(-largest_);
+    for (const Group& group : groups_) largest = std::max(largest, group.largest);
+    return {.shift = std::sqrt(largest)};
+  }
+  TruthOf<T> Find(Sought sought) override {
+    return sought == Sought::kAccelerations ? this->template Solve<Sought::kAccelerations>()
+           : sought == Sought::kCompleted   ? this->template Solve<Sought::kCompleted>()
+                                            : this->template Solve<Sought::kSpeeds>();
+  }
+  TruthOf<T> AddChange(std::span<const T> base, std::span<T> sum) override {
+    return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
+  }
+  void AddToSpeeds() override {
+    this->template ForParts<4096>(speed_.size(), [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) speed_[i] += alpha_[i];
+    });
+  }
+
+ private:
+  void Resize(std::size_t bodies, std::size_t num_u, double length, int threads) {
+    turned_singles_.resize(singles_.size());
+    angle_.assign(bodies + 1, T{});
+    speed_ = alpha_ = angle_;
+    this->SetSize(num_u, length, threads);
+  }
+
+  void SetConstants(int lane, const PathSweep<double>& one) {
+    for (std::size_t i = 0; i < chains_.size(); ++i) {
+      SetLane(chains_[i].end, lane, one.chains_[i].end);
+      SetLane(chains_[i].end_limit, lane, one.chains_[i].end_limit);
+    }
+    for (std::size_t k = 0; k < singles_.size(); ++k) {
+      SetLane(singles_[k], lane, one.singles_[k]);
+      SetLane(single_closures_[k], lane, one.single_closures_[k]);
+    }
+  }
+
+  void Lay(const Mechanism<Planar, double>& mechanism, std::span<PathLinks> paths,
+           int bodies_of_group) {
+    std::vector<Link<Lanes>> packs;
+    for (PathLinks& path : paths) {
+      int groups = std::clamp(static_cast<int>(path.links.size()) / bodies_of_group, 1, kMaxGroups);
+      int length = 0;
+      for (; groups > 0; groups /= 2) {
+        length = LengthOfPieces(path.closures, groups * kLanes);
+        if (length > 0) break;
+      }
+      const int pieces = groups * kLanes, packed = pieces * length;
+      SetLimits(mechanism, pieces, length, path);
+      const auto pinned = [&](int k) { return path.closures[k].follows == 0.0; };
+      Chain& chain = this->AddChain(path.links, pieces, length, packs);
+      chain.has_loops = path.has_loops;
+      chain.ends_at_ground = path.ends_at_ground;
+      chain.ground_is_P = path.ground_is_P;
+      chain.end = path.end;
+      chain.end_limit = path.end_limit;
+      for (int k = 0; k < packed; ++k) {
+        if (k % length > 0 && pinned(k)) chain.loops_in_lanes = true;
+      }
+      for (int piece = 0; piece < pieces; piece += kLanes) {
+        LayClosures(path.closures, length, piece, this->group_of(chain.first_piece + piece));
+      }
+      single_closures_.insert(single_closures_.end(), path.closures.begin() + packed,
+                              path.closures.end());
+    }
+    this->SetPacks(packs);
+    turned_packs_.resize(packs.size());
+  }
+
+  /// Closures of a group that begins with this piece of its path.
+  void LayClosures(const std::vector<Closure<double>>& closures, int length, int piece,
+                   Group& group) {
+    group.path = static_cast<int>(chains_.size()) - 1;
+    for (int i = 0; i < length; ++i) {
+      Closure<Lanes>& closure = pack_closures_.emplace_back();
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const Closure<double>& one = closures[(piece + lane) * length + i];
+        SetLane(closure, lane, one);
+        if (chains_.back().loops_in_lanes && one.follows == 0.0) group.leads[lane] = 0.0;
+        if (i == 0 && IsCut(one)) group.cuts_starts = true;
+      }
+      if (i > 0) continue;
+      group.starts = closure;
+      closure.cut_here = closure.cut_before = Lanes{};
+    }
+    group.in_turn = Any(group.leads * group.starts.follows > 0.0);
+  }
+
+  /// Computes the bodies at their angles, with the terms from violations of cut joints. Returns
+  /// false for angles beyond kLargestAngle.
+  template <bool kOfSpeeds>
+  TruthOf<T> TurnAll() {
+    if constexpr (kIsOne) {
+      pool_->ForEach(static_cast<int>(groups_.size()), [&](int i) {
+        if (chains_[groups_[i].path].loops_in_lanes) {
+          TurnPacks<true, kOfSpeeds>(groups_[i]);
+        } else {
+          TurnPacks<false, kOfSpeeds>(groups_[i]);
+        }
+      });
+      for (const Group& group : groups_) {
+        if (!(group.room >= 0.0)) return false;
+      }
+    }
+    largest_ = T{};
+    TruthOf<T> good = T{} >= 0.0;
+    for (Chain& path : chains_) {
+      good &= TurnSingles(path) >= 0.0;
+      if (!Any(good)) break;
+      if (path.has_loops) CloseLoops<kOfSpeeds>(path);
+    }
+    return good;
+  }
+
+  /// Computes the end point of each piece, relative to its start unless it has its own pin.
+  template <bool kLoops, bool kOfSpeeds>
+  void TurnPacks(Group& group) {
+    const bool has_loops = chains_[group.path].has_loops;
+    Point<Lanes> at_2 = {};
+    Lanes room = Lanes{} + kLargestAngle;
+    Lanes speed_before = {}, inverse_before = {}, largest = {};
+    for (int pack = group.pack; pack < group.pack + group.length; ++pack) {
+      const Link<Lanes>& link = packs_[pack];
+      const Lanes speed = Load<Lanes>(&speed_[pack * kLanes]);
+      const Lanes angle = Load<Lanes>(&angle_[pack * kLanes]);
+      room = Min(room, kLargestAngle - Magnitude(angle));
+      TurnedLink<Lanes> at = Turn(link, angle);
+      if constexpr (kLoops) {
+        const Closure<Lanes>& closure = pack_closures_[pack];
+        const Point<Lanes> at_pin = AtPin(link, at, speed, closure);
+        const Point<Lanes> gap = at_2 - at_pin;
+        const Point<Lanes> at_1 = {at_pin.p + Scaled(closure.follows, gap.p),
+                                   at_pin.v + Scaled(closure.follows, gap.v)};
+        at_2 = Across(link, at, speed, at_1);
+        SetGap<kOfSpeeds>(closure, gap, speed, speed_before, at, largest);
+        if (pack > group.pack) {
+          Vector2<Lanes>& r2 = turned_packs_[pack - 1].r2;
+          r2 = r2 - Scaled(closure.cut_before * inverse_before, gap.p);
+        }
+        speed_before = speed;
+        inverse_before = closure.inverse_radius;
+      } else if (has_loops) {
+        at_2 = Across(link, at, speed, at_2);
+      }
+      turned_packs_[pack] = at;
+    }
+    group.room = Smallest(room);
+    group.largest = -Smallest(-largest);
+    group.ends = at_2;
+  }
+
+  /// Computes the following bodies; returns the remainder up to kLargestAngle.
+  T TurnSingles(const Chain& path) {
+    T room = T{} + kLargestAngle;
+    for (int single = path.first_single; single < path.first_single + path.singles; ++single) {
+      const T angle = angle_[packed_ + single];
+      room = Min<T>(room, kLargestAngle - Magnitude(angle));
+      turned_singles_[single] = Turn(singles_[single], angle);
+    }
+    return room;
+  }
+
+  /// Subtracts `shift` [m] from handle 2 of the body at a place, if that is P of a cut joint.
+  void MoveEnd(int place, const Vector2<T>& shift) {
+    if constexpr (kIsOne) {
+      if (place < packed_) {
+        const int pack = place / kLanes, lane = place % kLanes;
+        Vector2<Lanes>& r2 = turned_packs_[pack].r2;
+        const double inverse_radius = pack_closures_[pack].inverse_radius[lane];
+        r2.x[lane] -= inverse_radius * shift.x;
+        r2.y[lane] -= inverse_radius * shift.y;
+        return;
+      }
+    }
+    Vector2<T>& r2 = turned_singles_[place - packed_].r2;
+    r2 = r2 - Scaled(single_closures_[place - packed_].inverse_radius, shift);
+  }
+
+  /// Closes loops along the pieces of a group at their first bodies, like TurnPacks() in between.
+  /// The body before each first one is one lane before it, in the last pack, or ends the previous
+  /// group. `at_2` leads from there to the last body of the group.
+  template <bool kOfSpeeds>
+  [[gnu::noinline]] void CloseStarts(Group& group, Point<double>& at_2) {
+    const Closure<Lanes>& starts = group.starts;
+    TurnedLink<Lanes>& turned = turned_packs_[group.pack];
+    const int last = group.pack + group.length - 1, first_place = group.pack * kLanes;
+    const Lanes speed = Load<Lanes>(&speed_[first_place]);
+    const Point<Lanes> at_pin = AtPin(packs_[group.pack], turned, speed, starts);
+    Point<Lanes> reached;
+    if (group.in_turn) {
+      for (int lane = 0; lane < kLanes; ++lane) {
+        SetLane(reached, lane, at_2);
+        const Point<double> at_1 = starts.follows[lane] > 0.0 ? at_2 : LaneOf(at_pin, lane);
+        const double leads = group.leads[lane];
+        at_2 =
+            LaneOf(group.ends, lane) + Point<double>{Scaled(leads, at_1.p), Scaled(leads, at_1.v)};
+      }
+    } else {
+      const Point<Lanes> ends =
+          group.ends + Point<Lanes>{Scaled(group.leads, at_pin.p), Scaled(group.leads, at_pin.v)};
+      reached = {{LaneAfter(ends.p.x, at_2.p.x), LaneAfter(ends.p.y, at_2.p.y)},
+                 {LaneAfter(ends.v.x, at_2.v.x), LaneAfter(ends.v.y, at_2.v.y)}};
+      at_2 = LaneOf(ends, kLanes - 1);
+    }
+    if (!group.cuts_starts) return;
+    const bool is_first = &group == &this->group_of(chains_[group.path].first_piece);
+    const Point<Lanes> gap = reached - at_pin;
+    const Lanes speed_before =
+        LaneAfter(Load<Lanes>(&speed_[last * kLanes]), is_first ? 0.0 : speed_[first_place - 1]);
+    Lanes largest = {};
+    SetGap<kOfSpeeds>(starts, gap, speed, speed_before, turned, largest);
+    group.largest = std::max(group.largest, -Smallest(-largest));
+    const Vector2<Lanes> to_Q = Scaled(starts.cut_before, gap.p);
+    Vector2<Lanes>& r2 = turned_packs_[last].r2;
+    r2 = r2 - Scaled<Lanes>(pack_closures_[last].inverse_radius,
+                            {LaneBefore(to_Q.x), LaneBefore(to_Q.y)});
+    if (!is_first) MoveEnd(first_place - 1, LaneOf(to_Q, 0));
+  }
+
+  template <bool kOfSpeeds>
+  void CloseLoops(Chain& path) {
+    Point<T> at_2 = {};
+    int before = -1;  // place of the previous body
+    if constexpr (kIsOne) {
+      for (int piece = 0; piece < path.pieces; piece += kLanes) {
+        Group& group = this->group_of(path.first_piece + piece);
+        CloseStarts<kOfSpeeds>(group, at_2);
+        before = (group.pack + group.length) * kLanes - 1;
+      }
+    }
+    T speed_before = before >= 0 ? speed_[before] : T{};
+    for (int single = path.first_single; single < path.first_single + path.singles; ++single) {
+      const Closure<T>& closure = single_closures_[single];
+      TurnedLink<T>& at = turned_singles_[single];
+      const TurnedLink<T> own = at;  // before violations move its arms
+      const T speed = speed_[packed_ + single];
+      Point<T> at_1 = at_2;
+      if (!Says(closure.follows)) {
+        at_1 = AtPin(singles_[single], at, speed, closure);
+        if (Says(closure.cut_here + closure.cut_before)) {
+          const Point<T> gap = at_2 - at_1;
+          SetGap<kOfSpeeds>(closure, gap, speed, speed_before, at, largest_);
+          if (Says(closure.cut_before)) MoveEnd(before, gap.p);
+        }
+      }
+      at_2 = Across(singles_[single], own, speed, at_1);
+      speed_before = speed;
+      before = packed_ + single;
+    }
+    if (!path.ends_at_ground) return;
+    const Point<T> gap = {at_2.p - path.end, at_2.v};
+    path.gap_w = path.ground_is_P ? T{} : speed_before;
+    if (!path.ground_is_P) MoveEnd(before, gap.p);
+    path.gap_v = kOfSpeeds ? RelativeVelocity(path.gap_w, gap) : gap.p;
+    largest_ = Max<T>(largest_, gap.p.x * gap.p.x + gap.p.y * gap.p.y);
+  }
+
+  // steps of ChainSweep
+  int Begin(const Group&) const { return 0; }
+  template <Sought kSought>
+  TwoHandle<Lanes> LeafOf(int pack) const {
+    if constexpr (kSought == Sought::kAccelerations) return LeafAlone(pack);
+    return Leaf<kSought>(packs_[pack], turned_packs_[pack], Load<Lanes>(&speed_[pack * kLanes]));
+  }
+  /// Not inlined: its products would be fused with sums of a join, which gives other bits.
+  [[gnu::noinline]] TwoHandle<Lanes> LeafAlone(int pack) const {
+    return Leaf<Sought::kAccelerations>(packs_[pack], turned_packs_[pack],
+                                        Load<Lanes>(&speed_[pack * kLanes]));
+  }
+  template <Sought kSought>
+  TwoHandle<Lanes> First(const Group& group, int) const {
+    return LeafOf<kSought>(group.pack);
+  }
+  template <Sought kSought>
+  void Next(int pack, int, TwoHandle<Lanes>& all, Lanes& slack) {
+    const Lanes limit = packs_[pack].limit;
+    all = Join(all, LeafOf<kSought>(pack), limit, cuts_[pack], slack);
+  }
+  template <Sought kSought>
+  OneHandle<T> Start(const Chain&) const {
+    OneHandle<T> none = {};
+    return none;
+  }
+  /// Not inlined, as LeafAlone().
+  [[gnu::noinline]] void Attach(int node, bool is_first, const TwoHandle<T>& next, const T& limit,
+                                OneHandle<T>& all, T& slack) {
+    if (is_first) {
+      all = {next.zeta22, next.zeta23};
+    } else {
+      all = Join(all, next, limit, end_cuts_[node], slack);
+    }
+  }
+  void AttachPiece(int piece, bool is_first, OneHandle<T>& all, T& slack) {
+    const Group& group = this->group_of(piece);
+    Attach(piece, is_first, LaneOf(group.assemblies, this->lane_of(piece)),
+           packs_[group.pack].limit[this->lane_of(piece)], all, slack);
+  }
+  template <Sought kSought>
+  void AttachSingle(int single, bool is_first, OneHandle<T>& all, T& slack) {
+    const Link<T>& link = singles_[single];
+    const T speed = speed_[packed_ + single];
+    Attach(num_pieces_ + single, is_first, Leaf<kSought>(link, turned_singles_[single], speed),
+           link.limit, all, slack);
+  }
+  template <Sought kSought>
+  T End(Chain& path, const OneHandle<T>& all, T slack) {
+    constexpr int kOfEach = Operations::Leaf(kSought) + Operations::kAngularAcceleration + 1;
+    operations_ +=
+        path.pieces * this->length(path) * (kOfEach + Operations::kJoin + Operations::kForceIn) +
+        path.singles * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
+    if (!path.ends_at_ground) return slack;
+    // Ground has no response (33, 34)
+    const Factored2<T> factors = FactorsOf(all.zeta22, path.end_limit, slack);
+    Vector2<T> wanted = {};  // of the last body, as TwoHandle::zeta13 of Leaf()
+    if (kSought == Sought::kSpeeds) wanted = -path.gap_v;
+    if (kSought == Sought::kAccelerations) wanted = Cross<T>(2.0 * path.gap_w, path.gap_v);
+    path.end_force = factors * (all.zeta23 - wanted);
+    return slack;
+  }
+  template <Sought kSought>
+  T Close(T slack) {
+    return slack;
+  }
+  template <Sought kSought>
+  Vector2<T> EndForce(const Chain& path) {
+    return path.ends_at_ground ? -path.end_force : Vector2<T>{};
+  }
+  Vector2<T> ForceIn(int node, bool is_first, const Vector2<T>& F2) const {
+    return is_first ? Vector2<T>{} : pins::ForceIn(end_cuts_[node], F2);
+  }
+  Vector2<Lanes> ForceIn(int pack, const Vector2<Lanes>& F1, const Vector2<Lanes>& F2) const {
+    return pins::ForceIn(cuts_[pack], F1, F2);
+  }
+  template <Sought kSought>
+  void RespondSingle(int single, const Vector2<T>& F1, const Vector2<T>& F2) {
+    alpha_[packed_ + single] =
+        AngularAcceleration<kSought>(turned_singles_[single], F1, F2) / singles_[single].radius;
+  }
+  template <Sought kSought>
+  void Respond(const Group&, int pack, const Vector2<Lanes>& F1, const Vector2<Lanes>& F2) {
+    const Lanes alpha = AngularAcceleration<kSought>(turned_packs_[pack], F1, F2);
+    Store(alpha / packs_[pack].radius, &alpha_[pack * kLanes]);
+  }
+  template <class U>
+  Vector2<U> Opposite(int /*place*/, const Vector2<U>& F1) const {
+    return -F1;
+  }
+
+  std::vector<Closure<Lanes>> pack_closures_;
+  std::vector<TurnedLink<Lanes>> turned_packs_;
+  std::vector<Closure<T>> single_closures_;
+  std::vector<TurnedLink<T>> turned_singles_;
+  std::vector<T> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
+  T largest_ = {};  ///< square of the largest gap, of positions, of all joints outside of groups
+  TreeAngles<T> tree_;
+};
+
+/// Pending evaluation of a run.
+struct Wanted {
+  SpeedsUsed speeds = SpeedsUsed::kGiven;
+  std::span<const double> q, u;
+  std::span<double> qdot, udot;
+};
+
+void Gather(std::span<const double> one, int lane, std::vector<Lanes>& all) {
+  for (std::size_t i = 0; i < one.size(); ++i) all[i][lane] = one[i];
+}
+void Scatter(const std::vector<Lanes>& all, int lane, std::span<double> one) {
+  for (std::size_t i = 0; i < one.size(); ++i) one[i] = all[i][lane];
 }
 
 }  // namespace
 
-template <class T>
-template <Pass kPass>
-void PathSweepOf<T>::UpGroup(Group& group) {
-  const int packs = paths_[group.path].packs;
-  const auto leaf = [&](int i) {
-    const int pack = group.pack + i;
-    return Leaf<kPass>(packs_[pack], turned_packs_[pack],
-                       Load<Lanes>(&speed_[group.place + i * kLanes]));
+std::unique_ptr<ShortCut<Planar>> MakePathSweep(const Mechanism<Planar, double>& mechanism,
+                                                int threads, int bodies_of_group) {
+  return PathSweep<double>::Make(mechanism, threads, bodies_of_group);
+}
+
+std::unique_ptr<ShortCut<Planar, Lanes>> MakePathLanes(const ShortCut<Planar>& one) {
+  return PathSweep<Lanes>::InLanes(static_cast<const PathSweep<double>&>(one));
+}
+
+bool SetMechanism(ShortCut<Planar, Lanes>& lanes, int lane, const ShortCut<Planar>& one) {
+  return static_cast<PathSweep<Lanes>&>(lanes).SetMechanism(
+      lane, static_cast<const PathSweep<double>&>(one));
+}
+
+/// All lanes of mechanisms of one shape. Unused lanes keep stale data; their results are discarded.
+class PathLane::All final : public SharedWork {
+ public:
+  explicit All(const ShortCut<Planar>& one)
+      : sweep_(MakePathLanes(one)), q_(one.num_u()), u_(q_), qdot_(q_), udot_(q_) {}
+  bool HasLanes() const { return sweep_ != nullptr; }
+
+  /// Returns -1 if no lane is free or the mechanism differs.
+  int Take(const ShortCut<Planar>& own) {
+    const auto free = std::ranges::find(taken_, false);
+    const int lane = static_cast<int>(free - taken_.begin());
+    if (free == taken_.end() || !SetMechanism(*sweep_, lane, own)) return -1;
+    *free = true;
+    return lane;
+  }
+  void GiveBack(int lane) { taken_[lane] = false; }
+
+  void Want(int lane, const Wanted& wanted) {
+    wanted_[lane] = wanted;
+    waits_[lane] = true;
+  }
+  bool WasGood(int lane) const { return good_[lane]; }
+
+  void Do() noexcept override {
+    for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
+      std::array<bool, kLanes> now{};
+      for (int lane = 0; lane < kLanes; ++lane) {
+        if (!waits_[lane] || wanted_[lane].speeds != speeds) continue;
+        now[lane] = true;
+        Gather(wanted_[lane].q, lane, q_);
+        Gather(wanted_[lane].u, lane, u_);
+      }
+      if (std::ranges::none_of(now, std::identity())) continue;
+      const LaneBits good = sweep_->Evaluate(speeds, nullptr, q_, u_, qdot_, udot_);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        if (!now[lane]) continue;
+        waits_[lane] = false;
+        good_[lane] = good[lane] != 0;
+        Scatter(qdot_, lane, wanted_[lane].qdot);
+        Scatter(udot_, lane, wanted_[lane].udot);
+      }
+    }
+  }
+
+ private:
+  std::unique_ptr<ShortCut<Planar, Lanes>> sweep_;
+  std::array<bool, kLanes> taken_{}, waits_{}, good_{};
+  std::array<Wanted, kLanes> wanted_;
+  std::vector<Lanes> q_, u_, qdot_, udot_;
+};
+
+std::unique_ptr<PathLane> PathLane::Take(SideBySide& beside, const ShortCut<Planar>& own) {
+  const auto take = [&](All& all) -> std::unique_ptr<PathLane> {
+    const int lane = all.Take(own);
+    return lane < 0 ? nullptr : std::unique_ptr<PathLane>(new PathLane(beside, all, lane));
   };
-  Lanes slack = {};
-  TwoHandle<Lanes> all = leaf(0);
-  for (int i = 1; i < packs; ++i) {
-    const int pack = group.pack + i;
-    const Lanes limit = packs_[pack].limit;
-    all = Join(all, leaf(i), limit, cuts_[pack], slack);
+  for (const std::unique_ptr<SharedWork>& work : beside.works) {
+    auto* all = dynamic_cast<All*>(work.get());
+    if (all == nullptr) continue;
+    if (auto lane = take(*all)) return lane;
   }
-  group.assemblies = all;
-  group.slack = Smallest(slack);
+  auto all = std::make_unique<All>(own);
+  if (!all->HasLanes()) return nullptr;
+  auto lane = take(*all);
+  beside.works.push_back(std::move(all));
+  return lane;
 }
 
-template <class T>
-template <Pass kPass>
-T PathSweepOf<T>::Up(PathPlaces& path) {
-  OneHandle<T> all = {};
-  EndCut<T>* cut = &end_cuts_[path.first_cut];
-  T slack = {};
-  const auto join = [&](const TwoHandle<T>& next, const T& limit) {
-    if (cut == &end_cuts_[path.first_cut]) {
-      all = {next.zeta22, next.zeta23};
-    } else {
-      all = Join(all, next, limit, *cut, slack);
-    }
-    ++cut;
-  };
-  if constexpr (kIsOne) {
-    for (int g = path.first_group; g < path.first_group + path.groups; ++g) {
-      const Group& group = groups_[g];
-      slack = Min(slack, group.slack);
-      const Lanes limits = packs_[group.pack].limit;
-      for (int lane = 0; lane < kLanes; ++lane) join(LaneOf(group.assemblies, lane), limits[lane]);
-    }
-  }
-  for (int k = 0; k < path.singles(); ++k) {
-    const Link<T>& link = singles_[path.first_single + k];
-    const T speed = speed_[path.first + path.packed + k];
-    join(Leaf<kPass>(link, turned_singles_[path.first_single + k], speed), link.limit);
-  }
-  if (path.ends_at_ground) {  // Ground has no response (33, 34)
-    const Factored2<T> factors = FactorsOf(all.zeta22, path.end_limit, slack);
-    Vector2<T> wanted = {};  // of the last body, as TwoHandle::zeta13 of Leaf()
-    if (kPass == Pass::kSpeeds) wanted = -path.gap_v;
-    if (kPass == Pass::kAccelerations) wanted = Cross<T>(2.0 * path.gap_w, path.gap_v);
-    path.end_force = factors * (all.zeta23 - wanted);
-  }
-  return slack;
-}
+PathLane::~PathLane() { all_.GiveBack(lane_); }
 
-/// From the path's end: the force in the joint before a body, then the body's angular acceleration.
-/// Forces on pieces are those in the joints between them.
-template <class T>
-template <Pass kPass>
-void PathSweepOf<T>::Down(const PathPlaces& path) {
-  const EndCut<T>* cuts = &end_cuts_[path.first_cut];
-  Vector2<T> F2 = path.ends_at_ground ? -path.end_force : Vector2<T>{};
-  for (int k = path.singles() - 1; k >= 0; --k) {
-    const int single = path.first_single + k, node = path.pieces() + k;
-    const Vector2<T> F1 = node == 0 ? Vector2<T>{} : ForceIn(cuts[node], F2);
-    alpha_[path.first + path.packed + k] =
-        AngularAcceleration<kPass>(turned_singles_[single], F1, F2) / singles_[single].radius;
-    F2 = -F1;
-  }
-  if constexpr (kIsOne) {
-    for (int piece = path.pieces() - 1; piece >= 0; --piece) {
-      const Vector2<double> F1 = piece == 0 ? Vector2<double>{} : ForceIn(cuts[piece], F2);
-      Group& group = groups_[path.first_group + piece / kLanes];
-      SetLane(group.F1, piece % kLanes, F1);
-      SetLane(group.F2, piece % kLanes, F2);
-      F2 = -F1;
-    }
-  }
+bool PathLane::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
+                        std::span<double> qdot, std::span<double> udot) {
+  all_.Want(lane_, {speeds, q, u, qdot, udot});
+  beside_.Meet();
+  return all_.WasGood(lane_);
 }
-
-template <class T>
-template <Pass kPass>
-void PathSweepOf<T>::DownGroup(const Group& group) {
-  Vector2<Lanes> F2 = group.F2;
-  for (int i = paths_[group.path].packs - 1; i >= 0; --i) {
-    const int pack = group.pack + i;
-    const Vector2<Lanes> F1 = i == 0 ? group.F1 : ForceIn(cuts_[pack], group.F1, F2);
-    const Lanes alpha = AngularAcceleration<kPass>(turned_packs_[pack], F1, F2);
-    Store(alpha / packs_[pack].radius, &alpha_[group.place + i * kLanes]);
-    F2 = -F1;
-  }
-}
-
-template <class T>
-template <Pass kPass>
-TruthOf<T> PathSweepOf<T>::Sweep() {
-  [[maybe_unused]] const int groups = static_cast<int>(groups_.size());
-  if constexpr (kIsOne) pool_->ForEach(groups, [&](int i) { UpGroup<kPass>(groups_[i]); });
-  T slack = {};
-  for (PathPlaces& path : paths_) {
-    constexpr int kOfEach = Operations::Leaf(kPass) + Operations::kAngularAcceleration + 1;
-    operations_ += path.packed * (kOfEach + Operations::kJoin + Operations::kForceIn) +
-                   path.singles() * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
-    slack = Min(slack, Up<kPass>(path));
-  }
-  const TruthOf<T> good = slack >= 0.0;
-  if (!Any(good)) return good;
-  for (const PathPlaces& path : paths_) Down<kPass>(path);
-  if constexpr (kIsOne) pool_->ForEach(groups, [&](int i) { DownGroup<kPass>(groups_[i]); });
-  return good;
-}
-
-template <class T>
-TruthOf<T> PathSweepOf<T>::Evaluate(SpeedsUsed speeds, Kinematics<Planar, double>*,
-                                    std::span<const T> q, std::span<const T> u, std::span<T> qdot,
-                                    std::span<T> udot) {
-  operations_ = 0;
-  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  TruthOf<T> good = Turn<GapKind::kSpeeds>();
-  if (!Any(good)) return good;
-  if (speeds == SpeedsUsed::kGiven) {
-    good &= Sweep<Pass::kAccelerations>();
-    if (!Any(good)) return good;
-    ForRanges(*pool_, u.size(), [&](std::size_t first, std::size_t size) {
-      std::ranges::copy(u.subspan(first, size), qdot.begin() + first);
-    });
-  } else {
-    good &= Sweep<Pass::kSpeeds>();
-    if (!Any(good)) return good;
-    tree_.ToJoints(alpha_.data(), u, qdot, *pool_);
-    ForRanges(*pool_, speed_.size(), [&](std::size_t first, std::size_t size) {
-      for (std::size_t i = first; i < first + size; ++i) speed_[i] += alpha_[i];
-    });
-    good &= Sweep<Pass::kCompleted>();
-    if (!Any(good)) return good;
-  }
-  return good & tree_.ToJoints(alpha_.data(), {}, udot, *pool_);
-}
-
-template <class T>
-bool PathSweepOf<T>::Place(GapKind kind, std::span<const double> q, std::span<const double> u) {
-  tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-  return kind == GapKind::kSpeeds ? Turn<GapKind::kSpeeds>() : Turn<GapKind::kPositions>();
-}
-
-template <class T>
-Correction<double> PathSweepOf<T>::LargestGap() const {
-  double largest = largest_;
-  for (const Group& group : groups_) largest = std::max(largest, group.largest);
-  return {.shift = std::sqrt(largest)};
-}
-
-template <class T>
-bool PathSweepOf<T>::AddChange(std::span<const double> base, std::span<double> sum) {
-  return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
-}
-
-template bool PathSweep::Evaluate(SpeedsUsed, Kinematics<Planar, double>*, std::span<const double>,
-                                  std::span<const double>, std::span<double>, std::span<double>);
-template bool PathSweep::Place(GapKind, std::span<const double>, std::span<const double>);
-template Correction<double> PathSweep::LargestGap() const;
-template bool PathSweep::AddChange(std::span<const double>, std::span<double>);
-template LaneBits PathSweepOf<Lanes>::Evaluate(SpeedsUsed, Kinematics<Planar, double>*,
-                                               std::span<const Lanes>, std::span<const Lanes>,
-                                               std::span<Lanes>, std::span<Lanes>);
 
 }  // namespace loopbench::odca::pins

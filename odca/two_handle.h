@@ -12,8 +12,7 @@
 // case.
 #pragma once
 
-#include "mechanism/algebra/lanes.h"
-#include "mechanism/algebra/small_matrix.h"
+#include "odca/short_cut.h"
 
 namespace loopbench::odca::pins {
 
@@ -176,13 +175,6 @@ struct TwoHandle {
   Vector2<T> zeta13, zeta23;
 };
 
-/// Quantity computed by a pass.
-enum class Pass {
-  kAccelerations,  ///< from speeds as they are
-  kSpeeds,         ///< the smallest change of speeds, in the metric of M, that closes the loops
-  kCompleted,      ///< accelerations, speeds being so
-};
-
 /// A leaf (1-4): with t = z x r, zeta_ij = 1/m + t_i t_j^T / I, and zeta_i3 is gravity, its angular
 /// acceleration about a pin on Ground, and the centripetal -w^2 r_i.
 ///
@@ -190,7 +182,7 @@ enum class Pass {
 /// negative, as Q comes before or after. In the same way A_Q - A_P is the motion of the body before
 /// it relative to this one, or the negative. In both cases that is 2 w_P x RelativeVelocity(),
 /// which zeta13 includes. Changes of speeds remove RelativeVelocity().
-template <Pass kPass, class T>
+template <Sought kSought, class T>
 LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at, const T& speed) {
   const T m = link.mobility, a = at.alpha, w2 = speed * speed * link.radius;
   const Vector2<T>&r1 = at.r1, &r2 = at.r2;
@@ -198,14 +190,14 @@ LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at,
   leaf.zeta11 = {m + r1.y * r1.y, -(r1.x * r1.y), m + r1.x * r1.x};
   leaf.zeta22 = {m + r2.y * r2.y, -(r2.x * r2.y), m + r2.x * r2.x};
   leaf.zeta12 = {m + r1.y * r2.y, -(r1.y * r2.x), -(r1.x * r2.y), m + r1.x * r2.x};
-  if constexpr (kPass == Pass::kSpeeds) {
+  if constexpr (kSought == Sought::kSpeeds) {
     leaf.zeta13 = -at.gap_v;
     leaf.zeta23 = {T{}, T{}};
   } else {
     leaf.zeta13 = {link.gx - a * r1.y - w2 * r1.x, link.gy + a * r1.x - w2 * r1.y};
     leaf.zeta23 = {link.gx - a * r2.y - w2 * r2.x, link.gy + a * r2.x - w2 * r2.y};
   }
-  if constexpr (kPass == Pass::kAccelerations) {
+  if constexpr (kSought == Sought::kAccelerations) {
     leaf.zeta13 = leaf.zeta13 + Cross(at.gap_w + at.gap_w, at.gap_v);  // (7)
   }
   return leaf;
@@ -213,11 +205,11 @@ LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at,
 
 /// sqrt(I) times angular acceleration, or change of speed, once the forces or impulses on both
 /// handles are known (1-4).
-template <Pass kPass, class T>
+template <Sought kSought, class T>
 LOOPBENCH_INLINE T AngularAcceleration(const TurnedLink<T>& at, const Vector2<T>& F1,
                                        const Vector2<T>& F2) {
   const T moment = (at.r1.x * F1.y - at.r1.y * F1.x) + (at.r2.x * F2.y - at.r2.y * F2.x);
-  return kPass == Pass::kSpeeds ? moment : at.alpha + moment;
+  return kSought == Sought::kSpeeds ? moment : at.alpha + moment;
 }
 
 /// X = L D L^T of (16), by D^-1 and the l below L's ones; times b it is the solution of X x = b.
@@ -308,8 +300,8 @@ LOOPBENCH_INLINE Vector2<T> ForceIn(const EndCut<T>& cut, const Vector2<T>& F2) 
 
 /// Multiplications and divisions of these functions, as tests/odca/path_sweep_test.cpp counts them.
 struct Operations {
-  static constexpr int Leaf(Pass pass) {
-    return pass == Pass::kSpeeds ? 12 : pass == Pass::kAccelerations ? 22 : 20;
+  static constexpr int Leaf(Sought sought) {
+    return sought == Sought::kSpeeds ? 12 : sought == Sought::kAccelerations ? 22 : 20;
   }
   static constexpr int kJoin = 57, kEndJoin = 31, kForceIn = 8, kForceInEnd = 4,
                        kAngularAcceleration = 4;

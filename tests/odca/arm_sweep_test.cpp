@@ -1,6 +1,4 @@
 // The sweep along arms against the general one, which the contract suite holds to an oracle.
-#include "odca/arm_sweep.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,15 +9,15 @@
 
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
+#include "odca/arm_links.h"
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::arms {
 namespace arm_sweep_test {
 
 Both Compare(const Mechanism<Spatial, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
-             const Numbers& u, int bodies_of_group = ArmSweep::kBodiesOfGroup) {
-  return odca::Compare(mechanism, ArmSweep::Make(mechanism, 3, bodies_of_group).get(), speeds, q,
-                       u);
+             const Numbers& u, int bodies_of_group = kBodiesOfGroup) {
+  return odca::Compare(mechanism, MakeArmSweep(mechanism, 3, bodies_of_group).get(), speeds, q, u);
 }
 
 /// Both right-hand sides.
@@ -66,7 +64,7 @@ TEST_P(ArmSweepTest, LeavesLoopsWithoutFreedomToTheGeneralSweep) {
     for (std::uint64_t seed = 1; seed <= 10; ++seed) {
       const Mechanism<Spatial, double> mechanism(RandomArms({.closed = n}, seed),
                                                  Coordinates::kJoint);
-      EXPECT_EQ(ArmSweep::Make(mechanism), nullptr);
+      EXPECT_EQ(MakeArmSweep(mechanism), nullptr);
       ++refused;
     }
   }
@@ -83,7 +81,7 @@ TEST(ArmSweep, AgreesWithTheOracle) {
       free.forces.clear();
       const Mechanism<Spatial, double> mechanism(free, Coordinates::kJoint);
       const testing::State state = testing::ConsistentState(free, mechanism, seed);
-      const auto sweep = ArmSweep::Make(mechanism);
+      const auto sweep = MakeArmSweep(mechanism);
       ASSERT_NE(sweep, nullptr) << chain.name;
       Numbers qdot(state.u.size()), own(state.u.size()), general;
       const testing::Answer exact =
@@ -118,7 +116,7 @@ TEST_P(ArmSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
     Random random(1);
     const Numbers q = RandomNumbers(random, mechanism.num_q(), 1.0);
     const Numbers u = RandomNumbers(random, mechanism.num_u(), 1.0);
-    const auto make = [&](int threads) { return ArmSweep::Make(mechanism, threads, 200); };
+    const auto make = [&](int threads) { return MakeArmSweep(mechanism, threads, 200); };
     ExpectTheSameBits(make, GetParam(), q, u, true);
   }
 }
@@ -136,7 +134,7 @@ MechanismDescription Branching() {
 
 TEST(ArmSweep, LeavesOthersToTheGeneralSweep) {
   const auto make = [](const MechanismDescription& description) {
-    return ArmSweep::Make(Mechanism<Spatial, double>(description, Coordinates::kJoint));
+    return MakeArmSweep(Mechanism<Spatial, double>(description, Coordinates::kJoint));
   };
   MechanismDescription cross = RandomArms({.closed = 9}, 1);
   for (JointDescription& joint : cross.joints) {

@@ -1,7 +1,5 @@
 // The sweep over assemblies of pins against the general one, which the contract suite holds to an
 // oracle. What every short cut must do is in short_cut_test.cpp.
-#include "odca/assembly_sweep.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -16,8 +14,8 @@ namespace assembly_sweep_test {
 
 using Model = Mechanism<Planar, double>;
 
-std::unique_ptr<AssemblySweep> Make(const Model& mechanism, const PlanOptions& options = {}) {
-  return AssemblySweep::Make(mechanism, MakePlan(mechanism, options));
+std::unique_ptr<ShortCut<Planar>> Make(const Model& mechanism, const PlanOptions& options = {}) {
+  return MakeAssemblySweep(mechanism, MakePlan(mechanism, options));
 }
 
 /// Joints may have drifted apart by as much as they please.

@@ -108,9 +108,10 @@ std::set<int> CitedIn(const Place& place, bool& found) {
     std::size_t begin = at;
     while (begin > 0 && !lines[begin - 1].empty()) --begin;
     const bool opens = lines[at].ends_with("{") || lines[at].ends_with(",");
+    const std::string end(lines[at].find_first_not_of(' '), ' ');
     for (std::size_t line = begin; line < lines.size(); ++line) {
       numbers.merge(Cited(lines[line]));
-      if (line >= at && (opens ? lines[line].starts_with("}") : lines[line].empty())) break;
+      if (line >= at && (opens ? lines[line].starts_with(end + "}") : lines[line].empty())) break;
     }
   }
   return numbers;

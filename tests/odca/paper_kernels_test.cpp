@@ -60,8 +60,7 @@ TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
       ASSERT_GT(link.mobility, 0.0) << "not pinned by a joint of the tree";
       const double angle = scene.kinematics().poses()[at.body].angle + links.axes[k];
       const double speed = scene.kinematics().motions()[at.body].angular[0];
-      const auto leaf =
-          pins::Leaf<pins::Pass::kAccelerations>(link, pins::Turn(link, angle), speed);
+      const auto leaf = pins::Leaf<Sought::kAccelerations>(link, pins::Turn(link, angle), speed);
       const int after = k + 1 < n ? links.path[k + 1].before : at.ground;
       const TwoHandles body = scene.Body(at.body, at.before, after);
       tally.Hold("leaf", Difference(leaf, body), kMargin * kEps);
@@ -152,7 +151,7 @@ arms::Free<double> FreeOf(const Scene<Spatial>& scene, const ArmPlace& at, doubl
   const auto& side = joint.from == at.body ? joint.X_PF : joint.X_QM;
   const Rotation<Spatial, double> R = scene.kinematics().poses()[at.body].R * side.R;
   arms::Free<double> free;
-  arms::FreeMotion<arms::Sought::kAccelerations>(
+  arms::FreeMotion<Sought::kAccelerations>(
       at.constants.link.shape, R.transpose() * scene.kinematics().motions()[at.body].angular, speed,
       free);
   return free;

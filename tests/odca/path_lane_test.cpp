@@ -4,14 +4,11 @@
 #include <limits>
 
 #include "mechanism/description/library.h"
-#include "odca/path_sweep.h"
 #include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
 namespace path_lane_test {
-
-using LaneSweep = PathSweepOf<Lanes>;
 
 /// As many numbers for each lane.
 std::vector<Lanes> Lane(const std::vector<Numbers>& of_lanes) {
@@ -49,15 +46,15 @@ TEST_P(PathLaneTest, HasTheBitsOfOneAlone) {
       const MechanismDescription path = RandomPath(n, 100 * seed + n);
       Random random(seed);
       std::vector<Mechanism<Planar, double>> mechanisms;
-      std::vector<std::unique_ptr<PathSweep>> alone;
+      std::vector<std::unique_ptr<ShortCut<Planar>>> alone;
       std::vector<Numbers> q, u;
-      std::unique_ptr<LaneSweep> lanes;
+      std::unique_ptr<ShortCut<Planar, Lanes>> lanes;
       for (int lane = 0; lane < kLanes; ++lane) {
         const Mechanism<Planar, double> mechanism(Resized(path, random), Coordinates::kJoint);
-        alone.push_back(PathSweep::Make(mechanism));
-        if (lane == 0) lanes = LaneSweep::InLanes(*alone[0]);
+        alone.push_back(MakePathSweep(mechanism));
+        if (lane == 0) lanes = MakePathLanes(*alone[0]);
         ASSERT_NE(lanes, nullptr) << path.name;
-        ASSERT_TRUE(lanes->SetMechanism(lane, *alone.back()));
+        ASSERT_TRUE(SetMechanism(*lanes, lane, *alone.back()));
         q.push_back(RandomNumbers(random, mechanism.num_q(), 4.0));
         u.push_back(RandomNumbers(random, mechanism.num_u(), 2.0));
       }
@@ -88,18 +85,18 @@ TEST_P(PathLaneTest, HasTheBitsOfOneAlone) {
 
 TEST(PathLane, HasOnlyMechanismsOfOneShape) {
   const auto sweep = [](const MechanismDescription& description) {
-    return PathSweep::Make(Mechanism<Planar, double>(description, Coordinates::kJoint));
+    return MakePathSweep(Mechanism<Planar, double>(description, Coordinates::kJoint));
   };
   const auto three = sweep(Chain(3));
-  const auto lanes = LaneSweep::InLanes(*three);
-  EXPECT_TRUE(lanes->SetMechanism(1, *sweep(Chain(3))));
-  EXPECT_FALSE(lanes->SetMechanism(1, *sweep(Chain(4))));
-  EXPECT_FALSE(lanes->SetMechanism(1, *sweep(Ladder(1, 1.1, 0.0))));
+  const auto lanes = MakePathLanes(*three);
+  EXPECT_TRUE(SetMechanism(*lanes, 1, *sweep(Chain(3))));
+  EXPECT_FALSE(SetMechanism(*lanes, 1, *sweep(Chain(4))));
+  EXPECT_FALSE(SetMechanism(*lanes, 1, *sweep(Ladder(1, 1.1, 0.0))));
   MechanismDescription open = Chain(3);
   open.joints.pop_back();
   open.initial = {};
-  EXPECT_FALSE(lanes->SetMechanism(1, *sweep(open)));
-  EXPECT_EQ(LaneSweep::InLanes(*sweep(Chain(2 * kLanes))), nullptr) << "its pieces fill the lanes";
+  EXPECT_FALSE(SetMechanism(*lanes, 1, *sweep(open)));
+  EXPECT_EQ(MakePathLanes(*sweep(Chain(2 * kLanes))), nullptr) << "its pieces fill the lanes";
 }
 
 /// Runs of which each asks by itself.

@@ -1,6 +1,4 @@
 // The sweep along paths against the general one, which the contract suite holds to an oracle.
-#include "odca/path_sweep.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <numeric>
 
 #include "mechanism/description/library.h"
+#include "odca/path_links.h"
 #include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
@@ -20,9 +19,8 @@ namespace path_sweep_test {
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 Both Compare(const Mechanism<Planar, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
-             const Numbers& u, int bodies_of_group = PathSweep::kBodiesOfGroup) {
-  return odca::Compare(mechanism, PathSweep::Make(mechanism, 3, bodies_of_group).get(), speeds, q,
-                       u);
+             const Numbers& u, int bodies_of_group = kBodiesOfGroup) {
+  return odca::Compare(mechanism, MakePathSweep(mechanism, 3, bodies_of_group).get(), speeds, q, u);
 }
 
 /// Both right-hand sides.
@@ -38,7 +36,7 @@ TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
     for (std::uint64_t seed = 1; seed <= 12; ++seed) {
       const MechanismDescription path = RandomPath(n, 100 * seed + n, is_long);
       const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
-      ASSERT_NE(PathSweep::Make(mechanism), nullptr) << path.name;
+      ASSERT_NE(MakePathSweep(mechanism), nullptr) << path.name;
       Random random(seed);
       const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
       const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
@@ -75,7 +73,7 @@ TEST_P(PathSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
   const auto hold = [&](const MechanismDescription& description, double size, bool evaluates) {
     const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
     const auto [q, u] = StateNear(description, mechanism, size, random);
-    const auto make = [&](int threads) { return PathSweep::Make(mechanism, threads); };
+    const auto make = [&](int threads) { return MakePathSweep(mechanism, threads); };
     ExpectTheSameBits(make, GetParam(), q, u, evaluates);
   };
   hold(Chain(8300), 1e-4, true);
@@ -96,7 +94,7 @@ TEST_P(PathSweepTest, HasTheSameBitsForAnyNumberOfThreads) {
 
 TEST(PathSweep, LeavesOthersToTheGeneralSweep) {
   const auto make = [](const MechanismDescription& description) {
-    return PathSweep::Make(Mechanism<Planar, double>(description, Coordinates::kJoint));
+    return MakePathSweep(Mechanism<Planar, double>(description, Coordinates::kJoint));
   };
   const MechanismDescription chain = Chain(5);
   EXPECT_EQ(make(Grid(2, 2, 1.0, 0.0)), nullptr) << "bodies with more joints";
@@ -108,7 +106,7 @@ TEST(PathSweep, LeavesOthersToTheGeneralSweep) {
 
 TEST_P(PathSweepTest, RefusesAChainThatIsStretchedOut) {
   const Mechanism<Planar, double> chain(Chain(4), Coordinates::kJoint);
-  const auto sweep = PathSweep::Make(chain);
+  const auto sweep = MakePathSweep(chain);
   Numbers u = Numbers::Ones(4), qdot = u, udot = u;
   for (const double angle : {1.1, 0.0}) {  // no force along it moves the last pin
     const Numbers q = Numbers::Constant(4, angle);
@@ -125,7 +123,7 @@ TEST(PathSweep, ProjectsNothingNearADegeneratePosition) {
   }
   Numbers u = Numbers::Ones(mechanism.num_u());
   const Numbers q_before = q, u_before = u;
-  EXPECT_FALSE(PathSweep::Make(mechanism)->Project(In(q), In(u), 1e-15));
+  EXPECT_FALSE(MakePathSweep(mechanism)->Project(In(q), In(u), 1e-15));
   EXPECT_EQ(q, q_before);
   EXPECT_EQ(u, u_before);
 }
@@ -135,7 +133,7 @@ TEST_P(PathSweepTest, AllocatesNothing) {
   for (const int windows : {20, 4200}) {
     const MechanismDescription ladder = Ladder(windows, 1.0, 0.5);
     const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
-    const auto sweep = PathSweep::Make(mechanism, 2);
+    const auto sweep = MakePathSweep(mechanism, 2);
     Numbers q = Numbers::Zero(mechanism.num_q());
     for (const JointValues& start : ladder.initial.coordinates) {
       q[mechanism.joints()[start.joint].q_offset] = start.values[0];
@@ -184,17 +182,17 @@ TEST(TwoHandleKernels, TakeAsManyOperationsAsTheySay) {
   EndCut<Counted> end_cut;
   Vector2<Counted> F;
   Counted speed, slack;
-  EXPECT_EQ(ProductsOf([&] { Leaf<Pass::kAccelerations>(link, at, speed); }),
-            Operations::Leaf(Pass::kAccelerations));
-  EXPECT_EQ(ProductsOf([&] { Leaf<Pass::kSpeeds>(link, at, speed); }),
-            Operations::Leaf(Pass::kSpeeds));
-  EXPECT_EQ(ProductsOf([&] { Leaf<Pass::kCompleted>(link, at, speed); }),
-            Operations::Leaf(Pass::kCompleted));
+  EXPECT_EQ(ProductsOf([&] { Leaf<Sought::kAccelerations>(link, at, speed); }),
+            Operations::Leaf(Sought::kAccelerations));
+  EXPECT_EQ(ProductsOf([&] { Leaf<Sought::kSpeeds>(link, at, speed); }),
+            Operations::Leaf(Sought::kSpeeds));
+  EXPECT_EQ(ProductsOf([&] { Leaf<Sought::kCompleted>(link, at, speed); }),
+            Operations::Leaf(Sought::kCompleted));
   EXPECT_EQ(ProductsOf([&] { Join(A, B, Counted(0.0), cut, slack); }), Operations::kJoin);
   EXPECT_EQ(ProductsOf([&] { Join(end, B, Counted(0.0), end_cut, slack); }), Operations::kEndJoin);
   EXPECT_EQ(ProductsOf([&] { ForceIn(cut, F, F); }), Operations::kForceIn);
   EXPECT_EQ(ProductsOf([&] { ForceIn(end_cut, F); }), Operations::kForceInEnd);
-  EXPECT_EQ(ProductsOf([&] { AngularAcceleration<Pass::kCompleted>(at, F, F); }),
+  EXPECT_EQ(ProductsOf([&] { AngularAcceleration<Sought::kCompleted>(at, F, F); }),
             Operations::kAngularAcceleration);
 }
 

@@ -10,8 +10,8 @@
 #include <set>
 
 #include "mechanism/description/library.h"
+#include "odca/join_order.h"
 #include "odca/odca.h"
-#include "odca/pairing.h"
 #include "tests/contract/comparison.h"
 #include "tests/contract/system_with.h"
 
@@ -359,15 +359,9 @@ TEST(PlanTest, GroundHoldsTrees) {
 /// Joints looked at while the joins of all bodies are put in order.
 long Looks(int num_bodies, const std::vector<PlanJoint>& joints) {
   std::vector<int> waiting(static_cast<std::size_t>(num_bodies), 0);
-  const BodyGraph graph(num_bodies, joints, waiting);
-  BodyMarks marks(num_bodies);
-  std::vector<int> bodies;
-  for (int body = 1; body < num_bodies; ++body) {
-    marks.part_of[body] = body - 1;
-    bodies.push_back(body);
-  }
-  std::vector<Join> joins;
-  return Pairing(graph, bodies, bodies, 3, &marks).Run(&joins).looks;
+  long looks = 0;
+  OrderJoins(num_bodies, joints, waiting, 3, 0, &looks);
+  return looks;
 }
 
 TEST(PlanTest, PlanningIsNearlyLinear) {

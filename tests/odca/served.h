@@ -7,9 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "odca/arm_sweep.h"
-#include "odca/assembly_sweep.h"
-#include "odca/path_sweep.h"
 #include "tests/contract/builder.h"
 #include "tests/odca/short_cut.h"
 
@@ -126,8 +123,8 @@ struct AlongPaths {
   using Space = Planar;
   static constexpr auto kName = "Paths";
   static auto Make(const Mechanism<Planar, double>& mechanism, int threads = 1,
-                   int group = pins::PathSweep::kBodiesOfGroup) {
-    return pins::PathSweep::Make(mechanism, threads, group);
+                   int group = pins::kBodiesOfGroup) {
+    return pins::MakePathSweep(mechanism, threads, group);
   }
   static MechanismDescription Closed(int n, std::uint64_t seed) {
     return testing::RandomChain(n, SpaceKind::kPlanar, seed);
@@ -148,7 +145,7 @@ struct OverAssemblies {
   static auto Make(const Mechanism<Planar, double>& mechanism, int /*threads*/ = 1,
                    int /*group*/ = 0) {
     const PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
-    return pins::AssemblySweep::Make(mechanism, MakePlan(mechanism, options));
+    return pins::MakeAssemblySweep(mechanism, MakePlan(mechanism, options));
   }
   static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
   static constexpr int kOneFreedom = 3;
@@ -175,8 +172,8 @@ struct AlongArms {
   using Space = Spatial;
   static constexpr auto kName = "Arms";
   static auto Make(const Mechanism<Spatial, double>& mechanism, int threads = 1,
-                   int group = arms::ArmSweep::kBodiesOfGroup) {
-    return arms::ArmSweep::Make(mechanism, threads, group);
+                   int group = arms::kBodiesOfGroup) {
+    return arms::MakeArmSweep(mechanism, threads, group);
   }
   static MechanismDescription Closed(int n, std::uint64_t seed) {
     return testing::RandomChain(n, SpaceKind::kSpatial, seed);

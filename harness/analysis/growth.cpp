@@ -1,5 +1,3 @@
-#include "harness/analysis/growth.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "harness/analysis/analysis.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/analysis/structure_hints.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -8,7 +6,8 @@
 #include <numbers>
 #include <set>
 
-#include "harness/text/words.h"
+#include "harness/analysis/analysis.h"
+#include "harness/text/text.h"
 #include "mechanism/description/joint_frames.h"
 #include "mechanism/model/kinematics.h"
 #include "mechanism/simplify/compile.h"

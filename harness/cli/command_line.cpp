@@ -10,11 +10,9 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "harness/record/provenance.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
 #include "harness/text/numeric_option.h"
-#include "harness/text/run_program.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -18,13 +18,10 @@
 #include "harness/exchange/import.h"
 #include "harness/integrator/arkode.h"
 #include "harness/isolation/processes.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/run/case_identity.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/view/picture.h"
-#include "harness/view/writers.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

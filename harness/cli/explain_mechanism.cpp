@@ -2,11 +2,10 @@
 #include <array>
 #include <numbers>
 
-#include "harness/analysis/model_warnings.h"
-#include "harness/analysis/structure_hints.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/run/case_identity.h"
-#include "harness/trajectory/statics.h"
+#include "harness/run/run.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
 

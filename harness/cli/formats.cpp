@@ -11,7 +11,7 @@
 #include "harness/config/file_schemas.h"
 #include "harness/json/json_document.h"
 #include "harness/judge/rule_schemas.h"
-#include "harness/store/store_lock.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

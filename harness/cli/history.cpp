@@ -1,8 +1,8 @@
 // history: measurements of successive commits.
+#include "harness/history/history.h"
+
 #include "harness/cli/commands.h"
-#include "harness/history/history_page.h"
-#include "harness/history/history_series.h"
-#include "harness/store/measurements.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,12 +7,11 @@
 #include <system_error>
 
 #include "harness/advise/advise.h"
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/record/noise.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/model_error.h"
-#include "harness/text/hash.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"

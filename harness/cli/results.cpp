@@ -2,13 +2,10 @@
 #include <array>
 
 #include "harness/cli/commands.h"
-#include "harness/figures/judge_figures.h"
+#include "harness/figures/figures.h"
 #include "harness/json/json_document.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/reports.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/judge/work_precision.h"
-#include "harness/report/html.h"
+#include "harness/judge/judge.h"
+#include "harness/report/report.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,20 +1,17 @@
 // run, merge and estimate: experiments into a store, stores into one, and the time before.
+#include "harness/run/run.h"
+
 #include <fstream>
 #include <iterator>
 #include <set>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/judge/claims.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/peers.h"
-#include "harness/run/run_case.h"
-#include "harness/store/store_lock.h"
-#include "harness/suite/estimate.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/suite/runner.h"
-#include "harness/text/cpu_time.h"
-#include "harness/timing/time_cases.h"
+#include "harness/judge/judge.h"
+#include "harness/store/store.h"
+#include "harness/suite/suite.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {

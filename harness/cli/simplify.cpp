@@ -2,7 +2,7 @@
 #include <charconv>
 
 #include "harness/cli/commands.h"
-#include "harness/run/model_error.h"
+#include "harness/run/run.h"
 #include "mechanism/model/mechanism.h"
 #include "mechanism/simplify/restart.h"
 

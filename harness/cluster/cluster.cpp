@@ -14,16 +14,11 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/run/case_identity.h"
-#include "harness/store/result_store.h"
-#include "harness/store/store_lock.h"
+#include "harness/run/run.h"
+#include "harness/store/store.h"
 #include "harness/suite/suite.h"
-#include "harness/suite/workload.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -13,7 +13,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/json/fields.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/simplify/compile.h"

@@ -6,8 +6,7 @@
 
 #include "harness/config/experiment_sections.h"
 #include "harness/config/options.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

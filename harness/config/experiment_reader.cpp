@@ -9,7 +9,7 @@
 #include "harness/config/options.h"
 #include "harness/json/fields.h"
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

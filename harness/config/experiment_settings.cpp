@@ -11,8 +11,7 @@
 #include "harness/config/experiment.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/published_series.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -10,8 +10,7 @@
 #include "harness/config/mechanism_sections.h"
 #include "harness/json/fields.h"
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "mechanism/start/poses.h"
 
 namespace loopbench::harness {

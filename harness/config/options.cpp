@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {

@@ -6,8 +6,7 @@
 #include "harness/exchange/export_c.h"
 #include "harness/exchange/export_names.h"
 #include "harness/generate/generated.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 
 namespace loopbench::exchange {
 

@@ -5,7 +5,7 @@
 
 #include "harness/config/mechanism_sections.h"
 #include "harness/exchange/import_draft.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/topology.h"
 

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

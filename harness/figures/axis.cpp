@@ -1,5 +1,3 @@
-#include "harness/figures/axis.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/figures/panel.h"
+#include "harness/figures/figures.h"
 
 namespace loopbench::harness {
 namespace {

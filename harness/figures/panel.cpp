@@ -1,5 +1,3 @@
-#include "harness/figures/panel.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,10 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
-#include "harness/text/words.h"
+#include "harness/figures/figures.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -10,16 +10,9 @@
 #include <set>
 #include <utility>
 
-#include "harness/record/measures.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/record/select.h"
-#include "harness/store/record_lines.h"
-#include "harness/store/result_store.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
-#include "harness/text/words.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,16 +1,14 @@
-#include "harness/history/history_page.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <ranges>
 
-#include "harness/figures/axis.h"
-#include "harness/history/history_series.h"
-#include "harness/judge/demand.h"
-#include "harness/text/escape.h"
-#include "harness/view/writers.h"
+#include "harness/figures/figures.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {

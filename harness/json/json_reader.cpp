@@ -9,8 +9,7 @@
 #include <map>
 #include <set>
 
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

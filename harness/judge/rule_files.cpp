@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "harness/json/fields.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/robustness_map.h"
+#include "harness/judge/judge.h"
 #include "harness/judge/rule_schemas.h"
 
 namespace loopbench::harness {

@@ -1,10 +1,9 @@
-#include "harness/record/measures.h"
-
 #include <algorithm>
 #include <deque>
 #include <map>
 #include <string>
 
+#include "harness/record/record.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {

@@ -12,9 +12,7 @@
 #include <vector>
 
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/record/select.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +9,8 @@
 #include <optional>
 #include <system_error>
 
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/report/html.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,12 +7,11 @@
 #include <utility>
 
 #include "harness/config/formulations.h"
-#include "harness/judge/claims.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/warning_notes.h"
-#include "harness/text/escape.h"
-#include "harness/text/words.h"
-#include "harness/view/writers.h"
+#include "harness/judge/judge.h"
+#include "harness/report/report.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {

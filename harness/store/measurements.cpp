@@ -1,5 +1,3 @@
-#include "harness/store/measurements.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +6,8 @@
 #include <set>
 
 #include "harness/json/json_reader.h"
-#include "harness/record/select.h"
-#include "harness/store/result_store.h"
+#include "harness/record/record.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/tables/table.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,9 +10,8 @@
 #include <string_view>
 
 #include "harness/record/record.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/fit.h"
-#include "harness/text/escape.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

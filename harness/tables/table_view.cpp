@@ -1,5 +1,3 @@
-#include "harness/tables/table_view.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,10 +10,9 @@
 
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
-#include "harness/record/noise.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/warning_notes.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -4,9 +4,8 @@
 #include <numbers>
 #include <utility>
 
-#include "harness/text/escape.h"
+#include "harness/text/text.h"
 #include "harness/trajectory/trajectory.h"
-#include "harness/trajectory/user_mechanism.h"
 
 namespace loopbench::harness {
 namespace {

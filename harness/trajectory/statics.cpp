@@ -1,11 +1,10 @@
-#include "harness/trajectory/statics.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/scaled_loops.h"
 

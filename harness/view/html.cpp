@@ -3,9 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "harness/text/escape.h"
-#include "harness/view/picture.h"
-#include "harness/view/writers.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/view/picture.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -7,7 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
+#include "harness/view/view.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/simplify/compile.h"
 #include "mechanism/simplify/structure.h"

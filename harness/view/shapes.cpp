@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/view/picture.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {

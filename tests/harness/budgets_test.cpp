@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/include_arrows.h"
 #include "tests/harness/places.h"
 
@@ -46,34 +46,34 @@ constexpr Budget kBudgets[] = {
     {"odca",                    { 7008,  37,   5},  3900},
     {"lagrange",                {  383,   4,   4},   350},
     {"reduction",               { 1630,  12,   4},  1350},
-    {"harness/text",            { 1653,  13,   0},   900},
-    {"harness/json",            { 2004,   9,   1},  1300},
-    {"harness/record",          { 1515,  10,   3},  1200},
-    {"harness/store",           { 1656,   8,   3},  1300},
-    {"harness/config",          { 6315,  24,  11},  4000},
-    {"harness/analysis",        { 2127,   8,   9},  1200},
-    {"harness/generate",        { 2437,  12,   7},  1230},
+    {"harness/text",            { 1601,   7,   0},   900},
+    {"harness/json",            { 2001,   9,   1},  1300},
+    {"harness/record",          { 1478,   6,   3},  1200},
+    {"harness/store",           { 1610,   5,   3},  1300},
+    {"harness/config",          { 6310,  24,  11},  4000},
+    {"harness/analysis",        { 2099,   5,   9},  1200},
+    {"harness/generate",        { 2435,  12,   7},  1230},
     {"harness/integrator",      { 1339,   6,   5},   900},
-    {"harness/reference",       {  913,   4,   4},   800},
-    {"harness/trajectory",      { 2538,   9,  12},  1750},
-    {"harness/observers",       { 1147,   4,   7},  1000},
-    {"harness/run",             { 1853,  12,  14},  1700},
+    {"harness/reference",       {  904,   3,   4},   800},
+    {"harness/trajectory",      { 2505,   6,  12},  1750},
+    {"harness/observers",       { 1146,   4,   7},  1000},
+    {"harness/run",             { 1790,   7,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
-    {"harness/isolation",       {  809,   2,   3},   790},
-    {"harness/timing",          { 1367,  10,   7},  1050},
-    {"harness/suite",           { 2391,  10,  15},  1500},
-    {"harness/cluster",         {  491,   2,   5},   420},
+    {"harness/isolation",       {  806,   2,   3},   790},
+    {"harness/timing",          { 1339,   7,   7},  1050},
+    {"harness/suite",           { 2316,   6,  15},  1500},
+    {"harness/cluster",         {  486,   2,   5},   420},
     {"harness/advise",          {  646,   2,   8},   650},
-    {"harness/tables",          { 2017,  10,   5},  1500},
-    {"harness/judge",           { 3694,  18,   5},  2700},
-    {"harness/figures",         { 3062,  12,   7},  1900},
-    {"harness/view",            { 2397,   7,   8},  2050},
-    {"harness/exchange",        { 9035,  35,  10},  5000},
-    {"harness/report",          { 1090,   4,  10},  1100},
-    {"harness/history",         { 2041,  10,   7},  1500},
-    {"harness/cli",             { 7833,  24,  29},  3600},
+    {"harness/tables",          { 1962,   6,   5},  1500},
+    {"harness/judge",           { 3593,  11,   5},  2700},
+    {"harness/figures",         { 2980,   7,   7},  1900},
+    {"harness/view",            { 2386,   6,   8},  2050},
+    {"harness/exchange",        { 9033,  35,  10},  5000},
+    {"harness/report",          { 1074,   3,  10},  1100},
+    {"harness/history",         { 1990,   6,   7},  1500},
+    {"harness/cli",             { 7802,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92750, 486, 242}, 62000}
+    {"",                        {92011, 432, 242}, 62000}
 };
 // clang-format on
 

@@ -1,4 +1,4 @@
-// The data of a report: motions, curves, tables.
+// Reports: data, and their HTML page.
 #pragma once
 
 #include <cstddef>
@@ -6,16 +6,17 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "harness/judge/claims.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/judge/work_precision.h"
+#include "harness/judge/judge.h"
 #include "harness/record/record.h"
-#include "harness/tables/table.h"
-#include "harness/view/picture.h"
+#include "harness/tables/tables.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
+
+// The data of a report: motions, curves, tables.
 
 // Decimation of curves that keeps their extremes.
 
@@ -148,5 +149,29 @@ ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& o
 /// Returns curves of drift, energy error and true error of the rows that have them. All curves
 /// share at most `most` points evenly and keep their extremes.
 std::vector<ReportPlot> MakePlots(const std::vector<Record>& rows, std::size_t most);
+
+// Writers of a report: JSON and an HTML page.
+
+// Report data as JSON for web/report/, safe inside an HTML element.
+
+/// A data element of the page, which is parsed when it is first displayed.
+struct DataElement {
+  std::string id;
+  std::string json;
+};
+
+/// Returns "tables", "costs", "map", "problems" and one "curves-NAME" per plot. Tables have numbers
+/// with all digits, curves and poses with display precision.
+std::vector<DataElement> ToJson(const ReportData& data);
+
+// Report data as one self-contained HTML page: data, style and script are embedded.
+
+/// web/report/ after uPlot and its licence, embedded when the program is built. Empty in a program
+/// built without it (cmake -DLOOPBENCH_REPORT=OFF).
+extern const std::string_view kReportScript, kReportStyle;
+
+/// Writes the findings as text, for readers without script and for print; the script draws the rest
+/// from the data.
+std::string ToHtml(const ReportData& data);
 
 }  // namespace loopbench::harness

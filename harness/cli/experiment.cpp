@@ -167,11 +167,10 @@ void AddUnitWarnings(const std::filesystem::path& path, const MechanismDescripti
 /// remedy.
 void AddStarts(const std::filesystem::path& path, const StartReport& report, Checked* checked) {
   for (const std::string& warning : report.warnings) AddWarning(path, warning, checked);
-  std::string text;
-  for (const std::string& fault : report.faults) {
-    text += fmt::format("{}{}: {}", text.empty() ? "" : "\n", path.string(), fault);
-  }
-  if (!text.empty()) throw ConfigError(text + "\n(--no-assembly leaves this check out)");
+  if (report.faults.empty()) return;
+  throw ConfigError(Joined(report.faults, "\n",
+                           [&](const std::string& fault) { return path.string() + ": " + fault; }) +
+                    "\n(--no-assembly leaves this check out)");
 }
 
 Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& command) {

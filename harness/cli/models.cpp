@@ -28,8 +28,7 @@ ObservedQuantities ObserveIn(const MechanismDescription& description,
                              const ObservedQuantities& observe, bool keeps_facts) {
   ObservedQuantities known = observe;
   const auto is_there = [&](const std::string& body) {
-    return std::ranges::find(description.bodies, body, &BodyDescription::name) !=
-           description.bodies.end();
+    return Contains(description.bodies, body, &BodyDescription::name);
   };
   std::erase_if(known.branch_invariants, [&](const AngleCombination& combination) {
     return !keeps_facts || !std::ranges::all_of(
@@ -79,9 +78,8 @@ std::string CommentOf(const ProblemModel& model, const std::string& whole) {
 }
 
 std::string List(const std::vector<std::string>& lines) {
-  std::string text;
-  for (const std::string& line : lines) text += fmt::format("- {}\n", EscapeMarkdown(line));
-  return text;
+  return Joined(lines, "",
+                [](const std::string& line) { return "- " + EscapeMarkdown(line) + "\n"; });
 }
 
 /// Returns the name of the experiment.
@@ -435,13 +433,13 @@ CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& who
   for (std::size_t body = 1; body < whole.bodies.size(); ++body) {
     for (const auto& [point, at] : whole.bodies[body].points) {
       const std::string name = whole.bodies[body].name + "." + point;
-      if (!names.empty() && std::ranges::find(names, name) == names.end()) continue;
+      if (!names.empty() && !Contains(names, name)) continue;
       const FoundPoint found = FindPoint(model.description, whole.bodies[body].name, point);
       if (found.body < 0) continue;
       ++error.points;
       for (std::size_t k = 0; k < count; ++k) {
         const Frame& X = whole_reference.snapshots[k].bodies[body].pose;
-        const Frame& Y = reference.snapshots[k].bodies[static_cast<std::size_t>(found.body)].pose;
+        const Frame& Y = reference.snapshots[k].bodies[found.body].pose;
         const double off = (X.p + X.R * at - model.R_WC * (Y.p + Y.R * found.at)).norm();
         if (off <= error.largest) continue;
         error.largest = off;

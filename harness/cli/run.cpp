@@ -334,11 +334,10 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
 
 JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overview,
                         const Plan& plan, const Estimate& estimate) {
-  std::vector<JsonObject> lines;
-  for (const Line& line : plan.lines) {
-    lines.push_back(JsonOf("mechanism", line.mechanism, "method", line.method, "cases", line.cases,
-                           "runs", line.runs, "seconds", line.seconds));
-  }
+  std::vector<JsonObject> lines = Mapped<JsonObject>(plan.lines, [](const Line& line) {
+    return JsonOf("mechanism", line.mechanism, "method", line.method, "cases", line.cases, "runs",
+                  line.runs, "seconds", line.seconds);
+  });
   return JsonOf("file", path, "name", overview.experiments.front().name, "combinations",
                 overview.combinations, "cases", plan.cases, "runs", plan.runs, "accuracy_seconds",
                 plan.seconds, "references", plan.references, "reference_seconds",

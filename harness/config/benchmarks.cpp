@@ -49,9 +49,7 @@ const std::vector<SizedFamily>& SizedFamilies() {
 }
 
 std::vector<std::string> NamesOfSizedFamilies() {
-  std::vector<std::string> names;
-  for (const SizedFamily& family : SizedFamilies()) names.push_back(family.name);
-  return names;
+  return Mapped<std::string>(SizedFamilies(), &SizedFamily::name);
 }
 
 std::string TextOfSizedFamilies() {

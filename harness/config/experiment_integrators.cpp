@@ -34,11 +34,8 @@ double ReadCoefficient(const JsonNode& node) {
 }
 
 std::vector<double> ReadCoefficients(const JsonNode& node) {
-  std::vector<double> numbers;
-  for (const JsonNode& element : node.Elements("coefficients")) {
-    numbers.push_back(ReadCoefficient(element));
-  }
-  return numbers;
+  return Mapped<double>(node.Elements("coefficients"),
+                        [](const JsonNode& element) { return ReadCoefficient(element); });
 }
 
 FieldValue<TableDraft> Coefficients(std::vector<double> ButcherTable::*member) {

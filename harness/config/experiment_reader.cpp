@@ -23,15 +23,6 @@ Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
   return experiment;
 }
 
-/// "mass = 1, damping = 0.5".
-std::string Described(const Record& parameters) {
-  std::string text;
-  for (const auto& [name, value] : parameters.items()) {
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, parameters.Text(name));
-  }
-  return text;
-}
-
 }  // namespace
 
 /// Records which rules of "exclude" have matched, and whether any case is left.
@@ -110,7 +101,7 @@ class ExperimentSource::Document {
     errors.ThrowIfAny(index == 0 ? ""
                                  : fmt::format("{}: the above in combination {} of {}: {}",
                                                path_.string(), index + 1, sweep_->count(),
-                                               Described(experiment.parameters)));
+                                               experiment.parameters.Described()));
     return experiment;
   }
 

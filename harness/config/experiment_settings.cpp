@@ -247,9 +247,7 @@ void RequireOutput(const JsonNode& node, ExperimentFile& file) {
   }
 }
 
-bool OutputOptions::Has(OutputPart part) const {
-  return std::ranges::find(quantities, part) != quantities.end();
-}
+bool OutputOptions::Has(OutputPart part) const { return Contains(quantities, part); }
 
 std::vector<double> OutputTimes(const OutputOptions& output, double horizon) {
   std::vector<double> times;

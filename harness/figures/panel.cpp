@@ -316,7 +316,7 @@ class Crosses {
     std::string height = fmt::format("first {:.6g}", y);
     if (!area_.y.CanShow(y)) {
       std::vector<std::string>& colors = on_edge_[at];
-      if (std::ranges::find(colors, color) != colors.end()) return "";
+      if (Contains(colors, color)) return "";
       colors.push_back(color);
       height = fmt::format("graph {:.4g}", kDistance * static_cast<double>(colors.size()));
     }
@@ -329,12 +329,10 @@ class Crosses {
 };
 
 std::string TicksCommand(char axis, const std::vector<Tick>& ticks, bool has_labels) {
-  std::string list;
-  for (const Tick& tick : ticks) {
-    list += fmt::format("{}{} {:.10g}{}", list.empty() ? "" : ", ",
-                        QuoteGnuplotTick(has_labels ? tick.label : ""), tick.at,
-                        tick.label.empty() ? " 1" : "");
-  }
+  const std::string list = Joined(ticks, ", ", [&](const Tick& tick) {
+    return fmt::format("{} {:.10g}{}", QuoteGnuplotTick(has_labels ? tick.label : ""), tick.at,
+                       tick.label.empty() ? " 1" : "");
+  });
   return fmt::format("set {}tics scale 0.5,0.25 ({})\n", axis, list);
 }
 

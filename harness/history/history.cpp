@@ -69,8 +69,7 @@ std::filesystem::path ResultsIn(const std::filesystem::path& folder, const std::
   const std::filesystem::path path = name, whole = std::filesystem::weakly_canonical(folder);
   const std::filesystem::path end = std::filesystem::weakly_canonical(folder / path);
   const bool is_within = std::ranges::mismatch(whole, end).in1 == whole.end() && whole != end;
-  if (path.is_relative() && std::ranges::find(path, "..") == path.end() && is_within)
-    return folder / path;
+  if (path.is_relative() && !Contains(path, "..") && is_within) return folder / path;
   throw ConfigError(fmt::format("{}: \"results\": found \"{}\", expected a path within the history",
                                 FileOf(folder).string(), name));
 }

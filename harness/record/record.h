@@ -78,7 +78,7 @@ enum class Rule {
 enum class Repeats {
   kAlways,
   /// Depends on the last bits of floating-point numbers or on compiled code (alignment of memory):
-  /// comparable under one arithmetic only (record.h).
+  /// comparable under one arithmetic only (Origin).
   kUnderOneArithmetic,
   /// Depends on the clock, the machine and its load, or the typed command: two runs of one case by
   /// one program may differ in it.
@@ -212,6 +212,9 @@ class Record {
 
   const std::vector<std::pair<std::string, Value>>& items() const { return items_; }
 
+  /// Returns "mass = 1, damping = 0.5".
+  std::string Described() const;
+
   friend bool operator==(const Record&, const Record&) = default;
 
  private:
@@ -237,7 +240,7 @@ std::string ToJsonObject(const Record& record);
 /// hand) is accepted, with `is_sealed` false. Throws std::runtime_error with the value found and
 /// the value expected for another format, a format without checksum, and a wrong checksum. Also
 /// throws unless the line is one flat JSON object of null, bool, number, string or array of
-/// numbers, with unique keys and values of the types of their keys (record.h). Linear in the line
+/// numbers, with unique keys and values of the types of their keys (Measure). Linear in the line
 /// length.
 Record FromJsonLine(std::string_view line, bool* is_sealed = nullptr);
 
@@ -272,7 +275,7 @@ std::string Excerpt(std::string_view text);
 // JSON documents for programs, made of values, records and other documents.
 
 /// JSON object with keys in the order of adding. Invalid UTF-8, NaN and infinity are converted as
-/// in records (record.h).
+/// in records.
 class JsonObject {
  public:
   JsonObject() = default;

@@ -188,12 +188,9 @@ std::vector<Record> Filter(std::span<const Record> records, const Selection& sel
 }
 
 std::string ToText(const Selection& selection) {
-  std::string text;
-  for (const auto& [key, values, op] : selection) {
-    text +=
-        fmt::format("{}{}{}{}", text.empty() ? "" : " ", key, ToString(op), fmt::join(values, ","));
-  }
-  return text;
+  return Joined(selection, " ", [](const Condition& one) {
+    return fmt::format("{}{}{}", one.key, ToString(one.op), fmt::join(one.values, ","));
+  });
 }
 
 void SortRows(std::vector<Record>* records) { std::ranges::stable_sort(*records, ComesBefore); }

@@ -379,11 +379,7 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
       if (!seen.insert(ToString(experiment.compile) + "\n" + file.canonical).second) continue;
       const StartReport report = ReportOf(LimitsOfRuns(experiment.limits, 1),
                                           [&] { return AnswerOfProblem(experiment, file); });
-      std::string values;
-      for (const auto& [name, value] : experiment.parameters.items()) {
-        values += fmt::format("{}{} = {}", values.empty() ? "" : ", ", name,
-                              experiment.parameters.Text(name));
-      }
+      std::string values = experiment.parameters.Described();
       if (!values.empty()) values = " (at " + values + ")";
       for (const std::string& fault : report.faults) {
         all.faults.push_back(fmt::format("problem \"{}\": {}{}", problem.name, fault, values));

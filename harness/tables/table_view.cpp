@@ -274,14 +274,12 @@ std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
 }
 
 std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Record> rows) {
-  std::vector<TableColumn> columns;
-  for (const std::string& key : view.columns) columns.push_back(ColumnOf(key, rows));
-  return columns;
+  return Mapped<TableColumn>(view.columns,
+                             [&](const std::string& key) { return ColumnOf(key, rows); });
 }
 
 bool Shows(const Table& table, const std::string& key) {
-  return table.group == key ||
-         std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
+  return table.group == key || Contains(table.columns, key, &TableColumn::key);
 }
 
 // Returns a note on warnings without a column; `runs` are the sources of the table's rows.

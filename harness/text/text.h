@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstddef>
@@ -10,10 +12,12 @@
 #include <ctime>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -130,7 +134,7 @@ std::string EscapeLatex(std::string_view text);
 std::string BreakableLatex(std::string_view text);
 
 /// Escapes text of SVG and HTML, in an element or an attribute: no character is markup, and control
-/// characters are shown (text.h).
+/// characters are shown, as by EscapeTerminal().
 std::string EscapeXml(std::string_view text);
 
 /// Writes a CSV field, quoted if RFC 4180 (or a reader with "#" comments) needs it. A text that a
@@ -185,7 +189,7 @@ class SystemFault : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Writes `text` to `path` by the output rules of text.h: a reader of a regular file finds the old
+/// Writes `text` to `path` by the output rules above: a reader of a regular file finds the old
 /// contents or the new ones, never a part. Makes missing parent folders. Throws std::runtime_error
 /// with the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
@@ -215,8 +219,8 @@ void WriteAll(int descriptor, std::string_view text, const std::filesystem::path
 /// Waits until the names in the folder of `path` are on disk, if the file system supports this.
 void SyncFolderOf(const std::filesystem::path& path);
 
-/// Returns the bytes of the regular file `path` (a device might never end) and notes it as input
-/// (text.h). Throws std::runtime_error with the path and the reason.
+/// Returns the bytes of the regular file `path` (a device might never end) and notes it as
+/// input. Throws std::runtime_error with the path and the reason.
 std::string ReadFile(const std::filesystem::path& path);
 
 // Temporary files and folders of a command: none remains, however the command ends.
@@ -496,6 +500,41 @@ void PrintError(fmt::format_string<internal::PrintedAs<Values>...> format,
 int FinishOutput(int code);
 
 // Words in messages: characters of UTF-8, lists, counts, the nearest spelling of a mistyped word.
+
+// Lists made of other lists.
+
+/// Returns a T of f(element) for each element; `f` may be a member.
+template <class T, class Range, class Function>
+std::vector<T> Mapped(const Range& range, Function f) {
+  std::vector<T> list;
+  for (const auto& element : range) list.emplace_back(std::invoke(f, element));
+  return list;
+}
+
+/// Returns the texts f(element) of all elements with the separator between them.
+template <class Range, class Function = std::identity>
+std::string Joined(const Range& range, std::string_view separator, Function f = {}) {
+  std::string text;
+  bool is_first = true;
+  for (const auto& element : range) {
+    if (!is_first) text += separator;
+    text += std::invoke(f, element);
+    is_first = false;
+  }
+  return text;
+}
+
+/// Returns true if an element, or its member `projection`, equals the value.
+template <class Range, class T, class Projection = std::identity>
+bool Contains(const Range& range, const T& value, Projection projection = {}) {
+  return std::ranges::find(range, value, projection) != std::end(range);
+}
+
+/// Appends a value that the list does not contain yet.
+template <class T>
+void AddOnce(std::vector<T>& list, const std::type_identity_t<T>& value) {
+  if (!Contains(list, value)) list.push_back(value);
+}
 
 /// True if a byte of UTF-8 continues the character before it.
 inline bool ContinuesCharacter(char byte) {

@@ -52,7 +52,7 @@ constexpr Budget kBudgets[] = {
     {"harness/store",           { 1609,   5,   3},  1300},
     {"harness/config",          { 6286,  24,  11},  4000},
     {"harness/analysis",        { 2094,   5,   9},  1200},
-    {"harness/generate",        { 2435,  12,   7},  1230},
+    {"harness/generate",        { 2329,  12,   7},  1230},
     {"harness/integrator",      { 1339,   6,   5},   900},
     {"harness/reference",       {  904,   3,   4},   800},
     {"harness/trajectory",      { 2501,   6,  12},  1750},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 1989,   6,   7},  1500},
     {"harness/cli",             { 7775,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {91944, 432, 242}, 62000}
+    {"",                        {91838, 432, 242}, 62000}
 };
 // clang-format on
 

@@ -50,7 +50,7 @@ constexpr Budget kBudgets[] = {
     {"harness/json",            { 2000,   9,   1},  1300},
     {"harness/record",          { 1466,   6,   3},  1200},
     {"harness/store",           { 1609,   5,   3},  1300},
-    {"harness/config",          { 6286,  24,  11},  4000},
+    {"harness/config",          { 6255,  24,  11},  4000},
     {"harness/analysis",        { 2094,   5,   9},  1200},
     {"harness/generate",        { 2329,  12,   7},  1230},
     {"harness/integrator",      { 1339,   6,   5},   900},
@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3592,  11,   5},  2700},
     {"harness/figures",         { 2975,   7,   7},  1900},
     {"harness/view",            { 2380,   6,   8},  2050},
-    {"harness/exchange",        { 9029,  35,  10},  5000},
+    {"harness/exchange",        { 9028,  35,  10},  5000},
     {"harness/report",          { 1073,   3,  10},  1100},
     {"harness/history",         { 1989,   6,   7},  1500},
     {"harness/cli",             { 7775,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {91838, 432, 242}, 62000}
+    {"",                        {91806, 432, 242}, 62000}
 };
 // clang-format on
 

@@ -34,7 +34,7 @@ struct PicturePlace {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< in ground axes [m]
 
   Eigen::Vector3d In(const Poses& poses) const {
-    const Frame& X = poses[static_cast<std::size_t>(body)];
+    const Frame& X = poses[body];
     return X.p + X.R * at + offset;
   }
 };
@@ -289,9 +289,11 @@ std::string PosesJson(const Poses& poses, bool planar, int digits = 10);
 
 // A picture as one self-contained HTML page: data, style and script are embedded.
 
-/// web/scene.js (draws any poses of a picture) with the files that it needs, web/scene.css and
-/// web/view.js (page of one mechanism), embedded when the program is built.
-extern const std::string_view kSceneScript, kSceneStyle, kViewScript;
+/// web/scene.js (draws any poses of a picture) with the files that it needs, web/scene.css,
+/// web/view.js and web/view.html (page of one mechanism), web/history.css and web/history.js,
+/// embedded when the program is built.
+extern const std::string_view kSceneScript, kSceneStyle, kViewScript, kViewBody, kHistoryStyle,
+    kHistoryScript;
 
 /// Returns the start of a page, up to its open style element, which contains kSceneStyle. The page
 /// may load or send nothing, whatever a name contains. `title` is safe for XML.

@@ -67,13 +67,13 @@ constexpr Budget kBudgets[] = {
     {"harness/tables",          { 1954,   6,   5},  1500},
     {"harness/judge",           { 3592,  11,   5},  2700},
     {"harness/figures",         { 2975,   7,   7},  1900},
-    {"harness/view",            { 2380,   6,   8},  2050},
-    {"harness/exchange",        { 9028,  35,  10},  5000},
+    {"harness/view",            { 2346,   6,   8},  2050},
+    {"harness/exchange",        { 8399,  32,  10},  5000},
     {"harness/report",          { 1073,   3,  10},  1100},
-    {"harness/history",         { 1989,   6,   7},  1500},
+    {"harness/history",         { 1951,   6,   7},  1500},
     {"harness/cli",             { 7775,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {91806, 432, 242}, 62000}
+    {"",                        {91105, 429, 242}, 62000}
 };
 // clang-format on
 

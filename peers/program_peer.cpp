@@ -7,7 +7,7 @@
 #include <exception>
 
 #include "harness/exchange/export_mechanism.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 
 namespace loopbench::peers {
 namespace {

@@ -1,6 +1,6 @@
 #include "peers/register.h"
 
-#include "harness/run/peers.h"
+#include "harness/run/run.h"
 #include "peers/mujoco/mujoco_program.h"
 #include "peers/program_peer.h"
 #include "peers/simbody/simbody_program.h"

@@ -10,10 +10,10 @@
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
 #include "harness/integrator/arkode.h"
-#include "harness/record/noise.h"
-#include "harness/reference/error_meter.h"
-#include "harness/run/run_case.h"
-#include "harness/timing/calibration.h"
+#include "harness/record/record.h"
+#include "harness/reference/reference.h"
+#include "harness/run/run.h"
+#include "harness/timing/timing.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

@@ -1,5 +1,3 @@
-#include "harness/analysis/growth.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,9 @@
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "harness/analysis/analysis.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -90,9 +91,7 @@ Scores ScoreMember(const DriftSeries& readings, const HypothesisOptions& options
 
 template <class Get>
 std::vector<double> Collect(const std::vector<Scores>& members, const Get& get) {
-  std::vector<double> values;
-  for (const Scores& member : members) values.push_back(get(member));
-  return values;
+  return Mapped<double>(members, [&](const Scores& member) { return get(member); });
 }
 
 // Returns true if the mean of the values exceeds zero by so many standard errors.
@@ -220,11 +219,8 @@ struct Statistics {
 
 std::vector<DriftSeries> Readings(std::span<const DriftSeries> maxima, double t_from, double t_to,
                                   int points) {
-  std::vector<DriftSeries> readings;
-  for (const DriftSeries& maximum : maxima) {
-    readings.push_back(Resample(maximum, t_from, t_to, points));
-  }
-  return readings;
+  return Mapped<DriftSeries>(
+      maxima, [&](const DriftSeries& maximum) { return Resample(maximum, t_from, t_to, points); });
 }
 
 Statistics Slopes(std::span<const DriftSeries> readings) {

@@ -1,5 +1,3 @@
-#include "harness/analysis/model_warnings.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -8,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "harness/analysis/analysis.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/start/poses.h"
 

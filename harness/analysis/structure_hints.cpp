@@ -1,5 +1,3 @@
-#include "harness/analysis/structure_hints.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -8,7 +6,8 @@
 #include <numbers>
 #include <set>
 
-#include "harness/text/words.h"
+#include "harness/analysis/analysis.h"
+#include "harness/text/text.h"
 #include "mechanism/description/joint_frames.h"
 #include "mechanism/model/kinematics.h"
 #include "mechanism/simplify/compile.h"
@@ -138,9 +137,8 @@ std::vector<double> SizesOf(const MechanismDescription& description) {
     if (joint.type == JointType::kFree) continue;
     for (const JointSide& side : {joint.from, joint.to}) boxes[side.body].extend(side.position);
   }
-  std::vector<double> sizes;
-  for (const Eigen::AlignedBox3d& box : boxes) sizes.push_back(box.diagonal().norm());
-  return sizes;
+  return Mapped<double>(boxes,
+                        [](const Eigen::AlignedBox3d& box) { return box.diagonal().norm(); });
 }
 
 /// Returns true for welds, rods, and balanced rotors: a centre of mass on a hinge's axis.
@@ -410,7 +408,7 @@ void Search(const MechanismDescription& description, int joint, CoordinateRange*
     return;
   }
   range->start = own->values.front();
-  if (std::ranges::find(initial.held, joint) == initial.held.end()) initial.held.push_back(joint);
+  AddOnce(initial.held, joint);
   const int free = FindBranches(start.description, 0).freedom -
                    static_cast<int>(FindIdleFreedoms(description, structure).size());
   if (free > 0) {

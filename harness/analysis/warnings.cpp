@@ -1,5 +1,3 @@
-#include "harness/analysis/warnings.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/published_series.h"
@@ -22,7 +20,7 @@ namespace loopbench::harness {
 namespace {
 
 /// Final poses nearer than this, over links and in rad, are alike for rounding's sake: below 1e-11
-/// comparisons hold all errors for round-off (harness/judge/demand.h).
+/// comparisons hold all errors for round-off (harness/judge/judge.h).
 constexpr double kRoundOffShare = 1e-11;
 
 constexpr std::string_view kPrefix = "series.final.";

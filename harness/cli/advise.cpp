@@ -1,12 +1,11 @@
 // advise: the cheapest method that meets an error bound.
 #include "harness/advise/advise.h"
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/run/model_error.h"
-#include "harness/run/run_case.h"
-#include "harness/suite/estimate.h"
+#include "harness/run/run.h"
+#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
 namespace {

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "harness/cli/commands.h"
-#include "harness/run/case_identity.h"
-#include "harness/store/store_lock.h"
+#include "harness/run/run.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

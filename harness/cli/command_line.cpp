@@ -10,11 +10,9 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "harness/record/provenance.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
 #include "harness/text/numeric_option.h"
-#include "harness/text/run_program.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 
@@ -55,9 +53,8 @@ std::vector<const CLI::App*> Subcommands(const CLI::App& app) {
 }
 
 std::vector<std::string> CommandNames(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::App* command : Subcommands(app)) names.push_back(command->get_name());
-  return names;
+  return Mapped<std::string>(Subcommands(app),
+                             [](const CLI::App* command) { return command->get_name(); });
 }
 
 std::string Joined(const std::vector<std::string>& words) {

@@ -13,8 +13,8 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/isolation/processes.h"
-#include "harness/record/select.h"
-#include "harness/text/terminal.h"
+#include "harness/record/record.h"
+#include "harness/text/text.h"
 
 namespace CLI {
 class App;

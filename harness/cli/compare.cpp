@@ -3,10 +3,9 @@
 #include <set>
 
 #include "harness/cli/commands.h"
-#include "harness/history/history_page.h"
-#include "harness/judge/statistics.h"
-#include "harness/judge/track.h"
-#include "harness/store/measurements.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

@@ -6,9 +6,8 @@
 #include "harness/config/benchmarks.h"
 #include "harness/config/formulations.h"
 #include "harness/generate/record.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/run_case.h"
-#include "harness/timing/subject.h"
+#include "harness/run/run.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 namespace {

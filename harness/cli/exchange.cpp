@@ -18,13 +18,10 @@
 #include "harness/exchange/import.h"
 #include "harness/integrator/arkode.h"
 #include "harness/isolation/processes.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/run/case_identity.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/view/picture.h"
-#include "harness/view/writers.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
@@ -157,11 +154,10 @@ std::filesystem::path OutOf(const ImportCommand& command) {
 JsonObject Document(const Imported& imported, const ImportCommand& command,
                     const std::filesystem::path& out) {
   const MechanismDescription& description = imported.description;
-  std::vector<JsonObject> notes;
-  for (const ImportNote& note : imported.notes) {
-    notes.push_back(JsonOf("file", note.file, "line", note.line, "element", note.element, "reason",
-                           note.reason, "changes_motion", note.changes_motion));
-  }
+  std::vector<JsonObject> notes = Mapped<JsonObject>(imported.notes, [](const ImportNote& note) {
+    return JsonOf("file", note.file, "line", note.line, "element", note.element, "reason",
+                  note.reason, "changes_motion", note.changes_motion);
+  });
   return JsonOf("file", command.file.string(), "format", imported.format, "mechanism", out.string(),
                 "name", description.name, "space", description.space, "bodies",
                 description.bodies.size() - 1, "joints", description.joints.size(), "forces",
@@ -213,11 +209,7 @@ int Import(ImportCommand& command, const Typed&) {
 }
 
 std::vector<std::string> ExportFormatNames() {
-  std::vector<std::string> names;
-  for (const exchange::ExportFormat& format : exchange::ExportFormats()) {
-    names.emplace_back(format.name);
-  }
-  return names;
+  return Mapped<std::string>(exchange::ExportFormats(), &exchange::ExportFormat::name);
 }
 
 struct ConvertCommand {
@@ -245,10 +237,9 @@ struct ConvertCommand {
 void PrintDocument(const ConvertCommand& command, const std::string& name,
                    const std::filesystem::path& out, const std::vector<std::string>& missing,
                    const std::vector<exchange::Note>& notes) {
-  std::vector<JsonObject> rows;
-  for (const exchange::Note& note : notes) {
-    rows.push_back(JsonOf("loss", note.loss, "text", note.text));
-  }
+  std::vector<JsonObject> rows = Mapped<JsonObject>(notes, [](const exchange::Note& note) {
+    return JsonOf("loss", note.loss, "text", note.text);
+  });
   JsonObject document = JsonOf("file", command.mechanism.string(), "name", name, "to", command.to);
   if (!out.empty()) document.Add("out", out.string());
   PrintJson(Put(document, "missing", missing, "notes", rows));

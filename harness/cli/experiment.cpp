@@ -1,18 +1,16 @@
 // list, check and assemble: files before a run.
 #include <tuple>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/options.h"
 #include "harness/json/file_kind.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/record/measures.h"
-#include "harness/run/run_case.h"
-#include "harness/suite/estimate.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/timing/time_cases.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
+#include "harness/suite/suite.h"
+#include "harness/timing/timing.h"
 #include "mechanism/start/branches.h"
 
 namespace loopbench::harness {
@@ -169,11 +167,10 @@ void AddUnitWarnings(const std::filesystem::path& path, const MechanismDescripti
 /// remedy.
 void AddStarts(const std::filesystem::path& path, const StartReport& report, Checked* checked) {
   for (const std::string& warning : report.warnings) AddWarning(path, warning, checked);
-  std::string text;
-  for (const std::string& fault : report.faults) {
-    text += fmt::format("{}{}: {}", text.empty() ? "" : "\n", path.string(), fault);
-  }
-  if (!text.empty()) throw ConfigError(text + "\n(--no-assembly leaves this check out)");
+  if (report.faults.empty()) return;
+  throw ConfigError(Joined(report.faults, "\n",
+                           [&](const std::string& fault) { return path.string() + ": " + fault; }) +
+                    "\n(--no-assembly leaves this check out)");
 }
 
 Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& command) {

@@ -6,8 +6,8 @@
 #include "harness/config/formulations.h"
 #include "harness/json/file_kind.h"
 #include "harness/observers/registry.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/timing/time_cases.h"
+#include "harness/suite/suite.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 namespace {

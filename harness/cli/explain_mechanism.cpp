@@ -2,11 +2,10 @@
 #include <array>
 #include <numbers>
 
-#include "harness/analysis/model_warnings.h"
-#include "harness/analysis/structure_hints.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/run/case_identity.h"
-#include "harness/trajectory/statics.h"
+#include "harness/run/run.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
 
@@ -194,8 +193,7 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
   for (std::size_t i = 1; i < statics.columns.size(); ++i) {
     const auto& [kind, name, component, unit] = statics.columns[i];
     if (kind != "reaction") {
-      const bool is_ours =
-          std::ranges::find(statics.held, name + ":" + component) != statics.held.end();
+      const bool is_ours = Contains(statics.held, name + ":" + component);
       const bool is_drive = kind == "drive";
       const std::string coordinate =
           is_drive ? component
@@ -232,8 +230,7 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
 
 /// Prints the limits of a coordinate and the positions there; returns 2 if there are none.
 int PrintRange(const MechanismDescription& description, const ExplainView& view) {
-  std::vector<std::string> names;
-  for (const JointDescription& joint : description.joints) names.push_back(joint.name);
+  std::vector<std::string> names = Mapped<std::string>(description.joints, &JointDescription::name);
   const auto found = std::ranges::find(names, view.range);
   if (found == names.end()) {
     const std::string nearest = NearestSpelling(view.range, names);
@@ -262,8 +259,7 @@ int PrintRange(const MechanismDescription& description, const ExplainView& view)
       if (values.joint == joint) continue;
       std::vector<std::string> numbers;
       for (const double number : values.values) numbers.push_back(ShortNumber(number));
-      position.push_back(fmt::format("{} {}", names[static_cast<std::size_t>(values.joint)],
-                                     fmt::join(numbers, " ")));
+      position.push_back(fmt::format("{} {}", names[values.joint], fmt::join(numbers, " ")));
     }
     const char* none = word.is_length() ? "none within ten lengths" : "none within a turn";
     AddRow({is_low ? "low" : "high",
@@ -359,9 +355,9 @@ std::string GivenBy(const MechanismDescription& description, int joint) {
   if (!description.joints[joint].motions.empty()) return "prescribed";
   std::string text;
   const auto has = [joint](const std::vector<JointValues>& list) {
-    return std::ranges::find(list, joint, &JointValues::joint) != list.end();
+    return Contains(list, joint, &JointValues::joint);
   };
-  if (std::ranges::find(initial.held, joint) != initial.held.end()) {
+  if (Contains(initial.held, joint)) {
     text = "fixed";
   } else if (has(initial.coordinates)) {
     text = "guessed";
@@ -450,8 +446,7 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
         ToString(compiled.done), ToString(CompileOptions()));
   }
   if (view.document != nullptr) {
-    std::vector<std::string> texts;
-    for (const Warning& warning : warnings) texts.push_back(warning.text);
+    std::vector<std::string> texts = Mapped<std::string>(warnings, &Warning::text);
     Put(*view.document, "simplifications", compiled.report, "warnings", texts, "hints", hints);
   }
   Say(view, "\nWarnings\n");

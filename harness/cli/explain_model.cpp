@@ -34,12 +34,10 @@ Table BodyTable(const MechanismDescription& description, const Structure& struct
   const auto add = [&](const BodyDescription& body) -> Record& {
     Record& row = table.rows.emplace_back();
     row.Set("name", body.name);
-    std::string points;
-    for (const auto& [name, point] : body.points) {
-      points += fmt::format("{}{} ({})", points.empty() ? "" : ", ", name,
-                            VectorText(point, description.space));
-    }
-    row.Set("points", points);
+    row.Set("points", Joined(body.points, ", ", [&](const auto& point) {
+              return fmt::format("{} ({})", point.first,
+                                 VectorText(point.second, description.space));
+            }));
     return row;
   };
   add(description.bodies[kGround]);
@@ -206,11 +204,9 @@ Table ForceTable(const MechanismDescription& description) {
 Table CouplingTable(const MechanismDescription& description) {
   Table table{.columns = Columns("name=coupling, relation")};
   for (const CouplingDescription& coupling : description.couplings) {
-    std::string text;
-    for (const auto& [joint, ratio] : coupling.parts) {
-      text += fmt::format("{}{} {}", text.empty() ? "" : " + ", ShortNumber(ratio),
-                          description.joints[joint].name);
-    }
+    const std::string text = Joined(coupling.parts, " + ", [&](const auto& part) {
+      return ShortNumber(part.ratio) + " " + description.joints[part.joint].name;
+    });
     AddRow({coupling.name, fmt::format("{} = {}", text, ShortNumber(coupling.offset))}, &table);
   }
   return table;

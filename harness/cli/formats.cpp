@@ -10,8 +10,9 @@
 #include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
 #include "harness/json/json_document.h"
+#include "harness/judge/judge.h"
 #include "harness/judge/rule_schemas.h"
-#include "harness/store/store_lock.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {
@@ -38,11 +39,7 @@ const Kind& KindOf(const std::string& name) {
 
 }  // namespace
 
-std::vector<std::string> SchemaKinds() {
-  std::vector<std::string> names;
-  for (const Kind& kind : Kinds()) names.push_back(kind.name);
-  return names;
-}
+std::vector<std::string> SchemaKinds() { return Mapped<std::string>(Kinds(), &Kind::name); }
 
 std::string SchemaOfKind(const std::string& kind) {
   return SchemaText("Loopbench " + KindOf(kind).title, KindOf(kind).schema());

@@ -1,8 +1,8 @@
 // history: measurements of successive commits.
+#include "harness/history/history.h"
+
 #include "harness/cli/commands.h"
-#include "harness/history/history_page.h"
-#include "harness/history/history_series.h"
-#include "harness/store/measurements.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {
@@ -131,11 +131,10 @@ JsonObject FindingsDocument(const History& history, const HistoryFindings& found
       values.push_back(value.value);
       if (!value.is_steady) unsteady.push_back(commits.back());
     }
-    std::vector<JsonObject> steps;
-    for (const LevelChange& change : one.changes) {
-      steps.push_back(JsonOf("commit", commits[change.at], "before", change.before, "after",
-                             change.after, "confidence", change.Confidence()));
-    }
+    std::vector<JsonObject> steps = Mapped<JsonObject>(one.changes, [&](const LevelChange& change) {
+      return JsonOf("commit", commits[change.at], "before", change.before, "after", change.after,
+                    "confidence", change.Confidence());
+    });
     all.push_back(JsonOf("machine", one.machine, "case", one.one, "measure", one.measure, "unit",
                          one.unit, "commits", commits, "values", values, "at_another_speed",
                          unsteady, "change_points", steps));

@@ -7,12 +7,11 @@
 #include <system_error>
 
 #include "harness/advise/advise.h"
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/record/noise.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/model_error.h"
-#include "harness/text/hash.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"
@@ -29,8 +28,7 @@ ObservedQuantities ObserveIn(const MechanismDescription& description,
                              const ObservedQuantities& observe, bool keeps_facts) {
   ObservedQuantities known = observe;
   const auto is_there = [&](const std::string& body) {
-    return std::ranges::find(description.bodies, body, &BodyDescription::name) !=
-           description.bodies.end();
+    return Contains(description.bodies, body, &BodyDescription::name);
   };
   std::erase_if(known.branch_invariants, [&](const AngleCombination& combination) {
     return !keeps_facts || !std::ranges::all_of(
@@ -80,9 +78,8 @@ std::string CommentOf(const ProblemModel& model, const std::string& whole) {
 }
 
 std::string List(const std::vector<std::string>& lines) {
-  std::string text;
-  for (const std::string& line : lines) text += fmt::format("- {}\n", EscapeMarkdown(line));
-  return text;
+  return Joined(lines, "",
+                [](const std::string& line) { return "- " + EscapeMarkdown(line) + "\n"; });
 }
 
 /// Returns the name of the experiment.
@@ -436,13 +433,13 @@ CausedError ErrorOfModel(const MechanismDescription& whole, const Reference& who
   for (std::size_t body = 1; body < whole.bodies.size(); ++body) {
     for (const auto& [point, at] : whole.bodies[body].points) {
       const std::string name = whole.bodies[body].name + "." + point;
-      if (!names.empty() && std::ranges::find(names, name) == names.end()) continue;
+      if (!names.empty() && !Contains(names, name)) continue;
       const FoundPoint found = FindPoint(model.description, whole.bodies[body].name, point);
       if (found.body < 0) continue;
       ++error.points;
       for (std::size_t k = 0; k < count; ++k) {
         const Frame& X = whole_reference.snapshots[k].bodies[body].pose;
-        const Frame& Y = reference.snapshots[k].bodies[static_cast<std::size_t>(found.body)].pose;
+        const Frame& Y = reference.snapshots[k].bodies[found.body].pose;
         const double off = (X.p + X.R * at - model.R_WC * (Y.p + Y.R * found.at)).norm();
         if (off <= error.largest) continue;
         error.largest = off;

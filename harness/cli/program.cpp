@@ -12,10 +12,8 @@
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
-#include "harness/text/terminal.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 #include "mechanism/model/dense_memory.h"
 
 namespace loopbench {

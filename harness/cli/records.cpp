@@ -5,11 +5,11 @@
 
 #include <fstream>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/figures/judge_figures.h"
-#include "harness/run/run_case.h"
-#include "harness/store/store_lock.h"
+#include "harness/figures/figures.h"
+#include "harness/run/run.h"
+#include "harness/store/store.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {

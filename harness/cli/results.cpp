@@ -2,13 +2,10 @@
 #include <array>
 
 #include "harness/cli/commands.h"
-#include "harness/figures/judge_figures.h"
+#include "harness/figures/figures.h"
 #include "harness/json/json_document.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/reports.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/judge/work_precision.h"
-#include "harness/report/html.h"
+#include "harness/judge/judge.h"
+#include "harness/report/report.h"
 
 namespace loopbench::harness {
 namespace {
@@ -298,10 +295,8 @@ int PrintVerdicts(const VerdictCommand& command, const Typed& typed) {
   if (records.empty()) throw ConfigError(command.store.string() + ": found no records to judge");
   RequireOneContent(records, command.store, "check-claims");
   VerifyFilesOf(records, StoreFile(command.store));
-  std::vector<ClaimResult> results;
-  for (const ClaimRule& rule : ReadClaims(command.claims)) {
-    results.push_back(Evaluate(rule, records));
-  }
+  std::vector<ClaimResult> results = Mapped<ClaimResult>(
+      ReadClaims(command.claims), [&](const ClaimRule& rule) { return Evaluate(rule, records); });
   if (!command.out.empty()) {
     WriteFileAtomically(command.out, ClaimsMarkdown(results, Provenance(typed.line)));
   }
@@ -395,7 +390,7 @@ int PrintWorkPrecision(const WorkPrecisionCommand& command, const Typed& typed) 
 void RejectPictures(const std::filesystem::path& out, const char* expected) {
   constexpr std::array kPictures = {".svg", ".pdf", ".png", ".jpg", ".jpeg", ".eps", ".gif"};
   const std::string ending = out.extension().string();
-  if (std::ranges::find(kPictures, ending) == kPictures.end()) return;
+  if (!Contains(kPictures, ending)) return;
   if (std::filesystem::is_directory(out)) return;
   Reject("--out {}: found the ending \"{}\", expected {}", out.string(), ending, expected);
 }

@@ -1,20 +1,17 @@
 // run, merge and estimate: experiments into a store, stores into one, and the time before.
+#include "harness/run/run.h"
+
 #include <fstream>
 #include <iterator>
 #include <set>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/judge/claims.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/peers.h"
-#include "harness/run/run_case.h"
-#include "harness/store/store_lock.h"
-#include "harness/suite/estimate.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/suite/runner.h"
-#include "harness/text/cpu_time.h"
-#include "harness/timing/time_cases.h"
+#include "harness/judge/judge.h"
+#include "harness/store/store.h"
+#include "harness/suite/suite.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
@@ -337,11 +334,10 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
 
 JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overview,
                         const Plan& plan, const Estimate& estimate) {
-  std::vector<JsonObject> lines;
-  for (const Line& line : plan.lines) {
-    lines.push_back(JsonOf("mechanism", line.mechanism, "method", line.method, "cases", line.cases,
-                           "runs", line.runs, "seconds", line.seconds));
-  }
+  std::vector<JsonObject> lines = Mapped<JsonObject>(plan.lines, [](const Line& line) {
+    return JsonOf("mechanism", line.mechanism, "method", line.method, "cases", line.cases, "runs",
+                  line.runs, "seconds", line.seconds);
+  });
   return JsonOf("file", path, "name", overview.experiments.front().name, "combinations",
                 overview.combinations, "cases", plan.cases, "runs", plan.runs, "accuracy_seconds",
                 plan.seconds, "references", plan.references, "reference_seconds",

@@ -2,7 +2,7 @@
 #include <charconv>
 
 #include "harness/cli/commands.h"
-#include "harness/run/model_error.h"
+#include "harness/run/run.h"
 #include "mechanism/model/mechanism.h"
 #include "mechanism/simplify/restart.h"
 
@@ -68,9 +68,7 @@ struct SimplifyCommand {
 
 /// Returns names of rules, and of the rules with a limit.
 std::vector<std::string> IdeaNames() {
-  std::vector<std::string> names;
-  for (const SimplificationRule& idea : SimplificationRules()) names.emplace_back(idea.name);
-  return names;
+  return Mapped<std::string>(SimplificationRules(), &SimplificationRule::name);
 }
 
 const SimplificationRule& IdeaNamed(const std::string& name, const std::string& option) {
@@ -86,7 +84,7 @@ std::vector<const SimplificationRule*> Chosen(const std::vector<std::string>& on
   for (const std::string& name : only) IdeaNamed(name, "--only");
   std::vector<const SimplificationRule*> chosen;
   for (const SimplificationRule& idea : SimplificationRules()) {
-    const bool wanted = only.empty() || std::ranges::find(only, idea.name) != only.end();
+    const bool wanted = only.empty() || Contains(only, idea.name);
     if (wanted) chosen.push_back(&idea);
   }
   return chosen;

@@ -8,7 +8,6 @@
 
 #include "harness/cli/commands.h"
 #include "harness/json/json_document.h"
-#include "harness/trajectory/check.h"
 
 namespace loopbench::harness {
 namespace {

@@ -14,16 +14,11 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/run/case_identity.h"
-#include "harness/store/result_store.h"
-#include "harness/store/store_lock.h"
+#include "harness/run/run.h"
+#include "harness/store/store.h"
 #include "harness/suite/suite.h"
-#include "harness/suite/workload.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 
@@ -82,9 +77,7 @@ std::vector<std::string> Unlisted(const std::string& text) {
 }
 
 std::vector<std::string> Texts(const std::vector<std::filesystem::path>& paths) {
-  std::vector<std::string> texts;
-  for (const auto& path : paths) texts.push_back(path.string());
-  return texts;
+  return Mapped<std::string>(paths, [](const auto& path) { return path.string(); });
 }
 
 /// Returns the value as written in the file.
@@ -350,7 +343,7 @@ PartProgress ProgressOfPart(const ClusterRun& run, const std::filesystem::path& 
                             double now) {
   PartProgress progress;
   progress.part = part;
-  progress.cases = run.cases[static_cast<std::size_t>(part - 1)];
+  progress.cases = run.cases[part - 1];
   const auto store = PartFolder(folder, part);
   std::unordered_map<std::string, bool> finished;
   std::size_t lines = 0;

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/suite/workload.h"
+#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
 

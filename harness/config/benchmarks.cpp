@@ -13,7 +13,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/json/fields.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/simplify/compile.h"
@@ -49,9 +49,7 @@ const std::vector<SizedFamily>& SizedFamilies() {
 }
 
 std::vector<std::string> NamesOfSizedFamilies() {
-  std::vector<std::string> names;
-  for (const SizedFamily& family : SizedFamilies()) names.push_back(family.name);
-  return names;
+  return Mapped<std::string>(SizedFamilies(), &SizedFamily::name);
 }
 
 std::string TextOfSizedFamilies() {

@@ -15,7 +15,6 @@
 #include "harness/config/options.h"
 #include "harness/config/published_series.h"
 #include "harness/record/record.h"
-#include "harness/record/select.h"
 #include "mechanism/description/topology.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/simplify/compile.h"
@@ -274,7 +273,7 @@ struct Case {
   std::vector<DrawnCoordinate> between = {};  ///< as in the rule
   double branch_bound = 1e-6;                 ///< [rad]
   Limits limits = {};
-  /// CaseKeys() of the case; for runs also "case_id" and "content" (harness/run/case_identity.h).
+  /// CaseKeys() of the case; for runs also "case_id" and "content" (harness/run/run.h).
   /// They are written to the record unchanged.
   Record keys = {};
 };

@@ -6,8 +6,7 @@
 
 #include "harness/config/experiment_sections.h"
 #include "harness/config/options.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -35,11 +34,8 @@ double ReadCoefficient(const JsonNode& node) {
 }
 
 std::vector<double> ReadCoefficients(const JsonNode& node) {
-  std::vector<double> numbers;
-  for (const JsonNode& element : node.Elements("coefficients")) {
-    numbers.push_back(ReadCoefficient(element));
-  }
-  return numbers;
+  return Mapped<double>(node.Elements("coefficients"),
+                        [](const JsonNode& element) { return ReadCoefficient(element); });
 }
 
 FieldValue<TableDraft> Coefficients(std::vector<double> ButcherTable::*member) {

@@ -12,8 +12,7 @@
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 

@@ -9,7 +9,7 @@
 #include "harness/config/options.h"
 #include "harness/json/fields.h"
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -21,15 +21,6 @@ Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
   if (ExpectDocument(root, FileKind::kExperiment))
     ExperimentFileFields().ReadRows(root, &experiment);
   return experiment;
-}
-
-/// "mass = 1, damping = 0.5".
-std::string Described(const Record& parameters) {
-  std::string text;
-  for (const auto& [name, value] : parameters.items()) {
-    text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", name, parameters.Text(name));
-  }
-  return text;
 }
 
 }  // namespace
@@ -110,7 +101,7 @@ class ExperimentSource::Document {
     errors.ThrowIfAny(index == 0 ? ""
                                  : fmt::format("{}: the above in combination {} of {}: {}",
                                                path_.string(), index + 1, sweep_->count(),
-                                               Described(experiment.parameters)));
+                                               experiment.parameters.Described()));
     return experiment;
   }
 

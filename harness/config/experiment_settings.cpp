@@ -11,8 +11,7 @@
 #include "harness/config/experiment.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/published_series.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -248,9 +247,7 @@ void RequireOutput(const JsonNode& node, ExperimentFile& file) {
   }
 }
 
-bool OutputOptions::Has(OutputPart part) const {
-  return std::ranges::find(quantities, part) != quantities.end();
-}
+bool OutputOptions::Has(OutputPart part) const { return Contains(quantities, part); }
 
 std::vector<double> OutputTimes(const OutputOptions& output, double horizon) {
   std::vector<double> times;

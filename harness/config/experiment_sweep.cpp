@@ -8,7 +8,7 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/formulations.h"
-#include "harness/record/measures.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 namespace {

@@ -37,7 +37,7 @@ struct FormulationRow {
   std::vector<Enforcement> levels = {};  ///< available levels; empty: all
   /// Colour of its curves in figures, "#RRGGBB". If empty, the next free colour is assigned.
   std::string color = {};
-  /// Integrator of a peer (harness/run/peers.h), an external program. Tables show it instead of the
+  /// Integrator of a peer (harness/run/run.h), an external program. Tables show it instead of the
   /// experiment's integrator. Empty for formulations. Its factories make the solver for the peer's
   /// states.
   std::string integrator = {};

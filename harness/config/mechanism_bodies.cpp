@@ -4,24 +4,29 @@
 #include <Eigen/Cholesky>
 
 #include "harness/config/mechanism_sections.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {
 namespace {
 
-void ReadPoints(const JsonNode& node, SpaceKind space, BodyDescription* body) {
+using Points = std::map<std::string, Eigen::Vector3d>;
+
+Points ReadPoints(const JsonNode& node, const Draft& draft) {
+  Points points;
   for (const auto& [name, position] : node.Members()) {
     if (name.empty()) position.FailAs("a point without a name", "a name that is not empty");
-    body->points[name] = ReadVector(position, space);
+    points[name] = ReadVector(position, draft);
   }
+  return points;
 }
 
-Json WritePoints(const BodyDescription& body, SpaceKind space) {
-  Json points = Json::object();
-  // names are unique: append, since points[name] would search the list
-  auto& list = points.get_ref<Json::object_t&>();
-  for (const auto& [name, at] : body.points) list.emplace_back(name, WriteVector(at, space));
-  return points.empty() ? Json() : points;
+Json WritePoints(const Points& points, const Draft& draft) {
+  Json written = Json::object();
+  // names are unique: append, since written[name] would search the list
+  auto& list = written.get_ref<Json::object_t&>();
+  for (const auto& [name, at] : points) list.emplace_back(name, WriteVector(at, draft));
+  return written.empty() ? Json() : written;
 }
 
 Json PointsSchema() {
@@ -81,20 +86,6 @@ Json WriteInertia(const Body& body) {
   return json;
 }
 
-void ReadPointsOfBody(const JsonNode& node, Body& body) {
-  ReadPoints(node, body.draft->space, &body);
-}
-
-Json WritePointsOfBody(const Body& body) { return WritePoints(body, body.draft->space); }
-
-void ReadPointsOfGround(const JsonNode& node, Draft& draft) {
-  ReadPoints(node, draft.space, &draft.bodies[kGround]);
-}
-
-Json WritePointsOfGround(const Draft& draft) {
-  return WritePoints(draft.bodies[kGround], draft.space);
-}
-
 const Fields<Body>& BodyFields() {
   static const Json inertia =
       EitherSchema({NumberSchema(kPositive), ArraySchema(NumberSchema(kPositive), 3, 3),
@@ -108,34 +99,21 @@ const Fields<Body>& BodyFields() {
         "Inertia about the centre of mass in body axes [kg m^2]: Izz (isotropic in space), [Ixx, "
         "Iyy, Izz] or the matrix elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].",
         "the inertia about the centre of mass"},
-       {"com", VectorOf(&BodyDescription::com),
+       {"com",
+        Coded<Body>(&BodyDescription::com, VectorSchema(), ReadVector, UnlessZero<WriteVector>),
         "Centre of mass in body axes [m]; default: the body's origin."},
-       {"points", By(PointsSchema(), ReadPointsOfBody, WritePointsOfBody),
+       {"points", Coded<Body>(&BodyDescription::points, PointsSchema(), ReadPoints, WritePoints),
         "Named points in body axes, from the body's origin [m]."}});
   return fields;
 }
 
 const Fields<Draft>& GroundFields() {
+  const auto points = [](auto& draft) -> auto& { return draft.bodies[kGround].points; };
   static const Fields<Draft> fields(
       "ground", "The fixed ground.",
-      {{"points", By(PointsSchema(), ReadPointsOfGround, WritePointsOfGround),
+      {{"points", Coded<Draft>(points, PointsSchema(), ReadPoints, WritePoints),
         "Named points in ground axes, from the origin [m]."}});
   return fields;
-}
-
-void ReadBodies(const JsonNode& node, Draft& draft) {
-  for (const JsonNode& element : node.Elements("bodies", "at least one body")) {
-    draft.bodies.push_back(ReadPart(BodyFields(), element, draft));
-    draft.body_names.Add(draft.bodies.back().name);
-  }
-}
-
-Json WriteBodies(const Draft& draft) {
-  Json bodies = Json::array();
-  for (std::size_t i = kGround + 1; i < draft.bodies.size(); ++i) {
-    bodies.push_back(WritePart(BodyFields(), draft, draft.bodies[i]));
-  }
-  return bodies;
 }
 
 }  // namespace
@@ -143,7 +121,8 @@ Json WriteBodies(const Draft& draft) {
 FieldValue<Draft> GroundValue() { return Section(GroundFields()); }
 
 FieldValue<Draft> BodiesValue() {
-  return By(ArraySchema(BodyFields().Schema(), 1), ReadBodies, WriteBodies);
+  return PartList(&Draft::bodies, BodyFields(), &Draft::body_names,
+                  {.what = "bodies", .least = "at least one body", .first = kGround + 1});
 }
 
 // "joints" of a mechanism file.
@@ -153,14 +132,6 @@ namespace {
 using Side = PartOf<JointSide>;
 using Joint = PartOf<JointDescription>;
 
-void ReadSideRotation(const JsonNode& node, Side& side) {
-  side.rotation = ReadRotation(node, side.draft->space);
-}
-
-Json WriteSideRotation(const Side& side) {
-  return side.rotation.isZero(0.0) ? Json() : WriteRotation(side.rotation);
-}
-
 const Fields<Side>& SideFields() {
   static const Fields<Side> fields(
       "side", "Frame of a joint, fixed to a body.",
@@ -168,7 +139,9 @@ const Fields<Side>& SideFields() {
         "the name of a body or \"ground\""},
        {"at", PlaceOf<JointSide>(&JointSide::body, &JointSide::position),
         "Origin: a point of the body by name, or body coordinates [m]. Default: body origin."},
-       {"rotation", By(RotationSchema(), ReadSideRotation, WriteSideRotation),
+       {"rotation",
+        Coded<Side>(&JointSide::rotation, RotationSchema(), ReadRotation,
+                    UnlessZero<WriteRotation>),
         "Rotation from body to frame [rad]: angle about z, or rotation vector; default: 0."}});
   return fields;
 }
@@ -191,9 +164,7 @@ void ReadAxis(const JsonNode& node, Joint& joint) {
   }
 }
 
-Json WriteAxis(const Joint& joint) {
-  return joint.axis.isZero(0.0) ? Json() : WriteVector(joint.axis, joint.draft->space);
-}
+Json WriteAxis(const Joint& joint) { return UnlessZero<WriteVector>(joint.axis, *joint.draft); }
 
 Range RangeOf(const JointParameter& parameter) { return parameter.positive ? kPositive : Range{}; }
 
@@ -374,36 +345,20 @@ const Fields<Joint>& JointFields() {
   return fields;
 }
 
-void ReadJoints(const JsonNode& node, Draft& draft) {
-  JointDescription unread;
-  unread.from.body = unread.to.body = -1;  // unknown: differs from every other side
-  for (const JsonNode& element : node.Elements("joints")) {
-    draft.joints.push_back(ReadPart(JointFields(), element, draft, unread));
-    draft.joint_names.Add(draft.joints.back().name);
-  }
-}
-
-Json WriteJoints(const Draft& draft) {
-  Json joints = Json::array();
-  for (const JointDescription& joint : draft.joints) {
-    joints.push_back(WritePart(JointFields(), draft, joint));
-  }
-  return joints;
-}
-
 }  // namespace
 
 const NameList& JointTypeNames() {
   static const NameList kNames = [] {
-    std::vector<std::string> names;
-    for (const JointTraits& traits : AllJointTraits()) names.emplace_back(traits.name);
-    return names;
+    return Mapped<std::string>(AllJointTraits(), &JointTraits::name);
   }();
   return kNames;
 }
 
 FieldValue<Draft> JointsValue() {
-  return By(ArraySchema(JointFields().Schema()), ReadJoints, WriteJoints);
+  JointDescription unread;
+  unread.from.body = unread.to.body = -1;  // unknown: differs from every other side
+  return PartList(&Draft::joints, JointFields(), &Draft::joint_names,
+                  {.what = "joints", .start = unread});
 }
 
 // "couplings" of a mechanism file.
@@ -422,7 +377,7 @@ void ReadCoefficients(const JsonNode& node, Coupling& coupling) {
     if (ratio == 0.0 && value.value().is_number()) value.Fail("a number that is not 0");
     const auto joint = draft.joint_names.Find(name);
     if (!joint) continue;
-    const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
+    const JointDescription& described = draft.joints[*joint];
     if (NumValues(described.type, draft.space, false) != 1) {
       value.FailAs(fmt::format("\"{}\" ({})", name, ToString(described.type)),
                    "a joint with one coordinate (revolute, prismatic or helical)");
@@ -440,7 +395,7 @@ void ReadCoefficients(const JsonNode& node, Coupling& coupling) {
 Json WriteCoefficients(const Coupling& coupling) {
   Json written = Json::object();
   for (const auto& [joint, ratio] : coupling.parts) {
-    written[coupling.draft->joints[static_cast<std::size_t>(joint)].name] = ratio;
+    written[coupling.draft->joints[joint].name] = ratio;
   }
   return written;
 }
@@ -462,27 +417,17 @@ const Fields<Coupling>& CouplingFields() {
   return fields;
 }
 
-void ReadCouplings(const JsonNode& node, Draft& draft) {
-  draft.coupling_names = draft.joint_names;  // records name both alike
-  for (const CouplingDescription& known : draft.couplings) draft.coupling_names.Add(known.name);
-  for (const JsonNode& element : node.Elements("couplings")) {
-    draft.couplings.push_back(ReadPart(CouplingFields(), element, draft));
-    draft.coupling_names.Add(draft.couplings.back().name);
-  }
-}
-
-Json WriteCouplings(const Draft& draft) {
-  Json couplings = Json::array();
-  for (const CouplingDescription& coupling : draft.couplings) {
-    couplings.push_back(WritePart(CouplingFields(), draft, coupling));
-  }
-  return couplings.empty() ? Json() : couplings;
-}
-
 }  // namespace
 
 FieldValue<Draft> CouplingsValue() {
-  return By(ArraySchema(CouplingFields().Schema()), ReadCouplings, WriteCouplings);
+  FieldValue<Draft> list = PartList(&Draft::couplings, CouplingFields(), &Draft::coupling_names,
+                                    {.what = "couplings", .is_always_there = false});
+  list.read = [read = list.read](const JsonNode& node, Draft& draft) {
+    draft.coupling_names = draft.joint_names;  // records name both alike
+    for (const CouplingDescription& known : draft.couplings) draft.coupling_names.Add(known.name);
+    read(node, draft);
+  };
+  return list;
 }
 
 }  // namespace loopbench::harness

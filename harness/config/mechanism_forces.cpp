@@ -2,12 +2,26 @@
 #include <fmt/format.h>
 
 #include "harness/config/mechanism_sections.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
 
 using Force = PartOf<ForceDescription>;
 using Rows = std::vector<Field<Force>>;
+
+/// Field for a value of a force, as Coded(): `get(parts)` refers to it.
+template <class Get, class Read, class Write>
+FieldValue<Force> OfForce(Get get, Json schema, Read read, Write write) {
+  return {
+      std::move(schema),
+      [=](const JsonNode& node, Force& force) { get(PartsOf(force)) = read(node, *force.draft); },
+      nullptr,
+      [=](const Force& force) {
+        ForceDescription copy = force;
+        return write(get(PartsOf(copy)), *force.draft);
+      }};
+}
 
 /// Reads the joint of a force, which must have exactly one coordinate.
 void ReadJoint(const JsonNode& node, Force& force) {
@@ -60,17 +74,14 @@ void CheckEnds(const JsonNode& node, Force& force) {
 void AddEnds(Rows* rows) {
   constexpr const char* kEnd = "an object with keys \"body\", \"at\"";
   const auto end = [](std::size_t i) {
-    return FieldValue<Force>{EndFields().Schema(),
-                             [i](const JsonNode& node, Force& force) {
-                               BodyPoint& point = *PartsOf(force).points[i];
-                               point = ReadPart(EndFields(), node, *force.draft, point);
-                             },
-                             nullptr,
-                             [i](const Force& force) {
-                               ForceDescription copy = force;
-                               return WritePart(EndFields(), *force.draft,
-                                                *PartsOf(copy).points[i]);
-                             }};
+    return OfForce(
+        [i](const ForceParts& parts) -> auto& { return *parts.points[i]; }, EndFields().Schema(),
+        [](const JsonNode& node, const Draft& draft) {
+          return ReadPart(EndFields(), node, draft, {.body = -1});  // unknown
+        },
+        [](const BodyPoint& point, const Draft& draft) {
+          return WritePart(EndFields(), draft, point);
+        });
   };
   rows->push_back({"from", end(0), "First end point.", kEnd});
   rows->push_back({"to", end(1), "Second end point, on another body.", kEnd});
@@ -91,30 +102,22 @@ FieldValue<Force> OneOf(const std::vector<std::string>& keys) {
 
 void AddVector(Rows* rows) {
   rows->push_back({"force",
-                   {VectorSchema(),
-                    [](const JsonNode& node, Force& force) {
-                      *PartsOf(force).force = ReadVector(node, force.draft->space);
-                    },
-                    nullptr,
-                    [](const Force& force) {
-                      ForceDescription copy = force;
-                      return WriteVector(*PartsOf(copy).force, force.draft->space);
-                    }},
-                   "Force [N].",
-                   "an array of 2 or 3 numbers [N]"});
+                   OfForce(
+                       [](const ForceParts& parts) -> auto& { return *parts.force; },
+                       VectorSchema(), ReadVector, WriteVector),
+                   "Force [N].", "an array of 2 or 3 numbers [N]"});
   static const NameList axes = {"ground", "body"};
-  rows->push_back({"axes",
-                   {ChoiceSchema(axes.all()),
-                    [](const JsonNode& node, Force& force) {
-                      const auto index = node.Choice(axes, "the axes of the force");
-                      if (index) *PartsOf(force).in_body_axes = *index == 1;
-                    },
-                    [](const Force&) { return Json(axes.all().front()); },
-                    [](const Force& force) {
-                      ForceDescription copy = force;
-                      return *PartsOf(copy).in_body_axes ? Json(axes.all().back()) : Json();
-                    }},
-                   "Axes of the force; body: the force turns with the body."});
+  FieldValue<Force> value = OfForce(
+      [](const ForceParts& parts) -> auto& { return *parts.in_body_axes; },
+      ChoiceSchema(axes.all()),
+      [](const JsonNode& node, const Draft&) {
+        return node.Choice(axes, "the axes of the force").value_or(0) == 1;
+      },
+      [](bool in_body_axes, const Draft&) {
+        return in_body_axes ? Json(axes.all().back()) : Json();
+      });
+  value.show = [](const Force&) { return Json(axes.all().front()); };
+  rows->push_back({"axes", value, "Axes of the force; body: the force turns with the body."});
 }
 
 void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
@@ -157,18 +160,16 @@ Fields<Force> FieldsOf(ForceDescription kind) {
   if (!one_of.empty()) rows.push_back({"", OneOf(one_of)});
   if (parts.force != nullptr) AddVector(&rows);
   if (parts.value != nullptr) {
-    rows.push_back({"value",
-                    {TimeFunctionSchema(),
-                     [](const JsonNode& node, Force& force) {
-                       *PartsOf(force).value = ReadTimeFunction(node);
-                     },
-                     nullptr,
-                     [](const Force& force) {
-                       ForceDescription copy = force;
-                       return WriteTimeFunction(*PartsOf(copy).value);
-                     }},
-                    "Moment [N m] or force [N] on the joint's second body.",
-                    "a number or a function of time"});
+    rows.push_back(
+        {"value",
+         OfForce(
+             [](const ForceParts& of) -> auto& { return *of.value; }, TimeFunctionSchema(),
+             [](const JsonNode& node, const Draft&) { return ReadTimeFunction(node); },
+             [](const TimeFunctionDescription& value, const Draft&) {
+               return WriteTimeFunction(value);
+             }),
+         "Moment [N m] or force [N] on the joint's second body.",
+         "a number or a function of time"});
   }
   for (std::size_t i = 0; i < parts.numbers.size(); ++i) AddNumber(parts, i, &rows);
   return {std::string(parts.name), std::string(parts.sentence), std::move(rows)};
@@ -177,9 +178,8 @@ Fields<Force> FieldsOf(ForceDescription kind) {
 /// Returns fields in the order of ForceKinds().
 const std::vector<Fields<Force>>& AllFields() {
   static const std::vector<Fields<Force>> all = [] {
-    std::vector<Fields<Force>> fields;
-    for (const ForceDescription& kind : ForceKinds()) fields.push_back(FieldsOf(kind));
-    return fields;
+    return Mapped<Fields<Force>>(ForceKinds(),
+                                 [](const ForceDescription& kind) { return FieldsOf(kind); });
   }();
   return all;
 }
@@ -226,8 +226,7 @@ Json WriteForces(const Draft& draft) {
 }  // namespace
 
 FieldValue<Draft> ForcesValue() {
-  std::vector<Json> kinds;
-  for (const Fields<Force>& fields : AllFields()) kinds.push_back(fields.Schema());
+  std::vector<Json> kinds = Mapped<Json>(AllFields(), &Fields<Force>::Schema);
   return By(ArraySchema(Named("force", EitherSchema(kinds))), ReadForces, WriteForces);
 }
 

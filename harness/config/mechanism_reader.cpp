@@ -10,35 +10,35 @@
 #include "harness/config/mechanism_sections.h"
 #include "harness/json/fields.h"
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "mechanism/start/poses.h"
 
 namespace loopbench::harness {
 
-Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space) {
+Eigen::Vector3d ReadVector(const JsonNode& node, const Draft& draft) {
   const Eigen::Vector3d vector = node.Vector();
-  if (space == SpaceKind::kPlanar && vector.z() != 0.0) {
+  if (draft.space == SpaceKind::kPlanar && vector.z() != 0.0) {
     node.FailWithCure(kSpatialCure, "z = 0 in a planar mechanism");
   }
   return vector;
 }
 
-Json WriteVector(const Eigen::Vector3d& vector, SpaceKind space) {
+Json WriteVector(const Eigen::Vector3d& vector, const Draft& draft) {
   Json json = {vector.x(), vector.y()};
-  if (space == SpaceKind::kSpatial || vector.z() != 0.0) json.push_back(vector.z());
+  if (draft.space == SpaceKind::kSpatial || vector.z() != 0.0) json.push_back(vector.z());
   return json;
 }
 
-Json WritePoint(const Eigen::Vector3d& at, const BodyDescription& body, SpaceKind space) {
-  for (const auto& [name, point] : body.points) {
+Json WritePoint(const Eigen::Vector3d& at, int body, const Draft& draft) {
+  for (const auto& [name, point] : draft.bodies[body].points) {
     if (point == at) return name;
   }
-  return at.isZero(0.0) ? Json() : WriteVector(at, space);
+  return UnlessZero<WriteVector>(at, draft);
 }
 
-Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space) {
-  if (node.value().is_array()) return ReadVector(node, space);
+Eigen::Vector3d ReadPoint(const JsonNode& node, int index, const Draft& draft) {
+  const BodyDescription& body = draft.bodies[index];
+  if (node.value().is_array()) return ReadVector(node, draft);
   if (node.value().is_string()) {
     const auto point = body.points.find(node.value().get_ref<const std::string&>());
     if (point != body.points.end()) return point->second;
@@ -63,20 +63,20 @@ std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft) {
   return node.Choice(draft.joint_names, "a joint");
 }
 
-Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space) {
+Eigen::Vector3d ReadRotation(const JsonNode& node, const Draft& draft) {
   if (node.value().is_number()) return {0.0, 0.0, node.Number()};
   if (!node.value().is_array() || node.value().size() != 3) {
     node.Fail("a number (rotation about z) or an array of 3 numbers [rad]");
     return Eigen::Vector3d::Zero();
   }
   const Eigen::Vector3d turn = node.Vector();
-  if (space == SpaceKind::kPlanar && (turn.x() != 0.0 || turn.y() != 0.0)) {
+  if (draft.space == SpaceKind::kPlanar && (turn.x() != 0.0 || turn.y() != 0.0)) {
     node.FailWithCure(kSpatialCure, "a rotation about z in a planar mechanism");
   }
   return turn;
 }
 
-Json WriteRotation(const Eigen::Vector3d& turn) {
+Json WriteRotation(const Eigen::Vector3d& turn, const Draft&) {
   if (turn.x() == 0.0 && turn.y() == 0.0) return turn.z();
   return {turn.x(), turn.y(), turn.z()};
 }
@@ -126,7 +126,7 @@ std::vector<JointValues> ReadJointValues(const JsonNode& section, const Draft& d
   for (const auto& [name, node] : section.Members()) {
     const auto joint = draft.joint_names.Find(name);
     if (!joint) continue;
-    const JointDescription& described = draft.joints[static_cast<std::size_t>(*joint)];
+    const JointDescription& described = draft.joints[*joint];
     const int expected = NumValues(described.type, draft.space, speeds);
     if (expected == 1 && !described.motions.empty()) {
       node.FailAs(fmt::format("a value of \"{}\", whose motion is prescribed", described.name),
@@ -211,19 +211,17 @@ void CheckIndependentName(const JsonNode& node, const std::string& name, const S
 
 using Form = PartOf<PendulumForm>;
 
-void ReadFormBody(const JsonNode& node, Form& form) {
-  const auto index = ReadBodyName(node, *form.draft);
-  if (index) form.body = form.draft->bodies[*index].name;
-}
-
-Json WriteFormBody(const Form& form) { return form.body; }
-
 const Fields<Form>& PendulumFields() {
+  const auto read_body = [](const JsonNode& node, const Draft& draft) {
+    const auto index = ReadBodyName(node, draft);
+    return index ? draft.bodies[*index].name : "";
+  };
+  const auto write_body = [](const std::string& body, const Draft&) { return Json(body); };
   static const Fields<Form> fields(
       "closed_form", "Closed-form motion of one body: a simple pendulum.",
       {{"type", Constant<Form>("pendulum", "a closed form"), "Closed-form type.", "\"pendulum\""},
-       {"body", By(TextSchema(), ReadFormBody, WriteFormBody), "Body whose angle is theta.",
-        "the name of a body"},
+       {"body", Coded<Form>(&PendulumForm::body, TextSchema(), read_body, write_body),
+        "Body whose angle is theta.", "the name of a body"},
        {"down_angle", Number(&PendulumForm::down_angle),
         "Absolute angle of the body at theta = 0 [rad].", "a number [rad]"},
        {"frequency_squared", Number(&PendulumForm::frequency_squared, kPositive),
@@ -310,18 +308,6 @@ Json WriteWeights(const Draft& draft) {
 
 using Target = PartOf<PoseTarget>;
 
-void ReadAt(const JsonNode& node, Target& target) {
-  target.at = ReadVector(node, target.draft->space);
-}
-Json WriteAt(const Target& target) {
-  return target.at ? WriteVector(*target.at, target.draft->space) : Json();
-}
-void ReadTurn(const JsonNode& node, Target& target) {
-  target.rotation = ReadRotation(node, target.draft->space);
-}
-Json WriteTurn(const Target& target) {
-  return target.rotation ? WriteRotation(*target.rotation) : Json();
-}
 void CheckTarget(const JsonNode& node, Target& target) {
   if (!target.at && !target.rotation) node.FailAs("neither", "\"at\", \"rotation\" or both");
 }
@@ -333,8 +319,10 @@ const Fields<Target>& TargetFields() {
         "the name of a body"},
        {"point", PlaceOf<PoseTarget>(&PoseTarget::body, &PoseTarget::point),
         "A point of the body by name, or body coordinates [m]. Default: body origin."},
-       {"at", By(VectorSchema(), ReadAt, WriteAt), "Position of the point in ground axes [m]."},
-       {"rotation", By(RotationSchema(), ReadTurn, WriteTurn),
+       {"at", Coded<Target>(&PoseTarget::at, VectorSchema(), ReadVector, IfAny<WriteVector>),
+        "Position of the point in ground axes [m]."},
+       {"rotation",
+        Coded<Target>(&PoseTarget::rotation, RotationSchema(), ReadRotation, IfAny<WriteRotation>),
         "Rotation of the body's axes from ground axes [rad]: angle about z, or rotation vector."},
        {"fixed", Bool<Target>(&PoseTarget::fixed), "If true, the start meets it exactly."},
        {"weight", Number<Target>(&PoseTarget::weight, kPositive),
@@ -359,34 +347,30 @@ Json WritePoses(const Draft& draft) {
 
 void ReadBranch(const JsonNode& node, Draft& draft) {
   for (const JsonNode& element : node.Elements("combinations of body angles")) {
-    draft.observe.branch_invariants.push_back(ReadCombination(element, draft));
+    draft.branch_invariants.push_back(ReadCombination(element, draft));
   }
 }
 
 Json WriteBranch(const Draft& draft) {
   Json branch = Json::array();
-  for (const AngleCombination& combination : draft.observe.branch_invariants) {
+  for (const AngleCombination& combination : draft.branch_invariants) {
     Json& written = branch.emplace_back(Json::object());
     for (const auto& [body, coefficient] : combination) written[body] = coefficient;
   }
   return branch.empty() ? Json() : branch;
 }
 
-void ReadClosedForm(const JsonNode& node, Draft& draft) {
-  draft.observe.closed_form = ReadPart(PendulumFields(), node, draft);
+std::optional<PendulumForm> ReadClosedForm(const JsonNode& node, const Draft& draft) {
+  return ReadPart(PendulumFields(), node, draft);
 }
 
-Json WriteClosedForm(const Draft& draft) {
-  const std::optional<PendulumForm>& form = draft.observe.closed_form;
+Json WriteClosedForm(const std::optional<PendulumForm>& form, const Draft& draft) {
   return form ? WritePart(PendulumFields(), draft, *form) : Json();
 }
 
-void ReadLength(const JsonNode& node, Draft& draft) {
-  draft.observe.length = node.Number(kPositive);
-}
+double ReadLength(const JsonNode& node, const Draft&) { return node.Number(kPositive); }
 
-Json WriteLength(const Draft& draft) {
-  const double length = draft.observe.length;
+Json WriteLength(double length, const Draft&) {
   return length == ObservedQuantities{}.length ? Json() : Json(length);
 }
 
@@ -405,12 +389,14 @@ const Fields<Expectation>& ExpectationFields() {
   return fields;
 }
 
-void ReadExpect(const JsonNode& node, Draft& draft) {
-  ExpectationFields().Read(node, &draft.observe.expected.emplace());
+std::optional<Expectation> ReadExpect(const JsonNode& node, const Draft&) {
+  Expectation expected;
+  ExpectationFields().Read(node, &expected);
+  return expected;
 }
 
-Json WriteExpect(const Draft& draft) {
-  return draft.observe.expected ? ExpectationFields().Write(*draft.observe.expected) : Json();
+Json WriteExpect(const std::optional<Expectation>& expected, const Draft&) {
+  return expected ? ExpectationFields().Write(*expected) : Json();
 }
 
 }  // namespace
@@ -439,8 +425,9 @@ const Fields<Draft>& ObservationFields() {
       {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch, WriteBranch),
         "Linear combinations of absolute body angles, by body, that are constant on the correct "
         "branch."},
-       {"closed_form", By(PendulumFields().Schema(), ReadClosedForm, WriteClosedForm)},
-       {"length", By(NumberSchema(kPositive), ReadLength, WriteLength),
+       {"closed_form", Coded<Draft>(&Draft::closed_form, PendulumFields().Schema(), ReadClosedForm,
+                                    WriteClosedForm)},
+       {"length", Coded<Draft>(&Draft::length, NumberSchema(kPositive), ReadLength, WriteLength),
         "Characteristic bar length [m]; default: 1."}});
   return fields;
 }
@@ -448,12 +435,6 @@ const Fields<Draft>& ObservationFields() {
 // The whole file.
 
 namespace {
-
-void ReadGravity(const JsonNode& node, Draft& draft) {
-  draft.gravity = ReadVector(node, draft.space);
-}
-
-Json WriteGravity(const Draft& draft) { return WriteVector(draft.gravity, draft.space); }
 
 // without bodies, every reference to a body would be a consequential error
 bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
@@ -477,7 +458,7 @@ const Fields<Draft>& MechanismFileFields() {
            {"comment", Text(&Draft::comment), "Free text for readers."},
            {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
             "planar: all motion is in the x-y plane, and third components are 0."},
-           {"gravity", By(VectorSchema(), ReadGravity, WriteGravity),
+           {"gravity", Coded<Draft>(&Draft::gravity, VectorSchema(), ReadVector, WriteVector),
             "Acceleration of gravity [m/s^2] in ground axes.",
             "an array of 2 or 3 numbers [m/s^2]"},
            {"ground", GroundValue()},
@@ -495,7 +476,8 @@ const Fields<Draft>& MechanismFileFields() {
             "Loops with smaller gaps are closed; constraints with smaller differences are "
             "redundant."},
            {"known_solution", Section(ObservationFields())},
-           {"expect", By(ExpectationFields().Schema(), ReadExpect, WriteExpect)}}));
+           {"expect", Coded<Draft>(&Draft::expected, ExpectationFields().Schema(), ReadExpect,
+                                   WriteExpect)}}));
   return fields;
 }
 
@@ -531,7 +513,7 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
     MechanismFileFields().ReadRows(root, &draft);
     MeetTargets(root, draft);
   }
-  result.observe = std::move(draft.observe);
+  result.observe = std::move(static_cast<ObservedQuantities&>(draft));
   result.description = std::move(static_cast<MechanismDescription&>(draft));
   return result;
 }
@@ -542,7 +524,7 @@ std::string MechanismText(const MechanismDescription& description,
   Draft draft;
   static_cast<MechanismDescription&>(draft) = description;
   draft.bodies[kGround].name = "ground";
-  draft.observe = observe;
+  static_cast<ObservedQuantities&>(draft) = observe;
   draft.comment = comment;
   std::string text = JsonText(MechanismFileFields().Write(draft));
   ParseMechanism(text, description.name + " (written)");

@@ -20,11 +20,10 @@ namespace loopbench::harness {
 
 /// Mechanism file being read, with names in the order of its lists. Lookup of names takes constant
 /// time, so that reading is linear in the size of the file.
-struct Draft : MechanismDescription {
+struct Draft : MechanismDescription, ObservedQuantities {
   NameList body_names;  ///< ground first
   NameList joint_names;
   NameList coupling_names;
-  ObservedQuantities observe;
   std::string comment;
 };
 
@@ -33,6 +32,11 @@ template <class T>
 struct PartOf : T {
   const Draft* draft = nullptr;
 };
+inline const Draft& DraftOf(const Draft& draft) { return draft; }
+template <class T>
+const Draft& DraftOf(const PartOf<T>& part) {
+  return *part.draft;
+}
 
 /// Cure for non-planar values in a file without "space".
 inline constexpr std::string_view kSpatialCure = "\"space\": \"spatial\" at the top level";
@@ -49,6 +53,8 @@ FieldValue<Draft> ForcesValue();
 const Fields<Draft>& InitialFields();
 const Fields<Draft>& ObservationFields();
 
+// Readers and writers of values. Writers return null for values that a file leaves out.
+
 /// Reads a number (a constant), or an object with "type" polynomial, harmonic or table. Returns a
 /// placeholder after an error.
 TimeFunctionDescription ReadTimeFunction(const JsonNode& node);
@@ -56,23 +62,43 @@ TimeFunctionDescription ReadTimeFunction(const JsonNode& node);
 Json WriteTimeFunction(const TimeFunctionDescription& function);
 Json TimeFunctionSchema();
 /// Reads two or three numbers; reports a third number that is not zero in the plane.
-Eigen::Vector3d ReadVector(const JsonNode& node, SpaceKind space);
+Eigen::Vector3d ReadVector(const JsonNode& node, const Draft& draft);
 /// Writes two numbers in the plane if the third is zero, otherwise three.
-Json WriteVector(const Eigen::Vector3d& vector, SpaceKind space);
+Json WriteVector(const Eigen::Vector3d& vector, const Draft& draft);
 /// Reads an angle about z, or a rotation vector of three numbers.
-Eigen::Vector3d ReadRotation(const JsonNode& node, SpaceKind space);
+Eigen::Vector3d ReadRotation(const JsonNode& node, const Draft& draft);
 /// Writes the angle if the rotation is about z.
-Json WriteRotation(const Eigen::Vector3d& turn);
+Json WriteRotation(const Eigen::Vector3d& turn, const Draft& draft);
 Json RotationSchema();
-/// Writes the name of the body's point at this position, otherwise the vector.
-Json WritePoint(const Eigen::Vector3d& at, const BodyDescription& body, SpaceKind space);
-/// Reads a point: the name of a point of the body, or a vector.
-Eigen::Vector3d ReadPoint(const JsonNode& node, const BodyDescription& body, SpaceKind space);
 Json PlaceSchema();
 /// Reads the name of a body, including "ground", and returns its index.
 std::optional<int> ReadBodyName(const JsonNode& node, const Draft& draft);
 /// Reads the name of a joint and returns its index.
 std::optional<int> ReadJointName(const JsonNode& node, const Draft& draft);
+/// Reads a point: the name of a point of the body, or a vector.
+Eigen::Vector3d ReadPoint(const JsonNode& node, int body, const Draft& draft);
+/// Writes the name of the body's point at this position, otherwise the vector.
+Json WritePoint(const Eigen::Vector3d& at, int body, const Draft& draft);
+
+/// Writers that leave out zeros, and values that are not there.
+template <Json (*write)(const Eigen::Vector3d&, const Draft&)>
+Json UnlessZero(const Eigen::Vector3d& vector, const Draft& draft) {
+  return vector.isZero(0.0) ? Json() : write(vector, draft);
+}
+template <Json (*write)(const Eigen::Vector3d&, const Draft&)>
+Json IfAny(const std::optional<Eigen::Vector3d>& vector, const Draft& draft) {
+  return vector ? write(*vector, draft) : Json();
+}
+
+/// Field for the value that `get(owner)` refers to, by `read(node, draft)` and `write(value,
+/// draft)`.
+template <class T, class Get, class Read, class Write>
+FieldValue<T> Coded(Get get, Json schema, Read read, Write write) {
+  return {
+      std::move(schema),
+      [=](const JsonNode& node, T& owner) { std::invoke(get, owner) = read(node, DraftOf(owner)); },
+      nullptr, [=](const T& owner) { return write(std::invoke(get, owner), DraftOf(owner)); }};
+}
 
 /// Reads a part; `start` contains the defaults.
 template <class T>
@@ -107,6 +133,38 @@ FieldValue<PartOf<Owner>> Part(T Owner::*member, const Fields<PartOf<T>>& fields
           }};
 }
 
+/// Rules of a list of parts.
+template <class T>
+struct PartRules {
+  const char* what;             ///< the elements in messages: "joints"
+  const char* least = "";       ///< as for JsonNode::Elements()
+  std::size_t first = 0;        ///< index of the first part of a file
+  bool is_always_there = true;  ///< also without parts
+  T start = {};                 ///< defaults of a part
+};
+
+/// Field for a list of parts with names, which are added to `names`.
+template <class T>
+FieldValue<Draft> PartList(std::vector<T> MechanismDescription::*list,
+                           const Fields<PartOf<T>>& fields, NameList Draft::*names,
+                           const PartRules<T>& rules) {
+  return {ArraySchema(fields.Schema(), *rules.least == '\0' ? 0 : 1),
+          [=, &fields](const JsonNode& node, Draft& draft) {
+            for (const JsonNode& element : node.Elements(rules.what, rules.least)) {
+              (draft.*list).push_back(ReadPart(fields, element, draft, rules.start));
+              (draft.*names).Add((draft.*list).back().name);
+            }
+          },
+          nullptr,
+          [=, &fields](const Draft& draft) {
+            Json parts = Json::array();
+            for (std::size_t i = rules.first; i < (draft.*list).size(); ++i) {
+              parts.push_back(WritePart(fields, draft, (draft.*list)[i]));
+            }
+            return parts.empty() && !rules.is_always_there ? Json() : parts;
+          }};
+}
+
 /// Field for a name that `taken` does not contain.
 template <class T>
 FieldValue<PartOf<T>> NewName(std::string T::*member, NameList Draft::*taken) {
@@ -117,19 +175,6 @@ FieldValue<PartOf<T>> NewName(std::string T::*member, NameList Draft::*taken) {
               node.Fail("a name that is not in use yet");
           },
           nullptr, [=](const PartOf<T>& owner) { return Json(owner.*member); }};
-}
-
-template <class T>
-FieldValue<PartOf<T>> VectorOf(Eigen::Vector3d T::*member) {
-  return {VectorSchema(),
-          [=](const JsonNode& node, PartOf<T>& owner) {
-            owner.*member = ReadVector(node, owner.draft->space);
-          },
-          nullptr,
-          [=](const PartOf<T>& owner) {
-            const Eigen::Vector3d& vector = owner.*member;
-            return vector.isZero(0.0) ? Json() : WriteVector(vector, owner.draft->space);
-          }};
 }
 
 template <class T>
@@ -164,15 +209,12 @@ FieldValue<PartOf<T>> PlaceOf(GetBody body, Get get) {
             T& part = owner;
             const int index = std::invoke(body, part);
             if (index < 0) return;
-            const Draft& draft = *owner.draft;
-            std::invoke(get, part) = ReadPoint(node, draft.bodies[index], draft.space);
+            std::invoke(get, part) = ReadPoint(node, index, *owner.draft);
           },
           nullptr,
           [=](const PartOf<T>& owner) {
             T part = owner;
-            const int index = std::invoke(body, part);
-            return WritePoint(std::invoke(get, part), owner.draft->bodies[index],
-                              owner.draft->space);
+            return WritePoint(std::invoke(get, part), std::invoke(body, part), *owner.draft);
           }};
 }
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {
@@ -88,17 +88,9 @@ const Profile* FindProfile(std::string_view name) {
   return found == Rows().end() ? nullptr : &*found;
 }
 
-std::vector<std::string> ProfileNames() {
-  std::vector<std::string> names;
-  for (const NamedProfile& profile : kNamed) names.emplace_back(profile.name);
-  return names;
-}
+std::vector<std::string> ProfileNames() { return Mapped<std::string>(kNamed, &NamedProfile::name); }
 
-std::vector<std::string> IntegratorNames() {
-  std::vector<std::string> names;
-  for (const Profile& profile : Rows()) names.push_back(profile.name);
-  return names;
-}
+std::vector<std::string> IntegratorNames() { return Mapped<std::string>(Rows(), &Profile::name); }
 
 std::optional<TableFault> FaultOfIntegrator(const ButcherTable& table) {
   constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789_-";

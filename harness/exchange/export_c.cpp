@@ -108,122 +108,10 @@ Branches JacobianOf(const Branches& derivative, const CodeRequest& request) {
   return jacobian;
 }
 
-constexpr const char* kHeaderBegin = R"(
-/* Equations of motion. State y: positions, then speeds. Every function that returns int returns 0,
-   or 1 if the state takes a branch that was not generated; then its results are unspecified. */
-#ifndef @UP@_H
-#define @UP@_H
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-enum {
-  @UP@_STATES = @STATES@,
-  @UP@_POSITIONS = @POSITIONS@,
-  @UP@_BODIES = @BODIES@,
-  @UP@_CONSTRAINTS = @CONSTRAINTS@
-};
-
-extern const char* const @ID@_state_names[@UP@_STATES];
-extern const char* const @ID@_state_units[@UP@_STATES];
-extern const char* const @ID@_body_names[@UP@_BODIES];
-
-/* initial state at time *t [s] */
-void @ID@_start(double* t, double* y);
-)";
-
-constexpr const char* kHeaderEnd =
-    R"(/* Newton's method toward the constraints until corrections stop decreasing */
-int @ID@_project(double t, double* y);
-/* a step of length h [s] by the classical Runge-Kutta method of order 4 */
-int @ID@_step(double t, double h, double* y);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif
-)";
-
-constexpr const char* kCall = R"(
-@HEAD@ {
-  double x[1 + @UP@_STATES], w[@ROOM@];
-  int i;
-  x[0] = t;
-  for (i = 0; i < @UP@_STATES; ++i) x[1 + i] = y[i];
-  if (!(@CALLS@)) return 1;
-  for (i = 0; i < @OUTPUTS@; ++i) {
-    if (!isfinite(@RESULT@[i])) return 1;
-  }
-  return 0;
-}
-
-)";
-
 constexpr const char* kSines = R"(static void sines(double angle, double* sine, double* cosine) {
   *sine = sin(angle);
   *cosine = cos(angle);
 }
-)";
-
-constexpr const char* kNoProject = R"(
-int @ID@_project(double t, double* y) {
-  (void)t, (void)y;
-  return 0;
-}
-)";
-
-constexpr const char* kProject = R"(
-int @ID@_project(double t, double* y) {
-  double corrected[@UP@_STATES], largest = INFINITY;
-  int i, step;
-  for (step = 0; step < 10; ++step) {
-    double change = 0.0;
-    if (@ID@_correction(t, y, corrected) != 0) return 1;
-    for (i = 0; i < @UP@_STATES; ++i) change = fmax(change, fabs(corrected[i] - y[i]));
-    if (!(change < largest)) break;
-    largest = change;
-    for (i = 0; i < @UP@_STATES; ++i) y[i] = corrected[i];
-  }
-  return 0;
-}
-)";
-
-constexpr const char* kStep = R"(
-int @ID@_step(double t, double h, double* y) {
-  static const double nodes[4] = {0.0, 0.5, 0.5, 1.0}, weights[4] = {1.0, 2.0, 2.0, 1.0};
-  double at[@UP@_STATES], slope[@UP@_STATES], sum[@UP@_STATES];
-  int i, stage;
-  for (i = 0; i < @UP@_STATES; ++i) slope[i] = sum[i] = 0.0;
-  for (stage = 0; stage < 4; ++stage) {
-    for (i = 0; i < @UP@_STATES; ++i) at[i] = y[i] + nodes[stage] * h * slope[i];
-    if (@ID@_derivative(t + nodes[stage] * h, at, slope) != 0) return 1;
-    for (i = 0; i < @UP@_STATES; ++i) sum[i] += weights[stage] * slope[i];
-  }
-  for (i = 0; i < @UP@_STATES; ++i) y[i] += h / 6.0 * sum[i];
-  return 0;
-}
-)";
-
-constexpr const char* kExample =
-#include "harness/exchange/export_c_example.inc"
-    ;
-
-constexpr const char* kBuild = R"(cmake_minimum_required(VERSION 3.16)
-project(@ID@ C)
-set(CMAKE_C_STANDARD 99)
-set(CMAKE_C_EXTENSIONS OFF)
-if(NOT CMAKE_BUILD_TYPE)
-  set(CMAKE_BUILD_TYPE Release)
-endif()
-add_library(@ID@_model @ID@.c)
-set_target_properties(@ID@_model PROPERTIES OUTPUT_NAME @ID@ POSITION_INDEPENDENT_CODE ON)
-target_compile_options(@ID@_model PRIVATE -ffp-contract=off)
-target_include_directories(@ID@_model PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
-target_link_libraries(@ID@_model PUBLIC m)
-add_executable(@ID@_example @ID@_example.c)
-target_link_libraries(@ID@_example PRIVATE @ID@_model)
 )";
 
 /// Writes the texts of the files.
@@ -258,11 +146,12 @@ class Writer {
     }
     std::string comment;
     for (const std::string& line : request_.provenance) comment += CommentLines("// ", line);
-    code_.files = {{code_.identifier + ".h", comment + Fill(kHeaderBegin, words_) + declarations_ +
-                                                 Fill(kHeaderEnd, words_)},
+    std::map<std::string, std::string> header = words_;
+    header["DECLARATIONS"] = declarations_;
+    code_.files = {{code_.identifier + ".h", comment + Filled("model.h", header)},
                    {code_.identifier + ".c", comment + Source()},
-                   {code_.identifier + "_example.c", comment + Fill(kExample, words_)},
-                   {"CMakeLists.txt", Fill(kBuild, words_)}};
+                   {code_.identifier + "_example.c", comment + Filled("example.c", words_)},
+                   {"CMakeLists.txt", Filled("CMakeLists.txt", words_)}};
   }
 
  private:
@@ -292,7 +181,7 @@ class Writer {
     words["CALLS"] = calls;
     words["OUTPUTS"] = std::to_string(first.outputs.size());
     words["RESULT"] = result;
-    functions_ += Fill(kCall, words);
+    functions_ += Filled("call.c", words);
   }
 
   std::string Strings(const std::string& name, const std::string& size,
@@ -319,8 +208,8 @@ class Writer {
     for (std::size_t i = 0; i < code_.start.size(); ++i) {
       text += format("  y[{}] = {:a}; /* {} */\n", i, code_.start[i], NumberText(code_.start[i]));
     }
-    return text + "}\n" + Fill(code_.num_rows == 0 ? kNoProject : kProject, words_) +
-           Fill(kStep, words_);
+    return text + "}\n" + Filled(code_.num_rows == 0 ? "no_project.c" : "project.c", words_) +
+           Filled("step.c", words_);
   }
 
   const CodeRequest& request_;

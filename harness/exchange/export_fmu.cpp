@@ -6,18 +6,13 @@
 #include "harness/exchange/export_c.h"
 #include "harness/exchange/export_names.h"
 #include "harness/generate/generated.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 
 namespace loopbench::exchange {
 
 namespace {
 
 using fmt::format;
-
-constexpr const char* kFunctions =
-#include "harness/exchange/export_fmu.inc"
-    ;
 
 /// A zip archive with uncompressed files (APPNOTE.TXT of PKWARE, sections 4.3.7, 4.3.12 and
 /// 4.3.16). Dates are 1 January 1980, so that equal contents give equal bytes.
@@ -140,30 +135,7 @@ std::string Description(const Code& code, const std::string& name, const std::st
       text += format("      <Unknown index=\"{}\"/>\n", i + 1);
     return text;
   };
-  return format(R"(<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="{guid}"
-    generationTool="Loopbench" variableNamingConvention="flat" numberOfEventIndicators="0">
-  <ModelExchange modelIdentifier="{id}">
-    <SourceFiles><File name="{id}.c"/><File name="fmi2_{id}.c"/></SourceFiles>
-  </ModelExchange>
-  <CoSimulation modelIdentifier="{id}" canHandleVariableCommunicationStepSize="true">
-    <SourceFiles><File name="{id}.c"/><File name="fmi2_{id}.c"/></SourceFiles>
-  </CoSimulation>
-  <UnitDefinitions>
-{units}  </UnitDefinitions>
-  <DefaultExperiment startTime="0" stopTime="1" stepSize="{step}"/>
-  <ModelVariables>
-{variables}  </ModelVariables>
-  <ModelStructure>
-    <Outputs>
-{state_outputs}{outputs}    </Outputs>
-    <Derivatives>
-{rates}    </Derivatives>
-    <InitialUnknowns>
-{rates}{outputs}    </InitialUnknowns>
-  </ModelStructure>
-</fmiModelDescription>
-)",
+  return format(fmt::runtime(Template("modelDescription.xml")),
                 fmt::arg("name", EscapeXmlAttribute(name)), fmt::arg("guid", guid),
                 fmt::arg("id", code.identifier), fmt::arg("units", unit_list),
                 fmt::arg("step", NumberText(step)), fmt::arg("variables", list),
@@ -180,11 +152,11 @@ std::string MakeFmu(const Code& code, const std::string& model_name, double step
   words["STEP"] = NumberText(step);
   const CodeFile* header = &code.files[0];
   const CodeFile* source = &code.files[1];
-  const std::string all = Fill(kFunctions, words) + header->text + source->text +
+  const std::string all = Filled("fmi2.c", words) + header->text + source->text +
                           Description(code, model_name, "", step);
   const std::string guid = harness::Fnv1a(all) + harness::Fnv1a(harness::Fnv1a(all) + all);
   words["GUID"] = guid;
-  const std::string functions = Fill(kFunctions, words);
+  const std::string functions = Filled("fmi2.c", words);
   const std::string fmi = format("fmi2_{}.c", code.identifier);
   const harness::TemporaryFolder folder("loopbench-fmu");
   harness::WriteFileAtomically(folder.path() / header->name, header->text);

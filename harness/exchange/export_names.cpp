@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/text/escape.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::exchange {

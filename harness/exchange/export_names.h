@@ -52,6 +52,13 @@ std::string NumberText(double value);
 /// Returns the text with each @WORD@ replaced by its value.
 std::string Fill(std::string text, const std::map<std::string, std::string>& words);
 
+/// Returns the text of templates/NAME.in, which the build embeds: "model.h".
+std::string_view Template(std::string_view name);
+/// Returns that text with each @WORD@ replaced by its value.
+inline std::string Filled(std::string_view name, const std::map<std::string, std::string>& words) {
+  return Fill(std::string(Template(name)), words);
+}
+
 /// Names that are unique within a document.
 class UniqueNames {
  public:

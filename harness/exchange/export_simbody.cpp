@@ -19,11 +19,6 @@ constexpr const char* kHead = R"(//
 //
 )";
 
-// The text is a separate file, because a program prints differently from Loopbench.
-constexpr const char* kProgram =
-#include "harness/exchange/export_simbody.inc"
-    ;
-
 using Type = SimbodyConstraintType;
 
 /// Returns the class of a tree joint; "" if unsupported.
@@ -228,7 +223,7 @@ class Writer {
                                 "\", a mechanism of Loopbench at its assembled start, as a program "
                                 "for Simbody 3.7. SI units, angles in rad.") +
         kHead + CommentOfNotes("// ", made_.notes) +
-        Fill(kProgram, {{"MECHANISM", constructor + Start() + Names()}});
+        Filled("simbody.cpp", {{"MECHANISM", constructor + Start() + Names()}});
     return std::move(made_);
   }
 

@@ -5,7 +5,7 @@
 
 #include "harness/config/mechanism_sections.h"
 #include "harness/exchange/import_draft.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/topology.h"
 
@@ -138,7 +138,7 @@ const Fields<LoopPart>& LoopFields() {
     if (loop.to.body >= 0 && loop.to.body == loop.from.body) node.Fail("another body");
   };
   const auto read_axis = [](const JsonNode& node, LoopPart& loop) {
-    loop.axis = ReadVector(node, loop.draft->space);
+    loop.axis = ReadVector(node, *loop.draft);
     if (TraitsOf(loop.type).own_axis == '-') {
       node.Fail(fmt::format("no axis of a {} joint", ToString(loop.type)));
     } else if (loop.axis.isZero()) {
@@ -182,7 +182,7 @@ void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
 
 const Fields<Sidecar>& SidecarFields() {
   const auto read_gravity = [](const JsonNode& node, Sidecar& sidecar) {
-    sidecar.gravity = ReadVector(node, sidecar.space);
+    sidecar.gravity = ReadVector(node, sidecar);
     sidecar.has_gravity = true;
   };
   static const Fields<Sidecar> fields(
@@ -390,10 +390,9 @@ Imported ImportDraft::Finish(const std::string& format) {
   NameJoints();
   bool gravity_is_said = options_.gravity.has_value() || !assumed_gravity_;
   if (!options_.sidecar.empty()) {
-    std::vector<Frame> rest;
-    for (const Placement& X : at_rest) rest.push_back(X.AsFrame());
+    std::vector<Frame> rest = Mapped<Frame>(at_rest, &Placement::AsFrame);
     const Sidecar facts = ReadSidecar(options_.sidecar, rest, &description);
-    imported.observe = facts.observe;
+    imported.observe = facts;
     gravity_is_said = gravity_is_said || facts.has_gravity;
   }
   if (!gravity_is_said) {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/simplify/plane.h"
 
 namespace loopbench::harness {

@@ -15,7 +15,7 @@
 #include "harness/exchange/export_names.h"
 #include "harness/exchange/import.h"
 #include "harness/exchange/xml_document.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {

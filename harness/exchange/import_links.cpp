@@ -120,10 +120,9 @@ void Place(const MechanismDescription& d, MasslessChain* chain) {
 
 /// Returns joints whose motion is determined without mass: by a rotor, a coupling or a motion.
 std::vector<bool> FindDetermined(const MechanismDescription& d) {
-  std::vector<bool> determined;
-  for (const JointDescription& joint : d.joints) {
-    determined.push_back(joint.rotor_inertia != 0.0 || !joint.motions.empty());
-  }
+  std::vector<bool> determined = Mapped<bool>(d.joints, [](const JointDescription& joint) {
+    return joint.rotor_inertia != 0.0 || !joint.motions.empty();
+  });
   for (const CouplingDescription& coupling : d.couplings) {
     for (const auto& part : coupling.parts) determined[part.joint] = true;
   }

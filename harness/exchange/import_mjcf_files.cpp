@@ -4,7 +4,7 @@
 #include <set>
 
 #include "harness/exchange/xml_document.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

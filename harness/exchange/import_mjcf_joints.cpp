@@ -231,8 +231,7 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
   }
   const Law law = LawOf(peeked);
   const auto name = element.Attribute("joint");
-  const bool is_known =
-      law.is_linear() && std::ranges::find(kActuators, element.tag()) != std::end(kActuators);
+  const bool is_known = law.is_linear() && Contains(kActuators, element.tag());
   if (!is_known || !name) return drop(kNoMotor, true);
   const std::size_t index = model->JointNamed(*name);
   const MjcfJoint& joint = model->joints[index];

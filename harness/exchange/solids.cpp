@@ -4,7 +4,7 @@
 #include <cstring>
 #include <tuple>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

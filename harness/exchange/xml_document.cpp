@@ -5,8 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 
@@ -109,9 +108,7 @@ std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const
   if (words.size() < least || words.size() > most) {
     Fail(least == most ? WithCount(least, "number") : fmt::format("{} to {} numbers", least, most));
   }
-  std::vector<double> numbers;
-  for (const std::string_view word : words) numbers.push_back(OneNumber(word));
-  return numbers;
+  return Mapped<double>(words, [&](const std::string_view word) { return OneNumber(word); });
 }
 
 fs::path XmlValue::File(const fs::path& subfolder, const fs::path& otherwise) const {
@@ -157,7 +154,7 @@ void XmlElement::RequireFew(std::size_t count, std::size_t most, std::string_vie
 std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> children;
   for (Element* child : document_->ChildrenOf(element_)) {
-    if (tags.empty() || std::ranges::find(tags, child->Name()) != tags.end()) {
+    if (tags.empty() || Contains(tags, child->Name())) {
       children.emplace_back(document_, child);
     }
   }
@@ -175,7 +172,7 @@ std::vector<XmlElement> XmlElement::InSections(const char* section,
 
 std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
   for (Element* one : document_->Within(element_)) {
-    if (std::ranges::find(tags, one->Name()) != tags.end()) return XmlElement(document_, one);
+    if (Contains(tags, one->Name())) return XmlElement(document_, one);
   }
   return std::nullopt;
 }

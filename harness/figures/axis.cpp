@@ -1,5 +1,3 @@
-#include "harness/figures/axis.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/figures/panel.h"
+#include "harness/figures/figures.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -149,9 +148,7 @@ double DistanceToSegment(const Point& point, const Point& from, const Point& to)
 }
 
 std::vector<Point> Placed(const PlotArea& area, std::span<const Point> points) {
-  std::vector<Point> placed;
-  for (const Point& point : points) placed.push_back(area.Place(point));
-  return placed;
+  return Mapped<Point>(points, [&](const Point& point) { return area.Place(point); });
 }
 
 /// Returns true if all points lie on the line, or on its points; both are page positions.
@@ -316,9 +313,7 @@ std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
       labels.push_back({curve.label});
       continue;
     }
-    if (std::ranges::find(labels[i], curve.label) == labels[i].end()) {
-      labels[i].push_back(curve.label);
-    }
+    AddOnce(labels[i], curve.label);
     for (Curve* one : {&merged[i], &curve}) {
       if (!one->crosses.empty()) failures.push_back(FailuresOf(one));
     }

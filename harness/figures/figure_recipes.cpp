@@ -1,5 +1,3 @@
-#include "harness/figures/figure_recipes.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,14 +7,11 @@
 #include <string_view>
 #include <tuple>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/experiment.h"
-#include "harness/figures/axis.h"
 #include "harness/figures/figures.h"
-#include "harness/record/select.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/table.h"
-#include "harness/tables/table_view.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,11 +7,10 @@
 #include <cstddef>
 #include <limits>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
-#include "harness/figures/panel.h"
-#include "harness/tables/table.h"
+#include "harness/tables/tables.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,16 +1,110 @@
-// Figures as data, and the styles of methods in all of them.
+// Figures: data, axes, panels drawn by gnuplot, and recipes from records.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
+#include "harness/judge/judge.h"
 #include "harness/record/record.h"
+#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
+
+// Axes, and the points that are drawn along them.
+
+// Scale of a figure: its range, the positions of values on it, and its ticks.
+
+/// Formats a number for figures: plain from 0.01 to 99999, else with powers of ten, "2.5·10⁻⁶".
+std::string NumberText(double value);
+
+/// Axis from `low` to `high`; both are positive on a logarithmic axis.
+struct Axis {
+  double low = 0.0, high = 1.0;
+  bool logarithmic = false;
+
+  bool CanShow(double value) const { return std::isfinite(value) && (!logarithmic || value > 0.0); }
+  /// Returns the position of a value: 0 at `low` and 1 at `high`.
+  double Place(double value) const { return (On(value) - On(low)) / (On(high) - On(low)); }
+
+ private:
+  double On(double value) const { return logarithmic ? std::log(value) : value; }
+};
+
+/// Range that grows to contain values, and gives an axis with a margin.
+class AxisRange {
+ public:
+  explicit AxisRange(bool logarithmic) : logarithmic_(logarithmic) {}
+
+  void Include(double value) {
+    if (!Axis{.logarithmic = logarithmic_}.CanShow(value)) return;
+    low_ = std::min(low_, value);
+    high_ = std::max(high_, value);
+  }
+  /// Returns the axis from the least to the largest value.
+  Axis Exact() const { return {low_, high_, logarithmic_}; }
+  /// Returns the axis. `margin` is a fraction of the extent. Values that agree in their first
+  /// digits still get a range that three digits can express.
+  Axis WithMargin(double margin) const;
+
+ private:
+  bool logarithmic_;
+  double low_ = std::numeric_limits<double>::infinity();
+  double high_ = -std::numeric_limits<double>::infinity();
+};
+
+struct Tick {
+  double at = 0.0;
+  std::string label;  ///< "" for a small tick
+};
+
+/// Returns about `most` labelled ticks and the small ones between them. A logarithmic axis with
+/// three powers of ten has these. A shorter one has 1, 2 and 5 or other digits of each decade. A
+/// linear axis has multiples of 1, 2 or 5 of a power of ten.
+std::vector<Tick> Ticks(const Axis& axis, int most);
+
+// Reduction of the points of curves, and curves that are drawn as one.
+
+/// A place in a drawing [pt], or a pair of values.
+using Point = std::pair<double, double>;
+
+/// Two axes and the size of the rectangle that they span [pt].
+struct PlotArea {
+  Axis x, y;
+  double width = 0.0, height = 0.0;
+
+  bool CanShow(const Point& point) const {
+    return x.CanShow(point.first) && y.CanShow(point.second);
+  }
+  Point Place(const Point& point) const {
+    return {width * x.Place(point.first), height * y.Place(point.second)};
+  }
+};
+
+/// Width of a curve [pt], a third of a millimetre: closer features cannot be distinguished.
+inline constexpr double kDrawnWidth = 1.0;
+
+/// Returns the first, last, lowest and highest point of each column that is a third of a curve
+/// wide. Omitted points lie between kept ones. Points need not be in order of x.
+std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points);
+
+/// True if every point of each curve lies within a drawn width of the other's line, or of its
+/// points if no line joins them. Points are in the order of x.
+bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const Point> other,
+              bool joined = true);
+
+// Figures as data, and the styles of methods in all of them.
 
 // Figures as SVG or PDF, drawn by gnuplot in the size in which they are printed.
 
@@ -20,7 +114,7 @@ enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond, kTriangleDown }
 /// Number of line patterns: solid, long dashes, dots, dash-dot, dash-dot-dot, short dashes.
 inline constexpr std::size_t kDashes = 6;
 
-/// Style of a curve, one attribute per property of its run (figures.h). Default: a black line.
+/// Style of a curve, one attribute per property of its run. Default: a black line.
 struct CurveStyle {
   std::string color = "#000000";
   std::size_t dash = 0;  ///< below kDashes
@@ -91,10 +185,10 @@ inline constexpr std::size_t kLegendRows = 6;
 /// Width of a drawing: one or two columns of a journal, 85 mm or 178 mm. Letters have 8 pt.
 enum class FigureSize { kOneColumn, kTwoColumn };
 
-/// Returns the curves of a panel as drawn. Curves that coincide (axis.h) become one curve: black,
-/// and solid and unmarked if they differ in colour, dash or mark. Its label is "odca = lagrange,
-/// joint", with "all" for all values of the panel. Curves with warnings are not merged with others,
-/// curves that end early never. Points keep hollow marks, crosses their colours.
+/// Returns the curves of a panel as drawn. Curves that coincide (Coincide()) become one curve:
+/// black, and solid and unmarked if they differ in colour, dash or mark. Its label is "odca =
+/// lagrange, joint", with "all" for all values of the panel. Curves with warnings are not merged
+/// with others, curves that end early never. Points keep hollow marks, crosses their colours.
 std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size);
 
 /// The gnuplot commands and data of a figure, for any terminal (neither terminal nor output are
@@ -147,5 +241,283 @@ std::vector<LegendRow> ChannelLegend(std::span<const Record> records);
 
 /// True if the values of a key differ.
 bool Varies(std::span<const Record> records, const std::string& key);
+
+// The standard figures of a store, and figures of precision runs and trajectories.
+
+// Figures made of records: motion, drift, and drift through singular configurations. The contents
+// of the records decide, never a name.
+
+/// A figure and the name of its file without extension.
+struct NamedFigure {
+  std::string name;
+  Figure figure;
+};
+
+/// Joint coordinates of one run against time. Angles [rad] are "series.angle.JOINT" against
+/// "series.t"; displacements [m] have their own panel, "series.displacement.JOINT". If the run has
+/// series of its opening, they are used (harness/observers/observer.h). The title names this and
+/// the run.
+Figure MotionFigure(const Record& record);
+
+/// Drift [m] of several runs of one mechanism against time on logarithmic axes: the running maximum
+/// "series.drift" against "series.drift_t", in the styles of all figures. At the end of a curve is
+/// the fitted power with its spread, and '?' if it is not resolved. A thin line shows a resolved
+/// power over its fit window. A failed run ends in a cross with its outcome.
+Figure DriftFigure(std::span<const Record> records);
+
+/// Drift on a linear time axis, without fits: effect of passing a singular configuration.
+Figure SingularFigure(std::span<const Record> records);
+
+/// All figures of the records with series. Each mechanism and horizon has the motion of one run:
+/// finished, without warnings, at level projection, at the finest tolerance, if possible. Each
+/// mechanism, horizon and tolerance has a drift figure, or one of singular configurations if a run
+/// came near one. Runs that differ in integrator, experiment or a parameter have separate figures,
+/// named with its value.
+std::vector<NamedFigure> AllFigures(std::span<const Record> records);
+
+// Error and drift of runs in several scalars, against tolerance.
+
+/// Draws error (lines) and drift (dashes) of each ladder against tolerance, one colour per scalar.
+/// Failed runs are crosses at the lower edge.
+std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records);
+
+// Two trajectories: both in the upper panel, their difference in the lower one.
+
+/// Makes both panels; columns that coincide are one curve. `columns` have one unit.
+Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
+                        std::span<const SharedColumn> columns, const std::string& title);
+
+// Figure of any value against another, and its distinct points.
+
+// A figure that the user chooses: any value of the records against any other.
+
+/// Request for a figure. Keys are keys of records; `x` may hold texts, which become equally spaced
+/// ticks. Two series ("series.drift_t" and "series.drift") give one curve per record.
+struct FreeFigure {
+  std::string x, y;
+  std::string group;  ///< keys "a,b": one curve per combination of values; "" for a single curve
+  std::string log;    ///< "x", "y", "xy" or "none"; "" for axes that span at least two decades
+  /// Title; by default the keys and the values that all records share.
+  std::optional<std::string> title = std::nullopt;
+  /// "NAME=TEXT": text of an axis (NAME is its key) or of a curve (NAME is its label).
+  std::vector<std::string> labels = {};
+};
+
+/// Keys that identify a case, in the order of titles.
+inline constexpr std::array<const char*, 7> kCaseKeys = {
+    "mechanism", "formulation", "enforcement", "coordinates", "solver", "rtol", "horizon"};
+
+struct FreeFigureResult {
+  Figure figure;
+  /// Remarks for the reader: keys that differ within a curve, failed runs without a value.
+  std::vector<std::string> remarks;
+};
+
+/// Throws ConfigError if no record has one of the keys.
+void RequireKeys(const FreeFigure& wanted, std::span<const Record> records);
+
+/// Draws the records that have both values. Points of a curve are joined in the order of x unless
+/// two of them share one. A failed run is a cross at its value, or at the lower edge if it has
+/// none; it is never left out. Only records of the kinds with a y value take part.
+///
+/// @throws ConfigError if a key is in no record, y is not numeric, no record has both values, or no
+/// value of a logarithmic axis is positive. Labels without an axis or curve are errors, too.
+FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted);
+
+// Selection of distinguishable records if there are more records than points in a picture.
+
+/// Takes records one by one and keeps at most `most` of them, reduced to the keys of a free figure:
+/// one per cell of the picture, curve, failure and warning state. Cells are as fine as `most`
+/// allows, on linear and on logarithmic axes.
+class DistinctPoints {
+ public:
+  DistinctPoints(const FreeFigure& wanted, std::size_t most);
+
+  /// Adds a record. Throws ConfigError if x or y is a series.
+  void Add(const Record& record);
+
+  const std::vector<Record>& records() const { return kept_; }
+  std::size_t seen() const { return seen_; }
+  /// Side of a cell as a fraction of an axis; 0 if every record was kept.
+  double cell() const { return parts_ == 0 ? 0.0 : 1.0 / parts_; }
+
+ private:
+  std::string KeyOf(const Record& record) const;
+  std::string CellOf(const Record& record, std::size_t axis) const;
+  void Coarsen();
+
+  std::array<std::string, 2> axes_;
+  std::vector<std::string> group_, keys_;  ///< keys_: all keys that the figure uses
+  std::size_t most_, seen_ = 0;
+  int parts_ = 0;                              ///< cells per axis; 0: all points are kept
+  std::array<std::array<Axis, 2>, 2> scales_;  ///< of x and y: linear and logarithmic
+  std::vector<Record> kept_;
+  std::unordered_set<std::string> cells_;
+};
+
+// Panels of figures and their legends, drawn by gnuplot.
+
+// gnuplot, the program that draws all figures.
+
+/// Letter size of all drawings [pt], distance of their lines and mean width of letters.
+inline constexpr double kLetterSize = 8.0, kLineHeight = 10.0, kLetterWidth = 4.2;
+
+/// Size of a drawing [pt].
+struct GnuplotPage {
+  double width = 504.0, height = 260.0;
+};
+
+/// Converts millimetres to points of 1/72 inch.
+constexpr double PointsOf(double millimetres) { return millimetres * 72.0 / 25.4; }
+
+/// Returns the approximate width of a text [pt].
+double WidthOf(std::string_view text);
+
+/// Breaks a text into lines of at most `most` letters at spaces; a longer word stays whole.
+std::vector<std::string> Wrapped(const std::string& text, std::size_t most);
+
+/// Writes a text at a position of the page [pt from its lower left corner]; `options` are gnuplot
+/// label options.
+std::string TextAt(const GnuplotPage& page, std::string_view text, double x, double y,
+                   std::string_view options);
+
+/// Runs `script`, which sets neither terminal nor output and quotes its texts with QuoteGnuplot().
+/// Writes `path`, as PDF if its extension is ".pdf", else as SVG. Returns nothing on success, else
+/// the reason: gnuplot missing (and its package) or gnuplot's own message. The file is complete or
+/// absent. No other files remain, even if this process is killed. No shell is used.
+[[nodiscard]] std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
+                                                         const GnuplotPage& page,
+                                                         const std::string& script,
+                                                         const std::string& gnuplot = "gnuplot");
+
+// A panel of a figure and its legend.
+
+// Legend below a figure: samples of colours, dashes and marks with their meaning.
+
+/// Returns gnuplot's "lc ... dt ... lw ..." of a curve's line, and "pt ... ps ... lc ..." of its
+/// marks.
+std::string LineLook(const CurveStyle& style);
+std::string MarkLook(const CurveStyle& style);
+inline constexpr const char* kCrossLook = "pt 2 ps 0.45 lw 1.2";
+
+struct Legend {
+  std::vector<LegendRow> rows;
+  std::size_t letters = 0;  ///< listed curves that stand for several
+};
+
+/// Makes the legend of a figure with the curves `merged`. First come its own rows, or else the
+/// curves' labels. Then follow the meaning of hollow marks, crosses and question marks, with
+/// `failures`, remarks on crosses without a curve. Last is a list of the curves that stand for
+/// several, by the letters at their ends. Rows are broken at the page width. In one column the list
+/// ends in "…" if the legend would exceed kLegendRows.
+Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSize size,
+                const std::vector<std::string>& failures);
+
+/// Draws rows below `top` [pt from the lower edge of the page].
+std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& page, double top);
+
+/// True if curves are named at their ends instead of in the legend.
+bool NamesAtEnds(const Figure& figure, const std::vector<Curve>& merged);
+
+/// Returns the text at the end of each curve: its name and its remark. The first `letters` curves
+/// that stand for several have their letter in the legend as name.
+std::vector<std::string> EndTexts(const Figure& figure, const std::vector<Curve>& merged,
+                                  bool names, std::size_t letters);
+
+// One panel of a figure: axes, curves, and the texts beside their ends.
+
+double WidthOfPage(FigureSize size);
+
+/// Height of a panel's rectangle [pt] in a figure of `panels` panels.
+double HeightOfPanel(FigureSize size, std::size_t panels);
+
+/// Axes of a panel and its approximate size.
+PlotArea AreaOf(const Figure& panel, FigureSize size);
+
+/// Returns the points that the axes can show.
+std::vector<Point> Drawable(const PlotArea& area, const Curve& curve);
+
+/// Position of a panel on the page [pt from the lower left corner].
+struct PanelPlace {
+  double left = 0.0, right = 0.0, bottom = 0.0, top = 0.0;
+};
+
+/// Returns commands that draw a panel, the last one "plot"; labels set before belong to it. Data
+/// names begin with `name`. `texts` are placed at the ends of the curves.
+std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
+                        const std::vector<std::string>& texts, const PlotArea& area,
+                        const GnuplotPage& page, const PanelPlace& place, const std::string& name,
+                        bool has_x_labels);
+
+/// Width [pt] of the labels of the vertical axis.
+double WidthOfLabels(const PlotArea& area);
+
+// Figures of the robustness map, and of work and precision.
+
+// The robustness map as a small heat map that is readable from a distance.
+
+/// Result of a method in all rows of a group.
+struct FoldedCell {
+  CellState worst = CellState::kNotApplicable;  ///< worst of the applicable rows
+  std::size_t holding = 0, judged = 0;          ///< numbers of applicable rows
+  bool with_warnings = false;                   ///< a row holds with warnings (HoldsWithWarnings)
+  bool fails_demand = false;                    ///< a row must hold and does not
+
+  /// Fraction of the applicable rows that hold; 1 if all do.
+  double Share() const;
+};
+
+/// A group with a cell for each method.
+struct FoldedGroup {
+  std::string label;  ///< short label of the rules if there is one
+  std::size_t rows = 0;
+  std::vector<FoldedCell> cells;
+
+  double Share() const;  ///< over all its rows and methods
+};
+
+/// Returns the groups of a map, in ascending order of the fraction that holds.
+std::vector<FoldedGroup> Folded(const RobustnessMap& map);
+
+/// A drawing: gnuplot's commands and the page they are for.
+struct MapDrawing {
+  GnuplotPage page;
+  std::string script;
+};
+
+/// Draws groups from top to bottom, methods from left to right, a legend below. Darker cells have
+/// fewer rows that hold; the glyph shows how the worst row ended. There are no hues. Cells with a
+/// required row that does not hold have a frame. Rows, numbers and reasons are in robustness-map.md
+/// and .csv.
+MapDrawing DrawMap(const RobustnessMap& map, FigureSize size = FigureSize::kTwoColumn);
+
+/// Draws into `path`, as PDF if its extension is ".pdf", else as SVG; returns the result of
+/// DrawWithGnuplot().
+[[nodiscard]] std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
+                                                        const RobustnessMap& map,
+                                                        FigureSize size = FigureSize::kTwoColumn,
+                                                        const std::string& gnuplot = "gnuplot");
+
+// Work-precision figures: cost of accuracy.
+
+/// Error over cost on logarithmic axes. Marks are the runs: hue for the formulation, shape for the
+/// coordinates, hollow with warnings. A line, dashed by level, joins the runs that no other run of
+/// the same formulation and level dominates. Thin black stairs are the overall Pareto front. Failed
+/// runs are crosses on the lower edge if their cost is known (their CPU time in place of the
+/// missing simulation time).
+Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
+                           const WorkPrecisionProblem& problem);
+
+/// Error over tolerance of the runs with one integrator, to check whether tolerances are met. A
+/// line shows error = tolerance (times a link length, for lengths).
+Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionProblem& problem,
+                       const std::string& integrator);
+
+/// Error over time ("series.error" over "series.error_t") of the runs with one integrator at its
+/// finest tolerance. A vertical line marks the trust horizon of the reference solution.
+Figure ErrorOverTimeFigure(const WorkPrecisionProblem& problem, const std::string& integrator);
+
+/// Returns the first figure per problem and the others per integrator, if they have data.
+std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precision);
 
 }  // namespace loopbench::harness

@@ -1,5 +1,3 @@
-#include "harness/figures/free_figure.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,14 +7,11 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/analysis/warnings.h"
-#include "harness/figures/axis.h"
+#include "harness/analysis/analysis.h"
 #include "harness/figures/figures.h"
-#include "harness/record/measures.h"
-#include "harness/record/select.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/table.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

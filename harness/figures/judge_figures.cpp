@@ -1,5 +1,3 @@
-#include "harness/figures/judge_figures.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,12 +9,9 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/figures/axis.h"
 #include "harness/figures/figures.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/table.h"
-#include "harness/text/escape.h"
-#include "harness/text/words.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

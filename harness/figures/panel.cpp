@@ -1,5 +1,3 @@
-#include "harness/figures/panel.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,10 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
-#include "harness/text/words.h"
+#include "harness/figures/figures.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -320,7 +316,7 @@ class Crosses {
     std::string height = fmt::format("first {:.6g}", y);
     if (!area_.y.CanShow(y)) {
       std::vector<std::string>& colors = on_edge_[at];
-      if (std::ranges::find(colors, color) != colors.end()) return "";
+      if (Contains(colors, color)) return "";
       colors.push_back(color);
       height = fmt::format("graph {:.4g}", kDistance * static_cast<double>(colors.size()));
     }
@@ -333,12 +329,10 @@ class Crosses {
 };
 
 std::string TicksCommand(char axis, const std::vector<Tick>& ticks, bool has_labels) {
-  std::string list;
-  for (const Tick& tick : ticks) {
-    list += fmt::format("{}{} {:.10g}{}", list.empty() ? "" : ", ",
-                        QuoteGnuplotTick(has_labels ? tick.label : ""), tick.at,
-                        tick.label.empty() ? " 1" : "");
-  }
+  const std::string list = Joined(ticks, ", ", [&](const Tick& tick) {
+    return fmt::format("{} {:.10g}{}", QuoteGnuplotTick(has_labels ? tick.label : ""), tick.at,
+                       tick.label.empty() ? " 1" : "");
+  });
   return fmt::format("set {}tics scale 0.5,0.25 ({})\n", axis, list);
 }
 

@@ -17,9 +17,7 @@
 
 #include "harness/generate/graph.h"
 #include "harness/generate/record.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
-#include "harness/text/run_program.h"
+#include "harness/text/text.h"
 
 namespace loopbench::generate {
 

@@ -6,7 +6,7 @@
 
 #include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/formulation/side_by_side.h"
 

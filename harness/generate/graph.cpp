@@ -9,6 +9,8 @@
 
 namespace loopbench::generate {
 
+using enum Operation;
+
 namespace {
 
 std::uint64_t Pair(int a, int b) {
@@ -16,129 +18,81 @@ std::uint64_t Pair(int a, int b) {
          static_cast<std::uint32_t>(b);
 }
 
+double NoValue(double, double) { throw std::logic_error("an input has no operands"); }
+
+std::array<double, 2> PoseSineAndCosine(double angle) {
+  std::array<double, 2> both;
+  PoseSines(angle, &both[0], &both[1]);
+  return both;
+}
+
 }  // namespace
 
-bool Counts(Operation operation) { return operation > Operation::kAbs; }
+const OperationTraits& TraitsOf(Operation operation) {
+  using Counted = OperationCounts;
+  static constexpr OperationTraits kTraits[] = {
+      {nullptr, "", &NoValue},  // an input
+      {nullptr, "", &NoValue},  // a constant
+      {nullptr, "-", [](double a, double) { return -a; }},
+      {nullptr, "fabs", [](double a, double) { return std::abs(a); }},
+      {&Counted::additions, "+", [](double a, double b) { return a + b; }},
+      {&Counted::additions, "-", [](double a, double b) { return a - b; }},
+      {&Counted::multiplications, "*", [](double a, double b) { return a * b; }},
+      {&Counted::divisions, "/", [](double a, double b) { return a / b; }},
+      {&Counted::roots, "sqrt", [](double a, double) { return std::sqrt(a); }},
+      {&Counted::sines, "sin", [](double a, double) { return std::sin(a); }},
+      {&Counted::sines, "cos", [](double a, double) { return std::cos(a); }},
+      {&Counted::sines, "s", [](double a, double) { return PoseSineAndCosine(a)[0]; }},
+      {&Counted::sines, "c", [](double a, double) { return PoseSineAndCosine(a)[1]; }},
+      {&Counted::other, "asin", [](double a, double) { return std::asin(a); }},
+      {&Counted::other, "acos", [](double a, double) { return std::acos(a); }},
+      {&Counted::other, "atan2", [](double a, double b) { return std::atan2(a, b); }},
+      {&Counted::other, "exp", [](double a, double) { return std::exp(a); }},
+      {&Counted::other, "expm1", [](double a, double) { return std::expm1(a); }},
+      {&Counted::other, "log", [](double a, double) { return std::log(a); }},
+      {&Counted::other, "pow", [](double a, double b) { return std::pow(a, b); }},
+      {&Counted::other, "round", [](double a, double) { return std::round(a); }},
+      {&Counted::other, "remainder", [](double a, double b) { return std::remainder(a, b); }},
+      {&Counted::other, "least", [](double a, double b) { return std::min(a, b); }},
+      {&Counted::other, "most", [](double a, double b) { return std::max(a, b); }}};
+  static_assert(std::size(kTraits) == static_cast<std::size_t>(kMax) + 1);
+  return kTraits[static_cast<std::size_t>(operation)];
+}
 
 void OperationCounts::Add(Operation operation) {
-  switch (operation) {
-    case Operation::kInput:
-    case Operation::kConstant:
-    case Operation::kNegate:
-    case Operation::kAbs:
-      return;
-    case Operation::kAdd:
-    case Operation::kSubtract:
-      ++additions;
-      return;
-    case Operation::kMultiply:
-      ++multiplications;
-      return;
-    case Operation::kDivide:
-      ++divisions;
-      return;
-    case Operation::kSqrt:
-      ++roots;
-      return;
-    case Operation::kSin:
-    case Operation::kCos:
-    case Operation::kPoseSin:
-    case Operation::kPoseCos:
-      ++sines;
-      return;
-    default:
-      ++other;
-  }
+  const auto counted_as = TraitsOf(operation).counted_as;
+  if (counted_as != nullptr) ++(this->*counted_as);
 }
 
 OperationCounts& OperationCounts::operator+=(const OperationCounts& more) {
-  additions += more.additions;
-  multiplications += more.multiplications;
-  divisions += more.divisions;
-  roots += more.roots;
-  sines += more.sines;
-  other += more.other;
+  for (const auto count :
+       {&OperationCounts::additions, &OperationCounts::multiplications, &OperationCounts::divisions,
+        &OperationCounts::roots, &OperationCounts::sines, &OperationCounts::other}) {
+    this->*count += more.*count;
+  }
   return *this;
 }
 
-double Value(Operation operation, double a, double b) {
-  double sine, cosine;
-  switch (operation) {
-    case Operation::kNegate:
-      return -a;
-    case Operation::kAbs:
-      return std::abs(a);
-    case Operation::kAdd:
-      return a + b;
-    case Operation::kSubtract:
-      return a - b;
-    case Operation::kMultiply:
-      return a * b;
-    case Operation::kDivide:
-      return a / b;
-    case Operation::kSqrt:
-      return std::sqrt(a);
-    case Operation::kSin:
-      return std::sin(a);
-    case Operation::kCos:
-      return std::cos(a);
-    case Operation::kPoseSin:
-      PoseSines(a, &sine, &cosine);
-      return sine;
-    case Operation::kPoseCos:
-      PoseSines(a, &sine, &cosine);
-      return cosine;
-    case Operation::kAsin:
-      return std::asin(a);
-    case Operation::kAcos:
-      return std::acos(a);
-    case Operation::kAtan2:
-      return std::atan2(a, b);
-    case Operation::kExp:
-      return std::exp(a);
-    case Operation::kExpm1:
-      return std::expm1(a);
-    case Operation::kLog:
-      return std::log(a);
-    case Operation::kPow:
-      return std::pow(a, b);
-    case Operation::kRound:
-      return std::round(a);
-    case Operation::kRemainder:
-      return std::remainder(a, b);
-    case Operation::kMin:
-      return std::min(a, b);
-    case Operation::kMax:
-      return std::max(a, b);
-    case Operation::kInput:
-    case Operation::kConstant:
-      break;
-  }
-  throw std::logic_error("an input has no operands");
-}
-
 int Graph::Input() {
-  nodes_.push_back({Operation::kInput});
+  nodes_.push_back({kInput});
   return static_cast<int>(nodes_.size()) - 1;
 }
 
-int Graph::Constant(double value) {
-  return FindOrAppend({Operation::kConstant, -1, -1, value, true});
-}
+int Graph::Constant(double value) { return FindOrAppend({kConstant, -1, -1, value, true}); }
 
 int Graph::Append(Operation operation, int a, int b) {
-  const bool commutes = operation == Operation::kAdd || operation == Operation::kMultiply;
+  const bool commutes = operation == kAdd || operation == kMultiply;
   if (commutes && a > b) std::swap(a, b);
   const bool is_known = IsKnown(a) && (b < 0 || IsKnown(b));
   const double other = b < 0 ? 0.0 : nodes_[b].value;
-  return FindOrAppend(
-      {operation, a, b, is_known ? Value(operation, nodes_[a].value, other) : 0.0, is_known});
+  return FindOrAppend({operation, a, b,
+                       is_known ? TraitsOf(operation).value(nodes_[a].value, other) : 0.0,
+                       is_known});
 }
 
 int Graph::FindOrAppend(const Node& node) {
   const auto bits = [](const Node& of) {
-    return of.operation == Operation::kConstant ? std::bit_cast<std::uint64_t>(of.value)
-                                                : Pair(of.a, of.b);
+    return of.operation == kConstant ? std::bit_cast<std::uint64_t>(of.value) : Pair(of.a, of.b);
   };
   const auto place_of = [&](const Node& of) {
     std::uint64_t hash =
@@ -155,7 +109,7 @@ int Graph::FindOrAppend(const Node& node) {
   if (2 * nodes_.size() >= table_.size()) {
     table_.assign(std::max<std::size_t>(1024, 2 * table_.size()), -1);
     for (int i = 0; i < std::ssize(nodes_); ++i) {
-      if (nodes_[i].operation != Operation::kInput) table_[place_of(nodes_[i])] = i;
+      if (nodes_[i].operation != kInput) table_[place_of(nodes_[i])] = i;
     }
   }
   int& found = table_[place_of(node)];
@@ -166,48 +120,47 @@ int Graph::FindOrAppend(const Node& node) {
 
 int Graph::Make(Operation operation, int a, int b) {
   const auto folds = [&](int node) { return IsConstant(node) && Folds(nodes_[node].value); };
-  if (folds(a) && (b < 0 || folds(b) || operation == Operation::kPoseCos)) {
-    return Constant(Value(operation, nodes_[a].value, b < 0 ? 0.0 : nodes_[b].value));
+  if (folds(a) && (b < 0 || folds(b) || operation == kPoseCos)) {
+    return Constant(TraitsOf(operation).value(nodes_[a].value, b < 0 ? 0.0 : nodes_[b].value));
   }
-  const auto negated = [&](int node) { return nodes_[node].operation == Operation::kNegate; };
+  const auto negated = [&](int node) { return nodes_[node].operation == kNegate; };
   const auto inner = [&](int node) { return nodes_[node].a; };
   switch (operation) {
-    case Operation::kNegate:
+    case kNegate:
       if (negated(a)) return inner(a);
       break;
-    case Operation::kAbs:
+    case kAbs:
       if (negated(a)) return Make(operation, inner(a));
       break;
-    case Operation::kAdd:
+    case kAdd:
       if (Is(a, 0.0)) return b;
       if (Is(b, 0.0)) return a;
-      if (negated(a) && negated(b))
-        return Make(Operation::kNegate, Append(operation, inner(a), inner(b)));
-      if (negated(b)) return Make(Operation::kSubtract, a, inner(b));
-      if (negated(a)) return Make(Operation::kSubtract, b, inner(a));
+      if (negated(a) && negated(b)) return Make(kNegate, Append(operation, inner(a), inner(b)));
+      if (negated(b)) return Make(kSubtract, a, inner(b));
+      if (negated(a)) return Make(kSubtract, b, inner(a));
       break;
-    case Operation::kSubtract:
+    case kSubtract:
       if (Is(b, 0.0)) return a;
-      if (Is(a, 0.0)) return Make(Operation::kNegate, b);
+      if (Is(a, 0.0)) return Make(kNegate, b);
       if (negated(a) && negated(b)) return Make(operation, inner(b), inner(a));
-      if (negated(b)) return Make(Operation::kAdd, a, inner(b));
-      if (negated(a)) return Make(Operation::kNegate, Make(Operation::kAdd, inner(a), b));
+      if (negated(b)) return Make(kAdd, a, inner(b));
+      if (negated(a)) return Make(kNegate, Make(kAdd, inner(a), b));
       break;
-    case Operation::kMultiply:
+    case kMultiply:
       if (Is(a, 0.0) || Is(b, 0.0)) return Constant(0.0);
       if (Is(a, 1.0)) return b;
       if (Is(b, 1.0)) return a;
-      if (Is(a, -1.0)) return Make(Operation::kNegate, b);
-      if (Is(b, -1.0)) return Make(Operation::kNegate, a);
-      if (negated(a)) return Make(Operation::kNegate, Make(operation, inner(a), b));
-      if (negated(b)) return Make(Operation::kNegate, Make(operation, a, inner(b)));
+      if (Is(a, -1.0)) return Make(kNegate, b);
+      if (Is(b, -1.0)) return Make(kNegate, a);
+      if (negated(a)) return Make(kNegate, Make(operation, inner(a), b));
+      if (negated(b)) return Make(kNegate, Make(operation, a, inner(b)));
       break;
-    case Operation::kDivide:
+    case kDivide:
       if (Is(a, 0.0)) return a;
       if (Is(b, 1.0)) return a;
-      if (Is(b, -1.0)) return Make(Operation::kNegate, a);
-      if (negated(a)) return Make(Operation::kNegate, Make(operation, inner(a), b));
-      if (negated(b)) return Make(Operation::kNegate, Make(operation, a, inner(b)));
+      if (Is(b, -1.0)) return Make(kNegate, a);
+      if (negated(a)) return Make(kNegate, Make(operation, inner(a), b));
+      if (negated(b)) return Make(kNegate, Make(operation, a, inner(b)));
       break;
     default:
       break;
@@ -254,9 +207,9 @@ int Graph::Depth(const std::vector<bool>& live, const std::vector<bool>& given) 
     const auto& [operation, a, b, value, is_known] = nodes_[node];
     // a cosine waits for the angle, not for the paired sine
     const int before =
-        std::max(a >= 0 ? depth[a] : 0, b >= 0 && operation != Operation::kPoseCos ? depth[b] : 0);
+        std::max(a >= 0 ? depth[a] : 0, b >= 0 && operation != kPoseCos ? depth[b] : 0);
     const bool is_given = node < given.size() && given[node];
-    depth[node] = is_given ? 0 : before + (Counts(operation) ? 1 : 0);
+    depth[node] = is_given ? 0 : before + (TraitsOf(operation).counted_as != nullptr ? 1 : 0);
     if (live[node]) deepest = std::max(deepest, depth[node]);
   }
   return deepest;
@@ -308,12 +261,12 @@ std::vector<double> Graph::Values(const std::vector<double>& inputs) const {
   std::size_t input = 0;
   for (std::size_t node = 0; node < nodes_.size(); ++node) {
     const auto& [operation, a, b, value, is_known] = nodes_[node];
-    if (operation == Operation::kInput) {
+    if (operation == kInput) {
       values[node] = inputs[input++];
     } else if (is_known) {
       values[node] = value;
     } else {
-      values[node] = Value(operation, values[a], b >= 0 ? values[b] : 0.0);
+      values[node] = TraitsOf(operation).value(values[a], b >= 0 ? values[b] : 0.0);
     }
   }
   return values;
@@ -331,91 +284,70 @@ bool Graph::Holds(const std::vector<double>& values) const {
 
 namespace {
 
-/// Builds expressions in a graph; 0 and 1 are constants.
-class Expressions {
- public:
-  explicit Expressions(Graph& graph) : graph_(graph) {}
+/// Node y of an operation on a and b, whose derivatives are da and db; builds expressions of them.
+struct Rule {
+  Graph& graph;
+  const int y, a, b, da, db;
+  const std::vector<double>& values;
 
-  int Number(double value) { return graph_.Constant(value); }
-  int Add(int a, int b) { return graph_.Make(Operation::kAdd, a, b); }
-  int Subtract(int a, int b) { return graph_.Make(Operation::kSubtract, a, b); }
-  int Times(int a, int b) { return graph_.Make(Operation::kMultiply, a, b); }
-  int Over(int a, int b) { return graph_.Make(Operation::kDivide, a, b); }
-  int Negate(int a) { return graph_.Make(Operation::kNegate, a); }
-  int Of(Operation function, int a, int b = -1) { return graph_.Make(function, a, b); }
-  int Square(int a) { return Times(a, a); }
-  bool IsZero(int a) const { return graph_.Is(a, 0.0); }
-
- private:
-  Graph& graph_;
+  int Number(double value) const { return graph.Constant(value); }
+  int Add(int one, int other) const { return graph.Make(kAdd, one, other); }
+  int Subtract(int one, int other) const { return graph.Make(kSubtract, one, other); }
+  int Times(int one, int other) const { return graph.Make(kMultiply, one, other); }
+  int Over(int one, int other) const { return graph.Make(kDivide, one, other); }
+  int Negate(int of) const { return graph.Make(kNegate, of); }
+  int Of(Operation function, int of, int other = -1) const {
+    return graph.Make(function, of, other);
+  }
+  /// sqrt(1 - a^2) without cancellation.
+  int Cosine() const { return Of(kSqrt, Times(Subtract(Number(1.0), a), Add(Number(1.0), a))); }
+  int Power() const {
+    const int power = Of(kPow, a, Subtract(b, Number(1.0)));
+    const int by_base = graph.Is(da, 0.0) ? da : Times(da, Times(b, power));
+    const int by_exponent = graph.Is(db, 0.0) ? db : Times(db, Times(y, Of(kLog, a)));
+    return Add(by_base, by_exponent);
+  }
+  /// Of the least or the largest of a and b.
+  int Extreme(bool is_least) const {
+    const bool first_is_less = values[a] < values[b];
+    graph.Compare(Relation::kLess, a, b, first_is_less);
+    return first_is_less == is_least ? da : db;
+  }
 };
 
-/// Derivative of `node` = `of`, whose operands have the derivatives da and db.
-int DerivativeOf(Graph& graph, int node, const Node of, int da, int db,
-                 const std::vector<double>& values) {
-  Expressions e(graph);
-  const int a = of.a, b = of.b;
-  // 1 - a^2 without cancellation
-  const auto one_minus_square = [&] {
-    return e.Times(e.Subtract(e.Number(1.0), a), e.Add(e.Number(1.0), a));
-  };
-  switch (of.operation) {
-    case Operation::kNegate:
-      return e.Negate(da);
-    case Operation::kAbs:
-      return e.Times(da, e.Over(a, node));
-    case Operation::kAdd:
-      return e.Add(da, db);
-    case Operation::kSubtract:
-      return e.Subtract(da, db);
-    case Operation::kMultiply:
-      return e.Add(e.Times(da, b), e.Times(a, db));
-    case Operation::kDivide:
-      return e.Over(e.Subtract(da, e.Times(node, db)), b);
-    case Operation::kSqrt:
-      return e.Over(da, e.Add(node, node));
-    case Operation::kSin:
-      return e.Times(da, e.Of(Operation::kCos, a));
-    case Operation::kCos:
-      return e.Negate(e.Times(da, e.Of(Operation::kSin, a)));
-    case Operation::kPoseSin:
-      return e.Times(da, e.Of(Operation::kPoseCos, a, node));
-    case Operation::kPoseCos:
-      return e.Negate(e.Times(da, b));  // b is the sine
-    case Operation::kAsin:
-      return e.Over(da, e.Of(Operation::kSqrt, one_minus_square()));
-    case Operation::kAcos:
-      return e.Negate(e.Over(da, e.Of(Operation::kSqrt, one_minus_square())));
-    case Operation::kAtan2:
-      return e.Over(e.Subtract(e.Times(b, da), e.Times(a, db)), e.Add(e.Square(a), e.Square(b)));
-    case Operation::kExp:
-      return e.Times(da, node);
-    case Operation::kExpm1:
-      return e.Times(da, e.Add(node, e.Number(1.0)));
-    case Operation::kLog:
-      return e.Over(da, a);
-    case Operation::kPow: {
-      const int power = e.Of(Operation::kPow, a, e.Subtract(b, e.Number(1.0)));
-      const int by_base = e.IsZero(da) ? da : e.Times(da, e.Times(b, power));
-      const int by_exponent =
-          e.IsZero(db) ? db : e.Times(db, e.Times(node, e.Of(Operation::kLog, a)));
-      return e.Add(by_base, by_exponent);
-    }
-    case Operation::kRound:
-      return e.Number(0.0);
-    case Operation::kRemainder:  // a less a multiple of b, which is constant between its jumps
-      return e.Subtract(da, e.Times(db, e.Of(Operation::kRound, e.Over(a, b))));
-    case Operation::kMin:
-    case Operation::kMax: {
-      const bool first_is_less = values[a] < values[b];
-      graph.Compare(Relation::kLess, a, b, first_is_less);
-      return first_is_less == (of.operation == Operation::kMin) ? da : db;
-    }
-    case Operation::kInput:
-    case Operation::kConstant:
-      break;
-  }
-  return e.Number(0.0);
+/// Returns the derivative of an operation.
+int DerivativeOf(Operation operation, const Rule& rule) {
+  constexpr int (*kRules[])(const Rule&) = {
+      [](const Rule& x) { return x.Number(0.0); },  // an input
+      [](const Rule& x) { return x.Number(0.0); },  // a constant
+      [](const Rule& x) { return x.Negate(x.da); },
+      [](const Rule& x) { return x.Times(x.da, x.Over(x.a, x.y)); },  // |a|
+      [](const Rule& x) { return x.Add(x.da, x.db); },
+      [](const Rule& x) { return x.Subtract(x.da, x.db); },
+      [](const Rule& x) { return x.Add(x.Times(x.da, x.b), x.Times(x.a, x.db)); },
+      [](const Rule& x) { return x.Over(x.Subtract(x.da, x.Times(x.y, x.db)), x.b); },
+      [](const Rule& x) { return x.Over(x.da, x.Add(x.y, x.y)); },  // square root
+      [](const Rule& x) { return x.Times(x.da, x.Of(kCos, x.a)); },
+      [](const Rule& x) { return x.Negate(x.Times(x.da, x.Of(kSin, x.a))); },
+      [](const Rule& x) { return x.Times(x.da, x.Of(kPoseCos, x.a, x.y)); },
+      [](const Rule& x) { return x.Negate(x.Times(x.da, x.b)); },  // kPoseCos: b is the sine
+      [](const Rule& x) { return x.Over(x.da, x.Cosine()); },      // asin
+      [](const Rule& x) { return x.Negate(x.Over(x.da, x.Cosine())); },
+      [](const Rule& x) {  // atan2
+        return x.Over(x.Subtract(x.Times(x.b, x.da), x.Times(x.a, x.db)),
+                      x.Add(x.Times(x.a, x.a), x.Times(x.b, x.b)));
+      },
+      [](const Rule& x) { return x.Times(x.da, x.y); },                        // exp
+      [](const Rule& x) { return x.Times(x.da, x.Add(x.y, x.Number(1.0))); },  // expm1
+      [](const Rule& x) { return x.Over(x.da, x.a); },                         // log
+      [](const Rule& x) { return x.Power(); },
+      [](const Rule& x) { return x.Number(0.0); },  // round
+      // a remainder is a less a multiple of b, which is constant between its jumps
+      [](const Rule& x) { return x.Subtract(x.da, x.Times(x.db, x.Of(kRound, x.Over(x.a, x.b)))); },
+      [](const Rule& x) { return x.Extreme(true); },
+      [](const Rule& x) { return x.Extreme(false); }};
+  static_assert(std::size(kRules) == static_cast<std::size_t>(kMax) + 1);
+  return kRules[static_cast<std::size_t>(operation)](rule);
 }
 
 }  // namespace
@@ -433,11 +365,12 @@ std::vector<int> Differentiate(Graph& graph, const std::vector<int>& outputs,
       const Node of = graph.nodes()[node];
       const int da = of.a >= 0 ? derivative[of.a] : zero;
       // a cosine names its sine next to its angle
-      const int db = of.b >= 0 && of.operation != Operation::kPoseCos ? derivative[of.b] : zero;
+      const int db = of.b >= 0 && of.operation != kPoseCos ? derivative[of.b] : zero;
       if (static_cast<int>(node) == input) {
         derivative[node] = one;
       } else if (da != zero || db != zero) {
-        derivative[node] = DerivativeOf(graph, static_cast<int>(node), of, da, db, values);
+        derivative[node] =
+            DerivativeOf(of.operation, {graph, static_cast<int>(node), of.a, of.b, da, db, values});
       }
     }
     for (const int output : outputs) jacobian.push_back(derivative[output]);

@@ -144,7 +144,7 @@ class Graph {
   /// Without the test the result is equal except for rounding, or not finite.
   void ForgetZeroTests();
 
-  /// Numbers of all nodes for these inputs, by the arithmetic of Value().
+  /// Numbers of all nodes for these inputs, by the arithmetic of OperationTraits::value.
   std::vector<double> Values(const std::vector<double>& inputs) const;
   /// Returns true if all comparisons of these numbers have their recorded outcomes.
   bool Holds(const std::vector<double>& values) const;
@@ -165,11 +165,13 @@ class Graph {
   std::unordered_map<std::uint64_t, std::array<std::uint8_t, 3>> compared_;  ///< outcome + 1
 };
 
-/// The value of an operation on numbers, as the recorded text computes it.
-double Value(Operation operation, double a, double b);
-
-/// Returns true if an operation counts (OperationCounts).
-bool Counts(Operation operation);
+struct OperationTraits {
+  std::int64_t OperationCounts::*counted_as;  ///< null: it does not count
+  const char* in_c;                           ///< its operator or function in generated code
+  /// Its value as the recorded text computes it; without a second operand, b has no effect.
+  double (*value)(double a, double b);
+};
+const OperationTraits& TraitsOf(Operation operation);
 
 // Derivatives of a graph's nodes with respect to its inputs, as further nodes of the graph.
 //

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <utility>
@@ -53,43 +54,6 @@ std::string Literal(double value) {
   if (std::isinf(value)) return value > 0.0 ? "INFINITY" : "(-INFINITY)";
   return value < 0.0 || std::signbit(value) ? fmt::format("({:a})", value)
                                             : fmt::format("{:a}", value);
-}
-
-const char* FunctionName(Operation operation) {
-  switch (operation) {
-    case Operation::kAbs:
-      return "fabs";
-    case Operation::kSqrt:
-      return "sqrt";
-    case Operation::kSin:
-      return "sin";
-    case Operation::kCos:
-      return "cos";
-    case Operation::kAsin:
-      return "asin";
-    case Operation::kAcos:
-      return "acos";
-    case Operation::kAtan2:
-      return "atan2";
-    case Operation::kExp:
-      return "exp";
-    case Operation::kExpm1:
-      return "expm1";
-    case Operation::kLog:
-      return "log";
-    case Operation::kPow:
-      return "pow";
-    case Operation::kRound:
-      return "round";
-    case Operation::kRemainder:
-      return "remainder";
-    case Operation::kMin:
-      return "least";
-    case Operation::kMax:
-      return "most";
-    default:
-      return "";
-  }
 }
 
 enum class Form { kLiterals, kConstants, kLanes };  // the last two receive constants
@@ -226,32 +190,27 @@ class Printer {
         : own_sines_ && of.operation == Operation::kSin ? Operation::kPoseSin
         : own_sines_ && of.operation == Operation::kCos ? Operation::kPoseCos
                                                         : of.operation;
+    const char* in_c = TraitsOf(operation).in_c;
     switch (operation) {
       case Operation::kInput:
       case Operation::kConstant:
         break;
-      case Operation::kNegate:
-        fmt::format_to(out, "  const {} v{} = -{};\n", number_, node, a());
-        break;
-      case Operation::kAdd:
-      case Operation::kSubtract:
-      case Operation::kMultiply:
-      case Operation::kDivide:
-        fmt::format_to(out, "  const {} v{} = {} {} {};\n", number_, node, a(),
-                       "+-*/"[static_cast<int>(of.operation) - static_cast<int>(Operation::kAdd)],
-                       b());
-        break;
       case Operation::kPoseSin:
       case Operation::kPoseCos:
         PrintSines(of.a, function);
-        fmt::format_to(out, "  const {} v{} = {}{};\n", number_, node,
-                       operation == Operation::kPoseSin ? 's' : 'c', of.a);
+        fmt::format_to(out, "  const {} v{} = {}{};\n", number_, node, in_c, of.a);
         break;
       default:
-        fmt::format_to(out, "  const {} v{} = {}{}({}", number_, node, has_lanes_ ? "each_" : "",
-                       FunctionName(operation), a());
-        if (of.b >= 0) fmt::format_to(out, ", {}", b());
-        text_ += ");\n";
+        fmt::format_to(out, "  const {} v{} = ", number_, node);
+        if (std::isalpha(static_cast<unsigned char>(*in_c)) != 0) {
+          fmt::format_to(out, "{}{}({}{}{})", has_lanes_ ? "each_" : "", in_c, a(),
+                         of.b >= 0 ? ", " : "", of.b >= 0 ? b() : "");
+        } else if (of.b < 0) {
+          fmt::format_to(out, "{}{}", in_c, a());
+        } else {
+          fmt::format_to(out, "{} {} {}", a(), in_c, b());
+        }
+        text_ += ";\n";
     }
     if (room_[node] >= 0) fmt::format_to(out, "  w[{}] = v{};\n", room_[node], node);
     for (const std::size_t i : results_[node]) {

@@ -53,7 +53,7 @@ double Recorded::Cast() const {
 }
 
 Recorded Recorded::Make(Operation operation, const Recorded& a) {
-  const double number = Value(operation, a.number, 0.0);
+  const double number = TraitsOf(operation).value(a.number, 0.0);
   if (current == nullptr) return number;
   current->as_run.Add(operation);
   if (Folds(a)) return number;
@@ -61,7 +61,7 @@ Recorded Recorded::Make(Operation operation, const Recorded& a) {
 }
 
 Recorded Recorded::Make(Operation operation, const Recorded& a, const Recorded& b) {
-  const double number = Value(operation, a.number, b.number);
+  const double number = TraitsOf(operation).value(a.number, b.number);
   if (current == nullptr) return number;
   current->as_run.Add(operation);
   if (Folds(a) && Folds(b)) return number;

@@ -1,11 +1,10 @@
-#include "harness/history/change_points.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "harness/judge/statistics.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/history/git.h"
-
 #include <fmt/format.h>
 
 #include <fstream>
@@ -7,7 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "harness/text/files.h"
+#include "harness/history/history.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

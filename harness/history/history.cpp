@@ -10,16 +10,9 @@
 #include <set>
 #include <utility>
 
-#include "harness/record/measures.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/record/select.h"
-#include "harness/store/record_lines.h"
-#include "harness/store/result_store.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
-#include "harness/text/words.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -76,8 +69,7 @@ std::filesystem::path ResultsIn(const std::filesystem::path& folder, const std::
   const std::filesystem::path path = name, whole = std::filesystem::weakly_canonical(folder);
   const std::filesystem::path end = std::filesystem::weakly_canonical(folder / path);
   const bool is_within = std::ranges::mismatch(whole, end).in1 == whole.end() && whole != end;
-  if (path.is_relative() && std::ranges::find(path, "..") == path.end() && is_within)
-    return folder / path;
+  if (path.is_relative() && !Contains(path, "..") && is_within) return folder / path;
   throw ConfigError(fmt::format("{}: \"results\": found \"{}\", expected a path within the history",
                                 FileOf(folder).string(), name));
 }

@@ -1,18 +1,199 @@
+// Measurements over commits: git, folders of a history, series, change points, pages.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
+
+namespace loopbench::harness {
+
+// Detection of level changes in a series of numbers, robust to outliers.
+//
+// P. Fearnhead, G. Rigaill, "Changepoint detection in the presence of outliers", Journal of the
+// American Statistical Association 114 (2019) 169-183: minimal penalised cost with the biweight
+// loss min((x - mu)^2, K^2), computed exactly by functional pruning (R-FPOP, a variant of PELT for
+// bounded losses). An isolated outlier costs at most K^2 and thus causes no change.
+
+/// Returns the first indices of all segments except the first, ascending.
+/// @param x  finite values
+/// @param bound  K > 0: values farther from their level are outliers
+/// @param penalty  per change, in the unit of the cost: x squared
+std::vector<std::size_t> RobustSegments(std::span<const double> x, double bound, double penalty);
+
+/// Noise of a series between its changes: an autoregressive process of order 1.
+struct Noise {
+  double sigma = 0.0;        ///< standard deviation about its level
+  double correlation = 0.0;  ///< correlation of neighbours, 0 to 0.9: slow phases of a machine last
+
+  /// Returns the long-run standard deviation: means vary as for independent values with it.
+  double LongRun() const;
+};
+
+/// Estimates noise from the mean squares of x[i+k] - x[i] for k = 1, 2, 3. Differences above 3.5
+/// times the median-implied value of normal noise come from steps and outliers and are ignored, at
+/// most a quarter. The growth with k gives the correlation, reduced by n^2 / (n^2 + 15^2) because
+/// few values may imitate any. Similar estimates: G. Romano, G. Rigaill, V. Runge, P. Fearnhead,
+/// "Detecting abrupt changes in the presence of local fluctuations and autocorrelated noise",
+/// Journal of the American Statistical Association 117 (2022) 2147-2162. Returns no noise below
+/// four values.
+Noise NoiseOf(std::span<const double> x);
+
+/// A change of level in a series of logarithms: a ratio.
+struct LevelChange {
+  std::size_t at = 0;                ///< first value of the new level
+  double before = 0.0, after = 0.0;  ///< medians of the segments
+  /// Expected number of changes at least as clear by noise alone, at all tested positions together.
+  double expected = 0.0;
+
+  double Confidence() const { return std::max(0.0, 1.0 - expected); }
+};
+
+/// Prior knowledge about a series.
+struct Resolution {
+  double noise = 0.0;   ///< minimum standard deviation that is assumed
+  double least = 0.0;   ///< smaller changes are ignored
+  double places = 0.0;  ///< number of tested positions: values of this series and all others
+};
+
+/// Maximum accepted number of changes by noise alone, at all tested positions together.
+inline constexpr double kFalseAlarms = 0.01;
+
+/// Finds the changes of a series. Candidates come from RobustSegments() with bound 3 sigma (as by
+/// the authors) and the usual penalty, 2 log(n) times the long-run variance. The least certain
+/// candidate is removed repeatedly, until all changes are at least resolution.least and noise is
+/// expected to cause at most kFalseAlarms at all tested positions (Bonferroni). The probabilities
+/// of two causes are added:
+///   - Segment means differ by noise: normal tail for their standard error. It uses the long-run
+///     standard deviation plus two of its own standard errors.
+///   - The shorter segment consists of outliers of its neighbour: binomial tail for the number of
+///     values beyond half of the step, with the share beyond 3 sigma in the series.
+std::vector<LevelChange> FindChanges(std::span<const double> x, const Resolution& resolution);
+
+// Git as storage of a history: commands, branches, locations.
+
+// The git program.
+
+/// Git repository of the current directory. Variables of a hook (GIT_DIR, GIT_INDEX_FILE, ...) only
+/// select this repository: the user's index and work tree are never used. Hooks do not run. User
+/// settings cannot change file contents or the set of files.
+class GitRepository {
+ public:
+  /// Throws ConfigError if there is no repository or no git.
+  GitRepository();
+
+  /// @param variables  "NAME=value", in addition to the environment
+  /// @param input      standard input
+  ProgramResult Try(const std::vector<std::string>& words,
+                    const std::vector<std::string>& variables = {},
+                    const std::string& input = "") const;
+
+  /// Returns the output without the line end. Throws std::runtime_error with the message of git.
+  std::string Get(const std::vector<std::string>& words,
+                  const std::vector<std::string>& variables = {},
+                  const std::string& input = "") const;
+
+  /// Returns the commit of a branch.
+  std::optional<std::string> BranchAt(const std::string& branch) const;
+
+  /// Returns the work tree in which a branch is checked out; "" if none.
+  std::string CheckedOutIn(const std::string& branch) const;
+
+  /// Writes the regular files of a commit into `folder`, byte for byte: attributes, filters and
+  /// line-end settings of the user have no effect. Other entries are not written.
+  /// @param index  a file that does not exist yet, outside of the folder: for Commit()
+  void Export(const std::string& commit, const std::filesystem::path& folder,
+              const std::string& index) const;
+
+  /// Returns a new commit on top of `parent` ("": no parent) with its files and all of `folder`,
+  /// unchanged by ignore, conversion or signature settings. Returns `parent` if nothing changed.
+  /// The author is the user, or "loopbench" if git has no user.
+  /// @param index  file made by Export() for the parent; without a parent, a file that does not
+  /// exist
+  std::string Commit(const std::filesystem::path& folder, const std::string& index,
+                     const std::string& parent, const std::string& message) const;
+
+ private:
+  std::string folder_;  ///< .git, common to all work trees
+};
+
+/// Checked-out commit and its date (ISO 8601, UTC); both "" outside of a repository.
+struct CheckedOut {
+  std::string commit, date;
+};
+/// @param commit  a commit in any notation of git
+/// Throws ConfigError if there is no git.
+CheckedOut FindCommit(const std::string& commit = "HEAD");
+
+// A history on a branch of its own in a git repository, edited in a folder.
+
+/// Files of a branch of the current repository, in a temporary folder. The repository changes only
+/// in Commit(). Several processes may work at once.
+class HistoryBranch {
+ public:
+  /// Throws ConfigError if the branch is absent and `may_begin` is false, if its name is invalid,
+  /// or if it has files but no history.jsonl. Throws std::runtime_error with the message of git.
+  explicit HistoryBranch(std::string branch, bool may_begin = false);
+
+  const std::filesystem::path& folder() const { return folder_; }
+
+  /// Returns the message with the branch in place of the folder: "measured:history.jsonl".
+  std::string Named(std::string message) const;
+
+  /// Commits all changes to the branch, and creates it if necessary; does nothing without changes.
+  /// Returns false if another process has changed the branch: repeat the changes in a new
+  /// HistoryBranch. Throws ConfigError if the branch is checked out anywhere, and
+  /// std::runtime_error with the message of git.
+  bool Commit(const std::string& message);
+
+ private:
+  std::string Index() const { return (temporary_.path() / "index").string(); }
+
+  GitRepository git_;
+  std::string branch_, at_;  ///< at_: the commit that was read, "" for a new branch
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_;
+};
+
+// Location of a history, as given by users.
+
+/// Either a folder or a branch of the current repository.
+struct HistoryPlace {
+  std::filesystem::path store;
+  std::string branch;
+};
+
+/// An open history.
+struct OpenHistory {
+  std::filesystem::path folder;
+  /// Rewrites a message for users: for a branch, the folder is temporary.
+  std::function<std::string(std::string)> named;
+};
+
+/// Calls `read` with the history. Errors contain the branch instead of its folder. Throws as
+/// HistoryBranch, and ConfigError unless exactly one of both is given.
+void ReadPlace(const HistoryPlace& place, const std::function<void(const OpenHistory&)>& read);
+
+/// Calls `change`, which returns the commit message for the branch. If another process has changed
+/// the branch meanwhile, calls it again on the new state.
+/// @param may_begin  creates an absent branch
+void ChangePlace(const HistoryPlace& place, bool may_begin,
+                 const std::function<std::string(const OpenHistory&)>& change);
+
 // Measurements of successive commits: a folder that only grows.
 //
 //   DIR/history.jsonl     a line for each added commit and each mark
 //   DIR/results/*.jsonl   measurements, without time series of runs but with samples of run times
-#pragma once
-
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "harness/record/record.h"
-
-namespace loopbench::harness {
 
 /// Measurements of a commit on a machine.
 struct HistoryEntry {
@@ -68,5 +249,91 @@ std::optional<HistoryEntry> LastGood(const History& history, const std::string& 
 /// Returns the baseline for times, which depend on the machine: entries of this machine come first,
 /// marked or not.
 std::optional<HistoryEntry> LastGoodOfMachine(const History& history, const std::string& machine);
+
+// Series of measurements over commits, and their steps.
+
+// Measures over commits and their level changes.
+
+/// Value of a commit in a series.
+struct HistoryValue {
+  std::size_t entry = 0;            ///< index into the history
+  double value = 0.0, upper = 0.0;  ///< for times: minimum and 90th percentile
+  double calibration = 0.0;         ///< for times [ns], NaN if unknown
+  /// False for times measured while the machine was slower or faster than usual at that time; true
+  /// if its speed is unknown. Unsteady values are not used for levels.
+  bool is_steady = true;
+  /// For times: common slowdown of all cases of the entry; 1 if there are few cases or none with a
+  /// measurable time.
+  double common = 1.0;
+};
+
+/// One measure of one case on one machine.
+struct HistorySeries {
+  std::string machine, one;  ///< one: the case, or kAllCases
+  std::string measure, unit;
+  Rule rule = Rule::kNone;
+  std::vector<HistoryValue> values;
+  /// at: index into `values`; levels: medians of the values. For times found after removing the
+  /// common slowdown, the levels are without it too.
+  std::vector<LevelChange> changes;
+
+  std::size_t Unsteady() const;  ///< number of values at another speed of the machine
+};
+
+/// Case of the pooled series of times: median over all cases of their ratios to their own medians.
+/// It shows changes that are common to all cases but too small in each.
+inline constexpr const char* kAllCases = "all cases";
+
+/// Change of the outcome or of the warnings of a case since the previous commit.
+struct EndingChange {
+  std::string machine, one, measure;  ///< measure: "outcome" or "warnings"
+  std::size_t entry = 0;              ///< index into the history
+  std::string before, after;
+};
+
+struct HistoryFindings {
+  std::vector<HistorySeries> series;
+  std::vector<EndingChange> endings;
+  std::vector<std::string> warnings;  ///< incomplete lines of results
+
+  std::size_t Steps() const;  ///< number of changes in series and endings
+};
+
+/// Finds all series with their changes. Times use steady values only; those of five and more cases
+/// are also pooled. A change common to these cases appears only in the pooled series: a machine
+/// that is slow for a week is one step. Throws std::runtime_error if a results file cannot be read.
+HistoryFindings FindingsOf(const History& history);
+
+// Steps of a history as table rows.
+
+/// Returns a row for each step, newest first; in one commit changed outcomes come first. "ratio" is
+/// empty if the level was 0 or a text.
+Table StepTable(const History& history, const HistoryFindings& found);
+
+/// Returns the number of omitted times as a sentence; nothing if there are none.
+std::optional<std::string> UnsteadyNote(const HistoryFindings& found);
+
+// Reports of a history: its page, and the summary of a comparison.
+
+// Results of a comparison for pull requests and CI servers.
+
+/// Returns Markdown: the conclusion, worse or different measures (at most 50 rows and the number of
+/// others), and the number of compared measures. `notes` follow.
+std::string ComparisonMarkdown(const ComparisonReport& report, const std::string& conclusion,
+                               const std::vector<std::string>& notes);
+
+/// Returns JUnit XML for Jenkins and GitLab: a test case for each measure of each case. Failures
+/// are worse or different measures and missing cases. Measures without a value are skipped. An
+/// empty comparison is one error: a comparison with exit status 1 or 2 always gives a failure or an
+/// error.
+/// @param options  options of the comparison
+std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions& options);
+
+// A history as one HTML page: steps, commits, and a chart of each series.
+
+/// Writes charts as SVG, without script; series with steps come first. Draws at most 200 and states
+/// the number of omitted ones.
+std::string HistoryPage(const History& history, const HistoryFindings& found,
+                        const std::string& title, const std::vector<std::string>& provenance);
 
 }  // namespace loopbench::harness

@@ -1,16 +1,14 @@
-#include "harness/history/history_page.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <ranges>
 
-#include "harness/figures/axis.h"
-#include "harness/history/history_series.h"
-#include "harness/judge/demand.h"
-#include "harness/text/escape.h"
-#include "harness/view/writers.h"
+#include "harness/figures/figures.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {
@@ -141,44 +139,6 @@ namespace {
 
 constexpr std::size_t kMaxCharts = 200;
 constexpr double kWidth = 760, kHeight = 190, kLeft = 92, kRight = 16, kTop = 12, kBottom = 46;
-
-constexpr const char* kStyle = R"(
-main { display: block; max-width: 1180px; margin: 0 auto; }
-table { border-collapse: collapse; margin: 6px 0 14px; font-size: 14px; }
-th, td { text-align: left; padding: 3px 10px 3px 0; border-bottom: 1px solid var(--rule); vertical-align: top; }
-td.n { text-align: right; font-variant-numeric: tabular-nums; }
-.wide { overflow-x: auto; }
-figure { margin: 0 0 18px; overflow-x: auto; }
-figcaption { font-weight: 600; overflow-wrap: anywhere; }
-svg { background: var(--paper); border: 1px solid var(--rule); max-width: 100%; height: auto; }
-svg text { font: 12px system-ui, 'DejaVu Sans', sans-serif; fill: var(--text); }
-.axis { stroke: var(--soft); } .grid { stroke: var(--guide); } .dot { fill: var(--drive); } .other { fill: var(--paper); stroke: var(--drive); }
-.spread { stroke: var(--drive); stroke-opacity: 0.65; } .level { stroke: var(--text); stroke-width: 1.5; }
-.step { stroke: var(--gap); stroke-dasharray: 5 3; }
-.worse { color: var(--gap); font-weight: 600; }
-tr.commit th { padding-top: 10px; }
-svg.spark { border: 0; background: none; } .spark path { fill: none; stroke: var(--drive); }
-input { font: inherit; width: 20em; max-width: 100%; color: var(--text); background: var(--paper); border: 1px solid var(--rule); }
-)";
-
-/// Chooses the light or dark theme of the system.
-constexpr const char* kThemeScript =
-    "const dark = matchMedia('(prefers-color-scheme: dark)');\n"
-    "const paint = () => { document.documentElement.dataset.theme = dark.matches ? 'dark' : "
-    "'light'; };\n"
-    "paint();\n"
-    "dark.addEventListener('change', paint);";
-
-/// Shows the series whose text has all words of the filter.
-constexpr const char* kFilterScript =
-    "const filter = document.getElementById('filter');\n"
-    "filter.addEventListener('input', () => {\n"
-    "  const words = filter.value.toLowerCase().split(/\\s+/);\n"
-    "  for (const one of document.querySelectorAll('figure, tr.series')) {\n"
-    "    const text = one.textContent.toLowerCase();\n"
-    "    one.hidden = !words.every((word) => text.includes(word));\n"
-    "  }\n"
-    "});";
 
 struct Chart {
   const History& history;
@@ -377,7 +337,7 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
     return !a->changes.empty() && b->changes.empty();
   });
   std::string page = PageHead(EscapeXml(title));
-  page += kStyle;
+  page += kHistoryStyle;
   page += fmt::format(
       "</style>\n<script>{}</script>\n</head>\n<body>\n<header><h1>{}</h1><p class=\"soft\">{} "
       "entries, {} series, {} "
@@ -385,7 +345,7 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
       "(other endings, and changes of level that noise would show {} times in "
       "all)</p></header>\n<main>\n"
       "<h2>Steps</h2>\n",
-      kThemeScript, EscapeXml(title), history.entries.size(), found.series.size(), found.Steps(),
+      kHistoryScript, EscapeXml(title), history.entries.size(), found.series.size(), found.Steps(),
       kFalseAlarms);
   page += StepRows(history, found);
   page +=
@@ -420,7 +380,7 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
   page += "</tbody></table></div>\n";
   for (const std::string& line : provenance)
     page += "<p class=\"soft\">" + EscapeXml(line) + "</p>\n";
-  return page + fmt::format("</main>\n<script>{}</script>\n</body>\n</html>\n", kFilterScript);
+  return page + "</main>\n</body>\n</html>\n";
 }
 
 }  // namespace loopbench::harness

@@ -1,5 +1,3 @@
-#include "harness/history/history_series.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,16 +10,14 @@
 #include <utility>
 #include <vector>
 
-#include "harness/judge/demand.h"
-#include "harness/judge/statistics.h"
-#include "harness/judge/track.h"
-#include "harness/record/noise.h"
-#include "harness/record/provenance.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 namespace {
 
-/// Returns the minimum change for each kind of measure, as in `compare` (compare.h). The assumed
+/// Returns the minimum change for each kind of measure, as in `compare` (judge.h). The assumed
 /// noise of constant series is a third of this change, so that a single such value is just no
 /// outlier.
 /// @param most  largest value of the series

@@ -11,7 +11,7 @@
 
 #include "harness/config/options.h"
 #include "harness/integrator/arkode.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 #include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {

@@ -27,11 +27,8 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record/select.h"
-#include "harness/text/cpu_time.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
-#include "harness/text/terminal.h"
+#include "harness/record/record.h"
+#include "harness/text/text.h"
 #include "mechanism/model/dense_memory.h"
 
 namespace loopbench::harness {

@@ -137,7 +137,7 @@ struct ProcessNews {
 /// returns nothing while there is nothing to start, and is called again after each ending. All is
 /// done if it returns nothing and no piece is running. `done` is called in the parent as pieces
 /// end, one at a time. No piece outlives this process. Throws std::runtime_error if a process
-/// cannot be started, any exception of `done`, the SystemFault (files.h) of a piece, and
+/// cannot be started, any exception of `done`, the SystemFault (text.h) of a piece, and
 /// Interrupted (processes.h) after `done` for all ended pieces. Running pieces are then killed.
 ///
 /// Sanitizers reserve the whole address space, so memory limits are not set with them.

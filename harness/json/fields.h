@@ -24,7 +24,7 @@
 #include "harness/json/file_kind.h"
 #include "harness/json/json_reader.h"
 #include "harness/json/schema.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

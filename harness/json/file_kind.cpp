@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "harness/json/fields.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -14,8 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

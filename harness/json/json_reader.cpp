@@ -9,8 +9,7 @@
 #include <map>
 #include <set>
 
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -310,11 +309,10 @@ std::vector<double> Spread(double from, double to, int count, bool logarithmic) 
   std::vector<double> numbers(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
     const double t = static_cast<double>(i) / (count - 1);
-    numbers[static_cast<std::size_t>(i)] =
-        logarithmic ? std::copysign(std::pow(10.0, std::lerp(std::log10(std::abs(from)),
-                                                             std::log10(std::abs(to)), t)),
-                                    from)
-                    : std::lerp(from, to, t);
+    numbers[i] = logarithmic ? std::copysign(std::pow(10.0, std::lerp(std::log10(std::abs(from)),
+                                                                      std::log10(std::abs(to)), t)),
+                                             from)
+                             : std::lerp(from, to, t);
   }
   for (double& number : numbers) number = Clean(number);
   numbers.front() = from;

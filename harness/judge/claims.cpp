@@ -1,5 +1,3 @@
-#include "harness/judge/claims.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,10 +10,10 @@
 #include <string>
 #include <string_view>
 
-#include "harness/judge/demand.h"
-#include "harness/record/noise.h"
-#include "harness/tables/table.h"
-#include "harness/text/escape.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/judge/compare.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -11,13 +9,11 @@
 #include <set>
 #include <sstream>
 
-#include "harness/analysis/warnings.h"
-#include "harness/judge/demand.h"
-#include "harness/judge/statistics.h"
-#include "harness/record/noise.h"
-#include "harness/record/provenance.h"
-#include "harness/tables/table.h"
-#include "harness/text/words.h"
+#include "harness/analysis/analysis.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

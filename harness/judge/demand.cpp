@@ -1,11 +1,11 @@
-#include "harness/judge/demand.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 

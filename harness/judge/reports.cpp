@@ -1,5 +1,3 @@
-#include "harness/judge/reports.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,11 +9,9 @@
 #include <set>
 #include <vector>
 
-#include "harness/judge/work_precision.h"
-#include "harness/tables/columns.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/judge/judge.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

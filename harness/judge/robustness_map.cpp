@@ -1,5 +1,3 @@
-#include "harness/judge/robustness_map.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,9 +10,10 @@
 #include <tuple>
 #include <utility>
 
-#include "harness/analysis/warnings.h"
-#include "harness/tables/columns.h"
-#include "harness/text/words.h"
+#include "harness/analysis/analysis.h"
+#include "harness/judge/judge.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "harness/json/fields.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/robustness_map.h"
+#include "harness/judge/judge.h"
 #include "harness/judge/rule_schemas.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -234,7 +234,7 @@ std::vector<std::string> ReadEndings(const JsonNode& node) {
   std::vector<std::string> endings;
   for (const JsonNode& element : node.OneOrMore("endings")) {
     const auto index = element.Choice(EndingNames(), "an ending of runs");
-    if (index) endings.push_back(EndingNames().all()[static_cast<std::size_t>(*index)]);
+    if (index) endings.push_back(EndingNames().all()[*index]);
   }
   return endings;
 }
@@ -269,9 +269,8 @@ void ReadWhen(const JsonNode& node, DemandOfRow& demand) { demand.when = ReadEnd
 
 void CheckWhen(const JsonNode& node, DemandOfRow& demand) {
   const std::vector<std::string>& right = *demand.right;
-  const bool possible = std::ranges::all_of(demand.when, [&right](const std::string& ending) {
-    return std::ranges::find(right, ending) != right.end();
-  });
+  const bool possible = std::ranges::all_of(
+      demand.when, [&right](const std::string& ending) { return Contains(right, ending); });
   if (possible) return;
   constexpr const char* kExpected = "endings that are \"expected_outcome\" here";
   if (const auto when = node.Optional("when")) {
@@ -328,7 +327,7 @@ void ReadNotApplicable(const JsonNode& reasons, RowOfMap* row) {
   for (const auto& [column, reason] : reasons.Members()) {
     row->not_applicable[column] = reason.Text();
     const auto index = row->columns->Find(column);  // overrides the group's "required"
-    if (index) row->must_hold[static_cast<std::size_t>(*index)] = false;
+    if (index) row->must_hold[*index] = false;
   }
 }
 
@@ -346,8 +345,8 @@ void ReadMustHold(const JsonNode& demanded, RowOfMap* row) {
        is_list ? demanded.Elements("column labels") : std::vector<JsonNode>{demanded}) {
     const auto column = element.Choice(*row->columns, "\"all\" or a method");
     if (!column) continue;
-    row->must_hold[static_cast<std::size_t>(*column)] = true;
-    if (row->not_applicable.contains(columns[static_cast<std::size_t>(*column)])) {
+    row->must_hold[*column] = true;
+    if (row->not_applicable.contains(columns[*column])) {
       element.Fail("a column that is applicable here");
     }
   }
@@ -400,11 +399,10 @@ void ReadRow(const JsonNode& node, RowOfMap& row) {
     node.FailAs("no \"select\"", "an object of keys and values, here or in the group");
   }
   const auto decided = [&row](const std::string& ending) {
-    return std::ranges::any_of(row.decides, [&ending](const Demand& demand) {
-      return std::ranges::find(demand.when, ending) != demand.when.end();
-    });
+    return std::ranges::any_of(
+        row.decides, [&ending](const Demand& demand) { return Contains(demand.when, ending); });
   };
-  if (std::ranges::find(row.right, "finished") != row.right.end() && !decided("finished")) {
+  if (Contains(row.right, "finished") && !decided("finished")) {
     node.FailAs("nothing that decides about a finished run",
                 "\"criteria\" with a measure, here or in the group");
   }

@@ -1,5 +1,3 @@
-#include "harness/judge/statistics.h"
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -9,7 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/analysis/growth.h"
+#include "harness/analysis/analysis.h"
+#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 

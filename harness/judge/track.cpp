@@ -1,5 +1,3 @@
-#include "harness/judge/track.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,9 +5,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "harness/judge/demand.h"
-#include "harness/judge/statistics.h"
-#include "harness/record/noise.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/judge/work_precision.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,11 +8,10 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/record/select.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/table.h"
-#include "harness/tables/table_view.h"
-#include "harness/text/files.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -307,14 +304,14 @@ std::string ValueOf(const WorkPrecisionRow& row, const Aspect& aspect) {
 }
 
 /// Values of one setting in the compared rows of all problems.
-struct Finding {
+struct ValueShares {
   bool is_equal = true;             ///< within each problem
   std::vector<std::string> values;  ///< in order of first appearance
   std::vector<int> rows;            ///< numbers of rows with each value
 };
 
-Finding FindValues(const WorkPrecision& work_precision, const Aspect& aspect) {
-  Finding finding;
+ValueShares FindValues(const WorkPrecision& work_precision, const Aspect& aspect) {
+  ValueShares finding;
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     std::set<std::string> own;
     for (const WorkPrecisionRow& row : problem.rows) {
@@ -335,7 +332,7 @@ Finding FindValues(const WorkPrecision& work_precision, const Aspect& aspect) {
 }
 
 /// "integrator (ode45 40, verner 38)"; long lists are cut.
-std::string Shares(const Aspect& aspect, const Finding& finding) {
+std::string Shares(const Aspect& aspect, const ValueShares& finding) {
   constexpr std::size_t kMaxShown = 8;
   std::string text = fmt::format("{} (", aspect.words);
   for (std::size_t i = 0; i < std::min(finding.values.size(), kMaxShown); ++i) {
@@ -431,7 +428,7 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   std::vector<std::string> equal, unequal, unknown, lines;
   bool one_machine = true;
   for (const Aspect& aspect : kAspects) {
-    const Finding finding = FindValues(work_precision, aspect);
+    const ValueShares finding = FindValues(work_precision, aspect);
     if (finding.values.empty()) continue;
     const bool is_single = finding.values.size() == 1;
     if (is_single && finding.values.front().empty()) {

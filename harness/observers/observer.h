@@ -77,7 +77,7 @@ template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run);
 
 /// Returns the observers of an ensemble member; they keep only largest errors
-/// (harness/run/ensemble.h) and need only positions and speeds of a sample.
+/// (harness/run/run.h) and need only positions and speeds of a sample.
 template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeMemberObservers(const Watched<Space>& run);
 

@@ -5,7 +5,7 @@
 //       {{"turns_max", kNumber, {"largest turn", "rad", kScientific}, {kLargest}, kError}}));
 //
 // They observe every accuracy run except members of ensembles. Their keys are measures like all
-// others (measures.h): records contain them, drift.csv has their headings, and `compare` judges
+// others (record.h): records contain them, drift.csv has their headings, and `compare` judges
 // those with a rule.
 #pragma once
 
@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "harness/observers/observer.h"
-#include "harness/record/measures.h"
 #include "harness/record/record.h"
 #include "mechanism/simplify/compile.h"
 

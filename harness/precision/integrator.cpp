@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "harness/precision/scalars.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -7,7 +7,7 @@
 
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/system.h"
 #include "odca/odca.h"

@@ -11,7 +11,7 @@
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "harness/precision/scalars.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "odca/odca.h"
 

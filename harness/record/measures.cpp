@@ -1,10 +1,9 @@
-#include "harness/record/measures.h"
-
 #include <algorithm>
 #include <deque>
 #include <map>
 #include <string>
 
+#include "harness/record/record.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {
@@ -17,6 +16,15 @@ using Format::kExponent, Format::kFixed, Format::kInteger, Format::kScientific, 
     Format::kShortest;
 
 constexpr Repeats kSameBits = Repeats::kUnderOneArithmetic, kVaries = Repeats::kNever;
+
+/// Returns the row of a count of work; parts of a mechanism are added.
+constexpr Measure Work(std::string_view key, std::string_view words) {
+  return {key, kNumber, {words, "", kInteger}, {kSum}, kCount, kSameBits};
+}
+/// Returns the row of an error that `compare` does not judge; the largest of all parts counts.
+constexpr Measure Error(std::string_view key, std::string_view words, std::string_view unit) {
+  return {key, kNumber, {words, unit, kScientific}, {kLargest}};
+}
 
 // Drift of accelerations is not compared: at round-off level it varies with every code change. Two
 // units are part of the words, so that comparison reports omit them.
@@ -126,27 +134,17 @@ constexpr Measure kMeasures[] = {
     {"plan_*", kNumber},
     {"allocations", kNumber, {}, {}, kCount, kSameBits},
     {"bytes", kNumber, {"", "B"}, {}, kCount, kSameBits},
-    {"steps", kNumber, {"steps", "", kInteger}, {kSum}, kCount, kSameBits},
-    {"rejected", kNumber, {"rejected", "", kInteger}, {kSum}, kCount, kSameBits},
-    {"rhs_evaluations", kNumber, {"rhs evaluations", "", kInteger}, {kSum}, kCount, kSameBits},
+    Work("steps", "steps"),
+    Work("rejected", "rejected"),
+    Work("rhs_evaluations", "rhs evaluations"),
     {"rhs_equivalents", kNumber, {"rhs equivalents", "", kInteger}, {kSum}},
     {"projection_iterations", kNumber, {"projections' Newton steps", "", kInteger}, {kSum}},
-    {"restarts", kNumber, {"restarts", "", kInteger}, {kSum}, kCount, kSameBits},
-    {"newton_iterations", kNumber, {"newton iterations", "", kInteger}, {kSum}, kCount, kSameBits},
-    {"newton_failures", kNumber, {"newton failures", "", kInteger}, {kSum}, kCount, kSameBits},
+    Work("restarts", "restarts"),
+    Work("newton_iterations", "newton iterations"),
+    Work("newton_failures", "newton failures"),
     {"newton_jacobians", kNumber, {"jacobians", "", kInteger}, {kSum}},
-    {"newton_rhs_evaluations",
-     kNumber,
-     {"rhs for jacobians", "", kInteger},
-     {kSum},
-     kCount,
-     kSameBits},
-    {"newton_dual_evaluations",
-     kNumber,
-     {"dual evaluations", "", kInteger},
-     {kSum},
-     kCount,
-     kSameBits},
+    Work("newton_rhs_evaluations", "rhs for jacobians"),
+    Work("newton_dual_evaluations", "dual evaluations"),
     {"newton_*", kNumber},
     {"state_hash", kText, {"state hash"}, {kHashOfAll}, kHash, kSameBits},
     {"derivative_hash", kText, {}, {}, kHash, kSameBits},
@@ -191,28 +189,16 @@ constexpr Measure kMeasures[] = {
     {"error_position_rms", kNumber, {"error, rms", "m", kScientific}, {kLargest}, kError},
     {"error_rotation_max", kNumber, {"error, rotation", "rad", kScientific}, {kLargest}, kError},
     {"error_velocity_max", kNumber, {"error, velocity [m/s]", "", kScientific}, {kLargest}, kError},
-    {"error_angular_velocity_max",
-     kNumber,
-     {"error, angular velocity [rad/s]", "", kScientific},
-     {kLargest}},
-    {"error_angle_max", kNumber, {"error, joint angles", "rad", kScientific}, {kLargest}},
-    {"error_displacement_max",
-     kNumber,
-     {"error, joint displacements", "m", kScientific},
-     {kLargest}},
-    {"error_angle_rate_max", kNumber, {"error, joint speeds [rad/s]", "", kScientific}, {kLargest}},
-    {"error_displacement_rate_max",
-     kNumber,
-     {"error, joint speeds [m/s]", "", kScientific},
-     {kLargest}},
-    {"error_over_uncertainty",
-     kNumber,
-     {"error / published uncertainty", "", kScientific},
-     {kLargest}},
-    {"error_energy_max", kNumber, {"error of the energy", "J", kScientific}, {kLargest}},
-    {"error_phase_max", kNumber, {"phase error", "s", kScientific}, {kLargest}},
-    {"error_path_max", kNumber, {"path error", "m", kScientific}, {kLargest}},
-    {"error_interpolation_max", kNumber, {"interpolation", "m", kScientific}, {kLargest}},
+    Error("error_angular_velocity_max", "error, angular velocity [rad/s]", ""),
+    Error("error_angle_max", "error, joint angles", "rad"),
+    Error("error_displacement_max", "error, joint displacements", "m"),
+    Error("error_angle_rate_max", "error, joint speeds [rad/s]", ""),
+    Error("error_displacement_rate_max", "error, joint speeds [m/s]", ""),
+    Error("error_over_uncertainty", "error / published uncertainty", ""),
+    Error("error_energy_max", "error of the energy", "J"),
+    Error("error_phase_max", "phase error", "s"),
+    Error("error_path_max", "path error", "m"),
+    Error("error_interpolation_max", "interpolation", "m"),
     {"error_points", kNumber, {"times compared", "", kInteger}, {kSmallest}},
     {"error_*", kNumber},
     {"trajectory", kText, {"trajectory"}},

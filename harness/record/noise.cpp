@@ -1,5 +1,3 @@
-#include "harness/record/noise.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,8 @@
 #include <limits>
 #include <numeric>
 #include <thread>
+
+#include "harness/record/record.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/record/provenance.h"
-
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sys/utsname.h>
@@ -16,7 +14,8 @@
 
 #include "harness/build_commit.h"
 #include "harness/build_info.h"
-#include "harness/text/hash.h"
+#include "harness/record/record.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -12,9 +12,7 @@
 #include <vector>
 
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 
@@ -30,6 +28,11 @@ void Record::Set(std::string_view key, Value value) {
 const Value* Record::Find(std::string_view key) const {
   const auto it = std::ranges::find(items_, key, &std::pair<std::string, Value>::first);
   return it == items_.end() ? nullptr : &it->second;
+}
+
+std::string Record::Described() const {
+  return Joined(items_, ", ",
+                [this](const auto& item) { return item.first + " = " + Text(item.first); });
 }
 
 std::string Record::Text(std::string_view key) const {
@@ -184,9 +187,7 @@ JsonObject& JsonObject::Add(std::string_view key, Value value) {
 }
 
 JsonObject& JsonObject::Add(std::string_view key, const std::vector<std::string>& texts) {
-  std::string list;
-  for (const std::string& text : texts) list += (list.empty() ? "" : ",") + ValueText(text);
-  Append(key, "[" + list + "]");
+  Append(key, "[" + Joined(texts, ",", ValueText) + "]");
   return *this;
 }
 
@@ -201,9 +202,7 @@ JsonObject& JsonObject::Add(std::string_view key, const std::vector<JsonObject>&
 }
 
 std::string JsonList(const std::vector<JsonObject>& objects) {
-  std::string list;
-  for (const JsonObject& object : objects) list += (list.empty() ? "" : ",\n") + object.Text();
-  return "[" + list + "]";
+  return "[" + Joined(objects, ",\n", &JsonObject::Text) + "]";
 }
 
 }  // namespace loopbench::harness

@@ -1,5 +1,3 @@
-#include "harness/record/select.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,7 +9,8 @@
 #include <optional>
 #include <system_error>
 
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -189,12 +188,9 @@ std::vector<Record> Filter(std::span<const Record> records, const Selection& sel
 }
 
 std::string ToText(const Selection& selection) {
-  std::string text;
-  for (const auto& [key, values, op] : selection) {
-    text +=
-        fmt::format("{}{}{}{}", text.empty() ? "" : " ", key, ToString(op), fmt::join(values, ","));
-  }
-  return text;
+  return Joined(selection, " ", [](const Condition& one) {
+    return fmt::format("{}{}{}", one.key, ToString(one.op), fmt::join(one.values, ","));
+  });
 }
 
 void SortRows(std::vector<Record>* records) { std::ranges::stable_sort(*records, ComesBefore); }

@@ -1,11 +1,11 @@
-#include "harness/reference/error_meter.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
+
+#include "harness/reference/reference.h"
 
 namespace loopbench::harness {
 

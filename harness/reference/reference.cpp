@@ -10,8 +10,7 @@
 #include <stdexcept>
 
 #include "harness/record/record.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

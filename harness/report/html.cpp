@@ -1,5 +1,3 @@
-#include "harness/report/html.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,12 +7,11 @@
 #include <utility>
 
 #include "harness/config/formulations.h"
-#include "harness/judge/claims.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/warning_notes.h"
-#include "harness/text/escape.h"
-#include "harness/text/words.h"
-#include "harness/view/writers.h"
+#include "harness/judge/judge.h"
+#include "harness/report/report.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {
@@ -52,14 +49,14 @@ std::string ColumnText(const ReportTable& table, const TableColumn& column, bool
 /// Returns true for initially visible columns: those of terminal tables, warnings and errors.
 bool IsBrief(const ReportTable& table, const std::string& key) {
   const std::vector<TableColumn> few = ColumnsOfKind(table.kind, true);
-  if (std::ranges::find(few, key, &TableColumn::key) != few.end()) return true;
+  if (Contains(few, key, &TableColumn::key)) return true;
   return key == "warnings" || key == "error_position_max";
 }
 
 std::string TableText(const ReportTable& table) {
   const std::vector<std::string> telling = DistinguishingKeys(table.rows);
   const auto column = [&](const TableColumn& one) {
-    const bool tells = std::ranges::find(telling, one.key) != telling.end();
+    const bool tells = Contains(telling, one.key);
     return ColumnText(table, one, tells || IsBrief(table, one.key));
   };
   const auto text = [](const char* key) {
@@ -90,12 +87,12 @@ std::string LooksText() {
 }
 
 std::string WarningsText() {
-  std::string text;
-  for (const auto& [code, meaning] : MeaningsOfWarnings()) {
-    text +=
-        fmt::format("{}{}:{}", text.empty() ? "" : ",", ScriptString(code), ScriptString(meaning));
-  }
-  return "{" + text + "}";
+  return "{" +
+         Joined(MeaningsOfWarnings(), ",",
+                [](const auto& row) {
+                  return ScriptString(row.first) + ":" + ScriptString(row.second);
+                }) +
+         "}";
 }
 
 std::string CurvesText(const ReportPlot& plot) {
@@ -115,8 +112,7 @@ std::string CostRowText(const WorkPrecisionRow& row, const std::vector<std::stri
 
 std::string CostText(const ReportCost& cost) {
   const auto problem = [](const WorkPrecisionProblem& one) {
-    std::vector<Record> records;
-    for (const WorkPrecisionRow& row : one.rows) records.push_back(row.record);
+    std::vector<Record> records = Mapped<Record>(one.rows, &WorkPrecisionRow::record);
     const std::vector<std::string> keys = DistinguishingKeys(records);
     return fmt::format(
         R"({{"name":{},"rows":{}}})", ScriptString(one.name),

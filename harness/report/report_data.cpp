@@ -1,5 +1,3 @@
-#include "harness/report/report_data.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,16 +9,14 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "harness/judge/work_precision.h"
-#include "harness/record/provenance.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
 #include "harness/reference/reference.h"
-#include "harness/store/result_store.h"
+#include "harness/report/report.h"
+#include "harness/store/store.h"
 #include "harness/suite/suite.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/table_view.h"
-#include "harness/tables/warning_notes.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {

@@ -1,12 +1,10 @@
-#include "harness/run/case_identity.h"
-
 #include <algorithm>
 
 #include "harness/config/experiment.h"
 #include "harness/config/options.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/text/hash.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/run/ensemble.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +9,9 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/record/measures.h"
-#include "harness/text/hash.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/start/assembly.h"
 

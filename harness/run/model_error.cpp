@@ -1,11 +1,10 @@
-#include "harness/run/model_error.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "harness/integrator/arkode.h"
+#include "harness/run/run.h"
 
 namespace loopbench::harness {
 

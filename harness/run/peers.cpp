@@ -1,11 +1,10 @@
-#include "harness/run/peers.h"
-
 #include <fmt/format.h>
 
 #include <map>
 
 #include "harness/config/formulations.h"
-#include "harness/text/files.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {

@@ -1,5 +1,3 @@
-#include "harness/run/run_case.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,17 +6,13 @@
 #include <memory>
 #include <optional>
 
-#include "harness/analysis/model_warnings.h"
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/integrator/arkode.h"
 #include "harness/observers/observer.h"
 #include "harness/observers/registry.h"
-#include "harness/reference/error_meter.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/ensemble.h"
-#include "harness/run/peers.h"
-#include "harness/run/side_by_side.h"
-#include "harness/text/hash.h"
+#include "harness/reference/reference.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {

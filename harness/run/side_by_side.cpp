@@ -1,5 +1,3 @@
-#include "harness/run/side_by_side.h"
-
 #include <algorithm>
 #include <atomic>
 #include <boost/context/fiber.hpp>
@@ -12,7 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/text/cpu_time.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {

@@ -1,5 +1,3 @@
-#include "harness/store/measurements.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +6,9 @@
 #include <set>
 
 #include "harness/json/json_reader.h"
-#include "harness/record/select.h"
-#include "harness/store/result_store.h"
+#include "harness/record/record.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -63,8 +62,7 @@ double Time(const JsonNode& run, const std::string& key) {
   const std::optional<int> index =
       unit ? unit->Choice({"ns", "us", "ms", "s"}, "a unit of time") : std::optional<int>(0);
   const std::optional<JsonNode> time = run.Required(key, "a time");
-  return index && time ? time->Number(kNotNegative) * nanoseconds[static_cast<std::size_t>(*index)]
-                       : 0.0;
+  return index && time ? time->Number(kNotNegative) * nanoseconds[*index] : 0.0;
 }
 
 /// All repetitions of one benchmark.
@@ -154,8 +152,7 @@ Record ReadContext(const JsonNode& root) {
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file) {
   return ReadDocument(text, file, [](const JsonNode& root) {
     if (!root.value().is_object()) root.Fail("the JSON object that Google Benchmark writes");
-    std::vector<Record> records;
-    for (const Repetitions& one : ReadRuns(root)) records.push_back(one.ToRecord());
+    std::vector<Record> records = Mapped<Record>(ReadRuns(root), &Repetitions::ToRecord);
     const Record context = ReadContext(root);
     for (Record& record : records) {
       for (const auto& [key, value] : context.items()) record.Set(key, value);

@@ -1,5 +1,3 @@
-#include "harness/store/record_lines.h"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -20,10 +18,9 @@
 #include <vector>
 
 #include "harness/json/json_document.h"
-#include "harness/record/measures.h"
 #include "harness/record/record.h"
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

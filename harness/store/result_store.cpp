@@ -1,5 +1,3 @@
-#include "harness/store/result_store.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -12,11 +10,9 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "harness/record/measures.h"
 #include "harness/record/record.h"
-#include "harness/store/record_lines.h"
-#include "harness/store/store_lock.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/store/store_lock.h"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
@@ -15,7 +13,8 @@
 #include <thread>
 
 #include "harness/record/record.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

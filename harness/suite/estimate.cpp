@@ -1,5 +1,3 @@
-#include "harness/suite/estimate.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,13 +9,10 @@
 #include <set>
 #include <sstream>
 
-#include "harness/analysis/model_warnings.h"
-#include "harness/analysis/structure_hints.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/run_case.h"
+#include "harness/analysis/analysis.h"
+#include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/cpu_time.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/start/assembly.h"
 
 #ifdef LOOPBENCH_PRECISIONS
@@ -288,7 +283,7 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
 double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
   const Experiment& own = experiments_[experiment];
   const auto sum = [](const auto& rows, const auto& seconds) {
-    double all = seconds(rows.front());  // the first method is timed twice (noise.h)
+    double all = seconds(rows.front());  // the first method is timed twice (record.h)
     for (const auto& row : rows) all += seconds(row);
     return all;
   };
@@ -384,11 +379,7 @@ StartReport CheckStarts(const std::vector<Experiment>& experiments) {
       if (!seen.insert(ToString(experiment.compile) + "\n" + file.canonical).second) continue;
       const StartReport report = ReportOf(LimitsOfRuns(experiment.limits, 1),
                                           [&] { return AnswerOfProblem(experiment, file); });
-      std::string values;
-      for (const auto& [name, value] : experiment.parameters.items()) {
-        values += fmt::format("{}{} = {}", values.empty() ? "" : ", ", name,
-                              experiment.parameters.Text(name));
-      }
+      std::string values = experiment.parameters.Described();
       if (!values.empty()) values = " (at " + values + ")";
       for (const std::string& fault : report.faults) {
         all.faults.push_back(fmt::format("problem \"{}\": {}{}", problem.name, fault, values));

@@ -1,18 +1,15 @@
-#include "harness/suite/reference_cases.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/record/record.h"
-#include "harness/reference/error_meter.h"
-#include "harness/run/case_identity.h"
+#include "harness/reference/reference.h"
+#include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/model/mechanism.h"
 

@@ -1,5 +1,3 @@
-#include "harness/suite/runner.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,15 +7,11 @@
 #include <optional>
 
 #include "harness/isolation/processes.h"
-#include "harness/record/noise.h"
-#include "harness/record/provenance.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/run_case.h"
-#include "harness/run/side_by_side.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/escape.h"
-#include "harness/text/terminal.h"
-#include "harness/timing/calibration.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "harness/trajectory/trajectory.h"
 #include "mechanism/algebra/lanes.h"
 
@@ -175,7 +169,7 @@ Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& referenc
 Piece TimingPiece(const Experiment& experiment, const TimingGroup& group) {
   Piece piece;
   for (const Case& entry : group.cases) piece.owed.push_back(entry.keys);
-  // the first method is timed twice (noise.h)
+  // the first method is timed twice (record.h)
   const int methods = static_cast<int>(group.cases.size()) + 1;
   int threads = 1;
   for (const Case& entry : group.cases) threads = std::max(threads, entry.method.threads);

@@ -12,16 +12,11 @@
 
 #include "harness/config/mechanism_reader.h"
 #include "harness/isolation/processes.h"
-#include "harness/record/noise.h"
+#include "harness/record/record.h"
 #include "harness/reference/reference.h"
-#include "harness/run/case_identity.h"
-#include "harness/suite/estimate.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/suite/runner.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
-#include "harness/text/terminal.h"
-#include "harness/timing/time_cases.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {

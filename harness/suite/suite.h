@@ -1,21 +1,335 @@
-// Runs of experiments: groups of cases, stores, and files next to them.
+// Runs of experiments: estimates, workloads, references, pieces of work, stores.
 #pragma once
 
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "harness/config/experiment.h"
+#include "harness/config/experiment_reader.h"
 #include "harness/isolation/processes.h"
+#include "harness/precision/ladder.h"
 #include "harness/record/record.h"
-#include "harness/record/select.h"
-#include "harness/store/result_store.h"
-#include "harness/suite/workload.h"
+#include "harness/reference/reference.h"
+#include "harness/store/store.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
+
+// Special cases: runs in several scalar types, and certified references.
+
+// Precision ladders of an experiment (harness/precision/ladder.h): one per problem and method.
+
+/// A ladder and the keys of its records: the reference, then every rung in the order of
+/// Ladder::rungs (kind "precision", with case_id and content).
+struct LadderGroup {
+  LadderTask task;  ///< without the description, which the child process makes
+  std::size_t problem = 0;
+  std::vector<Record> keys;
+};
+
+/// Returns the groups that contain a rung passing the filter.
+std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Selection& filter = {});
+
+/// Returns the number of records of all groups.
+std::size_t CountRungs(const Experiment& experiment);
+
+/// Throws ConfigError for a problem that a ladder cannot run: not planar after compilation, or with
+/// time tables. Compiles problems in a child process under the experiment's limits. A problem that
+/// exceeds these limits is not rejected here.
+void CheckLadders(const Experiment& experiment);
+
+/// Throws ConfigError if the experiment has ladders that cannot run: as above, or in a program
+/// built without their scalars (LOOPBENCH_PRECISIONS).
+void RequireLadders(const Experiment& experiment);
+
+/// Runs a ladder; returns one record per key, in order.
+std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group);
+
+// Reference solutions for the accuracy cases of an experiment, one per problem and horizon: a
+// record of each, and a file next to the store for certified ones.
+
+struct ReferenceCase {
+  std::size_t problem = 0;
+  double horizon = 0.0;  ///< [s]
+  std::string id;
+  std::filesystem::path file;  ///< empty for a published series
+  Record keys;                 ///< of kind "reference", with case_id and content
+};
+
+/// Returns true if the case is compared with a certified reference or a published series.
+bool HasReference(const Experiment& experiment, const Case& one);
+
+/// Returns the reference of a case that has one.
+/// @param store  the file of the store
+ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
+                          const std::filesystem::path& store);
+
+/// Creates the file if needed and absent, and returns a record of the certified accuracy.
+Record MakeOne(const Experiment& experiment, const ReferenceCase& one);
+
+/// Reads the certified reference of the case; nothing if the experiment requests none. A failed
+/// reference has no snapshots and contains the reason.
+std::optional<Reference> FindReference(const Experiment& experiment, const Case& one,
+                                       const std::filesystem::path& store);
+
+/// Throws ConfigError if the experiment requests references and this program was built without
+/// their scalars (LOOPBENCH_PRECISIONS).
+void RequireReferences(const Experiment& experiment);
+
+// Before a run: its estimated time, and checks of the start states.
+
+// Estimates the time of the pieces of a suite from pilots: the same work over a shorter horizon.
+
+class TemporaryFolder;
+
+/// CPU times measured by pilots, and the extrapolation to the full horizon.
+struct Rate {
+  double process_s = 0.0;  ///< CPU time of an empty process [s]
+  double fixed_s = 0.0;    ///< per run, independent of the horizon [s]
+  double member = 1.0;     ///< CPU time of an ensemble member [relative to the unperturbed run]
+  double running_s = 0.0;  ///< CPU time of the longest pilot, at its tolerance [s]
+  double reached = 1.0;    ///< part covered by this pilot [of the horizon]
+  double slope_s = 0.0;    ///< slope beyond it: CPU time of a whole horizon [s]
+  double ends_at = 1.0;    ///< part at which a run failed, and will again [of the horizon]
+  /// CPU time at which the step limit ends the run [s].
+  double most_s = std::numeric_limits<double>::infinity();
+
+  /// Returns the CPU time that grows with the horizon, for this part of it [s].
+  double Running(double part) const {
+    const double to = std::min(part, ends_at);
+    return std::min(
+        most_s, to <= reached ? running_s * to / reached : running_s + slope_s * (to - reached));
+  }
+};
+
+/// Pilots begin with 2 % of the horizon and grow until they have used `share` of the estimated time
+/// of the piece, within bounds. The last two give the slope, since many runs begin with short
+/// steps. Runs with equal problem, method and integrator share pilots at the loosest tolerance and,
+/// unless they are short, at the finest. A power law interpolates between them. For a long sweep
+/// eight combinations are tried. Each pilot runs in its own process under the limits of its case.
+/// If these stop it, the case is assumed to end in the same way.
+class Estimate {
+ public:
+  struct Budget {
+    double share = 0.1, least_s = 0.003, most_s = 2.0;  ///< per pilot
+    double usual_s = 4.0;  ///< all pilots [s]: beyond it each may use less than most_s
+    double all_s = 1e9;    ///< wall time of all pilots [s]; later requests remain unknown
+  };
+  /// `experiments` must outlive this. Pilots use tolerances of cases that pass `filter`.
+  Estimate(const std::vector<Experiment>& experiments, const Budget& budget,
+           const Selection& filter = {});
+  ~Estimate();
+
+  /// Returns the CPU time of a piece of the experiment [s], NaN if unknown. A case includes its
+  /// unperturbed run and its ensemble, or, if timed, `simulations` runs in one process.
+  double OfCase(std::size_t experiment, const Case& one, double simulations = 0.0);
+  double OfReference(std::size_t experiment, const ReferenceCase& one);
+  double OfLadder(std::size_t experiment, const LadderGroup& group);
+  double OfTiming(std::size_t experiment, const TimingGroup& group);
+
+  std::size_t pilots() const { return rates_.size(); }
+  /// Returns a sentence for each pilot stopped by its limits.
+  const std::vector<std::string>& cut_off() const { return cut_off_; }
+
+ private:
+  struct PilotCost;
+  std::size_t Nearest(std::size_t experiment) const;
+  const std::pair<double, double>& Tolerances(std::size_t experiment);
+  const Rate* Known(const std::string& key, const std::string& name, const ProcessLimits& limits,
+                    double times, const std::function<PilotCost(double fraction)>& work);
+  std::filesystem::path PlaceForRows();
+  const Rate* RateOfCase(std::size_t experiment, const Case& one, double rtol);
+
+  const std::vector<Experiment>& experiments_;
+  Budget budget_;
+  Selection filter_;
+  std::map<std::size_t, std::pair<double, double>> tolerances_;  ///< finest and loosest
+  double spent_s_ = 0.0;
+  std::unique_ptr<TemporaryFolder> written_;  ///< for trajectories of pilots
+  std::map<std::string, Rate> rates_;
+  std::vector<std::string> cut_off_;
+};
+
+// Checks before any run that the start states can be assembled.
+
+/// Sentences about starts: faults (not assembled, with found and expected values) and warnings
+/// (initial guesses that are not met).
+struct StartReport {
+  std::vector<std::string> faults, warnings;
+};
+
+/// Assembles the mechanism in a child process; exceeding the limits is a fault.
+StartReport CheckStart(const MechanismDescription& description, const ProcessLimits& limits);
+
+/// Checks the problems of an experiment's combinations as they are run, under the limits of their
+/// cases, up to the first combination with a fault. Shared problems are assembled once; members of
+/// ensembles are not checked.
+StartReport CheckStarts(const std::vector<Experiment>& experiments);
+
+/// Throws ConfigError for mechanisms that do not have the degrees of freedom that their files
+/// expect, analysed in a child process; exceeding the limits is an error, too.
+void RequireFreedom(const MechanismFile& file, const ProcessLimits& limits);
+void RequireFreedom(const std::vector<Experiment>& experiments);
+
+// Cases of a run: shards, sweeps of any length, the whole.
+
+// Shards divide a run among several machines.
+
+/// One of `count` shards: every case is in exactly one.
+struct Shard {
+  int index = 1, count = 1;
+  bool Takes(std::size_t number) const {
+    return number % static_cast<std::size_t>(count) == static_cast<std::size_t>(index - 1);
+  }
+};
+
+/// Reads "k/n" with 1 <= k <= n. Throws ConfigError.
+Shard ParseShard(const std::string& text);
+
+// A sweep with too many combinations to hold in memory at once.
+//
+// Opening a sweep reads enough combinations to contain each value of each axis. Invalid values are
+// therefore rejected before anything runs. Invalid combinations of values are rejected when they
+// are reached.
+
+/// Maximum number of combinations of a short sweep. Longer ones are read and run in groups, and
+/// sharded by combination: a shard reads only its own.
+inline constexpr std::size_t kLongSweep = 1000;
+
+/// Experiment files with their changed settings and selection.
+struct ExperimentFiles {
+  std::vector<std::filesystem::path> paths;
+  std::vector<Setting> settings;
+  Selection filter;
+  int threads = 0;  ///< for all methods; 0: as in the files
+};
+
+/// Cases of a problem and method, over all combinations.
+struct CaseLine {
+  std::string mechanism, method;
+  std::size_t cases = 0, runs = 0;  ///< an ensemble adds to the unperturbed run
+};
+
+/// Returns the number of runs of a case.
+std::size_t RunsOf(const Case& entry);
+
+/// Adds a case `times` times to its line; lines are in the order of their first case.
+void AddTo(std::vector<CaseLine>* lines, const Case& entry, std::size_t times = 1);
+
+/// Throws ConfigError for a condition on a key that no case has, since it would match nothing.
+void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter);
+
+/// Returns true if any case of the experiment passes.
+bool Passes(const Experiment& experiment, const Selection& filter);
+
+class LongSweep {
+ public:
+  /// Throws ConfigError as the reader, for all combinations read here, and if no case can pass.
+  LongSweep(ExperimentSource source, const ExperimentFiles& files);
+
+  const ExperimentSource& source() const { return source_; }
+  std::size_t count() const { return source_.count(); }
+
+  /// Returns evenly spaced combinations, at most 64, each with at least one passing case.
+  const std::vector<Experiment>& some() const { return some_; }
+
+  /// Returns the number of combinations in a group: fewer for large mechanisms.
+  std::size_t group_size() const { return group_size_; }
+
+  /// Reads combinations from..to-1 of a shard (its first, second, ...) that have passing cases,
+  /// with their numbers in the sweep.
+  std::vector<Experiment> Read(std::size_t from, std::size_t to, const Shard& shard,
+                               std::vector<std::int64_t>* numbers = nullptr);
+
+  /// Counts all passing cases. Takes a microsecond or two per combination if cases differ only in
+  /// parameters; otherwise reads each combination.
+  std::vector<CaseLine> CountCases();
+
+ private:
+  /// Returns nothing if no case passes.
+  std::vector<Experiment> ReadOne(std::size_t combination);
+  bool ParametersPass(std::size_t combination) const;
+  std::vector<CaseLine> CountAlike(const Experiment& first) const;
+
+  ExperimentSource source_;
+  Selection filter_, on_axes_;  ///< all conditions, and those on parameters only
+  int threads_;
+  bool are_alike_ = true;  ///< keys of cases differ in parameters only
+  std::vector<Experiment> some_;
+  std::size_t group_size_ = kLongSweep;
+};
+
+// Work of a command: the experiments of its files, a group at a time.
+
+/// Experiments in memory at the same time.
+struct ExperimentGroup {
+  std::vector<Experiment> experiments;
+  std::vector<std::int64_t> numbers;  ///< index of each among all experiments of the command
+  std::string name;                   ///< "combinations 1 to 1000 of 1000000", or ""
+  bool is_sharded = false;            ///< true: selected for the shard already
+};
+
+/// Short files form one group. Long sweeps follow in groups of their own.
+class Workload {
+ public:
+  /// Reads all files except the combinations of long sweeps. Throws ConfigError as the readers, and
+  /// if no case of a file passes the filter.
+  explicit Workload(const ExperimentFiles& files, const Shard& shard = {});
+
+  bool is_long() const { return !sweeps_.empty(); }
+  /// Returns the first experiment of the first file.
+  const Experiment& first() const { return *first_; }
+  /// Returns all experiments of short files and samples of each long sweep.
+  const std::vector<Experiment>& some() const { return is_long() ? some_ : whole_.experiments; }
+
+  std::size_t groups() const;
+  ExperimentGroup Read(std::size_t group);
+
+  /// Returns a hash of everything that determines the cases of each group.
+  const std::string& content() const { return content_; }
+
+ private:
+  struct Part {
+    LongSweep sweep;
+    std::size_t groups;
+    std::int64_t first_number;
+  };
+
+  Shard shard_;
+  std::optional<Experiment> first_;
+  ExperimentGroup whole_;         ///< all short files
+  std::vector<Experiment> some_;  ///< samples, if there are long sweeps
+  std::vector<Part> sweeps_;
+  std::string content_;
+};
+
+/// Summary of a file for commands that run nothing.
+struct Overview {
+  std::vector<Experiment> experiments;  ///< experiments with a passing case, all or a sample
+  bool is_sample = false;               ///< true for a sample of a long sweep
+  std::size_t combinations = 0;         ///< number with a passing case; in a long sweep all
+  std::vector<std::pair<std::string, std::size_t>> axes;  ///< with their numbers of values
+  std::vector<CaseLine> lines;                            ///< all passing cases
+
+  std::size_t cases() const;
+};
+
+/// Throws ConfigError as Workload.
+Overview MakeOverview(const std::filesystem::path& path, const ExperimentFiles& files);
+
+// Runs of experiments: groups of cases, stores, and files next to them.
 
 // Runs the cases of experiments in child processes and stores their records.
 
@@ -101,5 +415,118 @@ std::filesystem::path ReferenceOf(const Record& record, const std::filesystem::p
 void CopyMechanisms(const std::vector<Record>& records,
                     const std::vector<std::filesystem::path>& stores,
                     const std::filesystem::path& target);
+
+// Pieces of work, their processes, and the progress line.
+
+// Progress line with the remaining time, on standard error if it is a terminal.
+
+/// Shows the running pieces from the start. Silent if standard error is no terminal.
+class Progress {
+ public:
+  /// A piece of work: label and estimated duration [s]. NaN if unknown: the average of the other
+  /// pieces is used.
+  struct Piece {
+    std::string label;
+    double estimate_s;
+  };
+
+  /// Runs `jobs` pieces at once.
+  Progress(std::string what, std::vector<Piece> pieces, int jobs);
+  ~Progress();  ///< clears the line
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  static bool IsSeen();
+
+  void Start(std::size_t piece);
+  void Done(std::size_t piece);
+  /// Redraws the line if a second has passed.
+  void Look();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Running {
+    std::size_t piece;
+    Clock::time_point begin;
+  };
+
+  /// Returns the remaining time, corrected by the durations of finished pieces. Negative: unknown.
+  double SecondsToGo() const;
+  void Draw();
+
+  std::string what_;
+  std::vector<Piece> pieces_;
+  int jobs_;
+  bool is_seen_;
+  std::size_t done_ = 0;
+  double taken_s_ = 0.0, foreseen_s_ = 0.0;  ///< of the finished pieces
+  double waiting_s_ = 0.0;                   ///< estimate for the pieces that have not begun
+  std::vector<Running> running_;
+  Clock::time_point begin_, drawn_;
+};
+
+// One process of a run: its expected records and the function that makes them.
+
+struct Piece {
+  std::vector<Record> owed;     ///< keys, case_id and content: complete except for results
+  std::int64_t experiment = 0;  ///< index among the experiments of the command
+  /// `beside`: other pieces of the process, null without any.
+  std::function<std::vector<Record>(int threads, SideBySide* beside)> work;
+  ProcessLimits limits;
+  std::string label;
+  double cost = 0.0;                      ///< expensive pieces run first
+  std::string lanes = {};                 ///< pieces with equal names share calls; "": none
+  int threads = 1;                        ///< threads of `work`, which may need fewer
+  std::filesystem::path product = {};     ///< file that must exist for the piece to be done
+  std::filesystem::path trajectory = {};  ///< file that its process may leave incomplete
+  std::function<double(Estimate&)> seconds = {};
+};
+
+/// Pieces of an experiment, which must outlive them.
+/// @param one    case with its id
+/// @param store  the store file; references lie in its folder
+Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
+                    const std::filesystem::path& store);
+Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& reference);
+Piece TimingPiece(const Experiment& experiment, const TimingGroup& group);
+Piece LadderPiece(const Experiment& experiment, const LadderGroup& group);
+
+/// Returns the expected records, filled from the answer or with the reason (parent process).
+/// @param set  changes by --set
+std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
+                              const std::string& set);
+
+// Runs the pieces that a store does not contain yet, and stores their records.
+
+class Runner {
+ public:
+  /// `finished`: records in the store when the run begins.
+  Runner(const SuiteOptions& options, FinishedRuns& finished, ResultStore& store)
+      : options_(options), finished_(finished), store_(store) {}
+
+  /// Runs the unfinished pieces of `pieces`, which are in the order of the experiments.
+  /// @param estimate  time estimates of their experiments
+  /// @param shared    short pieces may share a process
+  /// @returns  number of their records with an outcome other than "finished"
+  std::size_t Run(const std::string& what, std::vector<Piece> pieces, int jobs, bool shared,
+                  Estimate* estimate);
+
+  /// Forgets all requests so far: cases of a long sweep are distinguished within their group only.
+  void Forget() {
+    asked_.clear();
+    count.ids.clear();
+  }
+
+  SuiteCount count;
+
+ private:
+  bool Done(const Piece& piece, std::size_t* failed);
+  std::vector<Piece> NotAsked(std::vector<Piece> pieces);
+
+  const SuiteOptions& options_;
+  FinishedRuns& finished_;
+  ResultStore& store_;
+  std::unordered_set<std::string> asked_;  ///< ids
+};
 
 }  // namespace loopbench::harness

@@ -1,5 +1,3 @@
-#include "harness/suite/workload.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,12 +8,10 @@
 #include <set>
 #include <utility>
 
-#include "harness/record/measures.h"
-#include "harness/record/provenance.h"
-#include "harness/run/case_identity.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/tables/columns.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,8 +7,8 @@
 #include <ranges>
 #include <utility>
 
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 #include "mechanism/formulation/options.h"
 
 namespace loopbench::harness {

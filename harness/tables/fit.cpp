@@ -1,12 +1,10 @@
-#include "harness/tables/fit.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <numeric>
 
-#include "harness/tables/table.h"
-#include "harness/text/terminal.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

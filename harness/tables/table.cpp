@@ -1,5 +1,3 @@
-#include "harness/tables/table.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,9 +10,8 @@
 #include <string_view>
 
 #include "harness/record/record.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/fit.h"
-#include "harness/text/escape.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -44,11 +41,7 @@ std::string FullPrecision(const Record& row, const std::string& key) {
   const Value* value = row.Find(key);
   if (value == nullptr) return "";
   if (const auto* series = std::get_if<std::vector<double>>(value)) {
-    std::string joined;
-    for (const double number : *series) {
-      joined += fmt::format("{}{}", joined.empty() ? "" : ";", number);
-    }
-    return joined;
+    return fmt::format("{}", fmt::join(*series, ";"));
   }
   if (const auto* number = std::get_if<double>(value); number != nullptr && std::isnan(*number)) {
     return "";
@@ -196,8 +189,7 @@ namespace {
 // Returns columns of machine-readable lists: the group's key comes first unless it is a column.
 std::vector<TableColumn> FlatColumns(const Table& table) {
   std::vector<TableColumn> columns = table.columns;
-  if (!table.group.empty() &&
-      std::ranges::find(columns, table.group, &TableColumn::key) == columns.end()) {
+  if (!table.group.empty() && !Contains(columns, table.group, &TableColumn::key)) {
     columns.insert(columns.begin(), ColumnOf(table.group, table.rows));
   }
   return columns;
@@ -361,10 +353,9 @@ std::string Preamble(const std::vector<LatexColumn>& columns, const Setting& set
 }  // namespace
 
 std::string ToLatex(const Table& table) {
-  std::vector<LatexColumn> columns;
-  for (const TableColumn& column : ColumnsUnderHeading(table)) {
-    columns.push_back(LatexColumnOf(table, column));
-  }
+  std::vector<LatexColumn> columns =
+      Mapped<LatexColumn>(ColumnsUnderHeading(table),
+                          [&](const TableColumn& column) { return LatexColumnOf(table, column); });
   std::vector<std::size_t> left;
   std::vector<LatexColumn> shown = columns;
   for (const std::size_t place : OrderOfLeaving(table)) {
@@ -372,7 +363,7 @@ std::string ToLatex(const Table& table) {
     left.push_back(place);
     shown.clear();
     for (std::size_t i = 0; i < columns.size(); ++i) {
-      if (std::ranges::find(left, i) == left.end()) shown.push_back(columns[i]);
+      if (!Contains(left, i)) shown.push_back(columns[i]);
     }
   }
   const Setting setting = SettingFor(shown).value_or(*std::prev(std::end(kSettings)));

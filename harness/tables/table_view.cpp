@@ -1,5 +1,3 @@
-#include "harness/tables/table_view.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,10 +10,9 @@
 
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
-#include "harness/record/noise.h"
-#include "harness/tables/columns.h"
-#include "harness/tables/warning_notes.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {
@@ -277,14 +274,12 @@ std::vector<TableColumn> DefaultColumns(const std::string& kind, bool compact,
 }
 
 std::vector<TableColumn> ChosenColumns(const TableView& view, std::span<const Record> rows) {
-  std::vector<TableColumn> columns;
-  for (const std::string& key : view.columns) columns.push_back(ColumnOf(key, rows));
-  return columns;
+  return Mapped<TableColumn>(view.columns,
+                             [&](const std::string& key) { return ColumnOf(key, rows); });
 }
 
 bool Shows(const Table& table, const std::string& key) {
-  return table.group == key ||
-         std::ranges::find(table.columns, key, &TableColumn::key) != table.columns.end();
+  return table.group == key || Contains(table.columns, key, &TableColumn::key);
 }
 
 // Returns a note on warnings without a column; `runs` are the sources of the table's rows.

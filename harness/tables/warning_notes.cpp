@@ -1,14 +1,12 @@
-#include "harness/tables/warning_notes.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
 #include <utility>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/published_series.h"
-#include "harness/tables/columns.h"
+#include "harness/tables/tables.h"
 
 namespace loopbench::harness {
 namespace {
@@ -113,7 +111,7 @@ std::string NameOfProblem(const Record& record, std::span<const Record> records)
                      NameOfRow(record, keys));
 }
 
-// Describes the runs that decide if runs end differently (harness/analysis/warnings.h).
+// Describes the runs that decide if runs end differently (harness/analysis/analysis.h).
 std::string Deciding(const std::vector<Record>& runs) {
   const bool one_integrator = std::ranges::all_of(runs, [&](const Record& run) {
     return run.Text("integrator") == runs.front().Text("integrator");

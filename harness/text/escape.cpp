@@ -1,5 +1,3 @@
-#include "harness/text/escape.h"
-
 #include <fmt/format.h>
 #include <locale.h>
 
@@ -11,7 +9,7 @@
 #include <iterator>
 #include <span>
 
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/text/files.h"
-
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
@@ -24,8 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/text/run_program.h"
-#include "harness/text/terminal.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/text/run_program.h"
-
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -15,7 +13,7 @@
 #include <exception>
 #include <new>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/text/terminal.h"
-
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -12,6 +10,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
+
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,8 +1,8 @@
-#include "harness/text/words.h"
-
 #include <algorithm>
 #include <cctype>
 #include <cstddef>
+
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,9 +1,9 @@
-#include "harness/timing/allocations.h"
-
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>
 #include <stdexcept>
+
+#include "harness/timing/timing.h"
 
 namespace {
 

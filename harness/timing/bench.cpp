@@ -15,12 +15,9 @@
 #include <sstream>
 
 #include "harness/config/benchmarks.h"
-#include "harness/record/provenance.h"
-#include "harness/text/files.h"
-#include "harness/text/terminal.h"
-#include "harness/timing/allocations.h"
-#include "harness/timing/calibration.h"
-#include "harness/timing/subject.h"
+#include "harness/record/record.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 
 namespace {
 

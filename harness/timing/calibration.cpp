@@ -1,10 +1,10 @@
-#include "harness/timing/calibration.h"
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
+
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 namespace {

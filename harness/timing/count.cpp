@@ -13,14 +13,10 @@
 #include <vector>
 
 #include "harness/config/benchmarks.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/text/files.h"
 #include "harness/text/numeric_option.h"
-#include "harness/text/terminal.h"
-#include "harness/text/words.h"
-#include "harness/timing/allocations.h"
-#include "harness/timing/subject.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 

@@ -1,5 +1,3 @@
-#include "harness/timing/subject.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +9,9 @@
 
 #include "harness/integrator/arkode.h"
 #include "harness/integrator/stepper.h"
-#include "harness/run/run_case.h"
-#include "harness/text/hash.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

@@ -1,5 +1,3 @@
-#include "harness/timing/time_cases.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,11 +8,9 @@
 
 #include "harness/config/benchmarks.h"
 #include "harness/integrator/arkode.h"
-#include "harness/record/noise.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/peers.h"
-#include "harness/run/run_case.h"
-#include "harness/timing/calibration.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
+#include "harness/timing/timing.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

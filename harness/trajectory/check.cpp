@@ -1,5 +1,3 @@
-#include "harness/trajectory/check.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,8 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+
+#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 namespace {

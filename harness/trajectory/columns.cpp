@@ -4,9 +4,8 @@
 #include <numbers>
 #include <utility>
 
-#include "harness/text/escape.h"
+#include "harness/text/text.h"
 #include "harness/trajectory/trajectory.h"
-#include "harness/trajectory/user_mechanism.h"
 
 namespace loopbench::harness {
 namespace {
@@ -26,8 +25,7 @@ void AddVector(const std::string& kind, const std::string& name, const std::stri
 std::string EffortUnit(bool is_length) { return is_length ? "N" : "N m"; }
 
 bool IsLength(const MechanismDescription& user, int joint) {
-  const auto words =
-      ValueWords(user.joints[static_cast<std::size_t>(joint)].type, user.space, false);
+  const auto words = ValueWords(user.joints[joint].type, user.space, false);
   return !words.empty() && words.front().is_length();
 }
 
@@ -43,7 +41,7 @@ void AddReaction(const MechanismDescription& user, const JointDescription& joint
   }
   const auto words = ValueWords(joint.type, user.space, false);
   for (const PrescribedMotion& motion : joint.motions) {
-    const ValueWord& word = words[static_cast<std::size_t>(motion.coordinate)];
+    const ValueWord& word = words[motion.coordinate];
     columns->push_back({"drive", name, std::string(word.name), EffortUnit(word.is_length())});
   }
 }
@@ -53,9 +51,8 @@ void AddForce(const MechanismDescription& user, std::size_t index, bool planar, 
   const ForceParts parts = PartsOf(force);
   const std::string name = fmt::format("{}:{}", index, LabelName(parts.name));
   if (parts.joint != nullptr) {
-    columns->push_back(
-        {"force", name + ":" + LabelName(user.joints[static_cast<std::size_t>(*parts.joint)].name),
-         "effort", EffortUnit(IsLength(user, *parts.joint))});
+    columns->push_back({"force", name + ":" + LabelName(user.joints[*parts.joint].name), "effort",
+                        EffortUnit(IsLength(user, *parts.joint))});
   } else if (parts.points.size() == 2) {
     columns->push_back({"force", name, "tension", "N"});
   } else {
@@ -321,7 +318,7 @@ class RowOf final : public RowWriter {
     const Wrench<Space, double> F = reactions_.Of(j, axes);
     for (int i = 0; i < Space::kLin; ++i) PushOrOpen(F.linear[i]);
     for (int i = 0; i < Space::kRot; ++i) PushOrOpen(F.angular[i]);
-    for (const PrescribedMotion& motion : user_.joints[static_cast<std::size_t>(j)].motions) {
+    for (const PrescribedMotion& motion : user_.joints[j].motions) {
       PushOrOpen(reactions_.DriveOf(j, motion.coordinate));
     }
   }

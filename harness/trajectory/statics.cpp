@@ -1,11 +1,10 @@
-#include "harness/trajectory/statics.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/scaled_loops.h"
 
@@ -69,8 +68,7 @@ class AtRestSearch {
       const auto words = ValueWords(held_.joints[j].type, held_.space, false);
       const std::size_t given = description.joints[j].motions.size();
       for (std::size_t i = given; i < held_.joints[j].motions.size(); ++i) {
-        const ValueWord& word =
-            words[static_cast<std::size_t>(held_.joints[j].motions[i].coordinate)];
+        const ValueWord& word = words[held_.joints[j].motions[i].coordinate];
         statics.held.push_back(fmt::format("{}:{}", LabelName(held_.joints[j].name), word.name));
       }
     }
@@ -123,8 +121,7 @@ class AtRestSearch {
       const double scale =
           joint.kind->inverse_H_squared * (words[i].is_length() ? 1.0 : mechanism_.length());
       for (Eigen::Index k = 0; k < rates.size(); ++k) {
-        rates[k] =
-            scale * user_.DirectionOfSpeed(j, i).dot(relative_[static_cast<std::size_t>(k)][j]);
+        rates[k] = scale * user_.DirectionOfSpeed(j, i).dot(relative_[k][j]);
       }
       Beyond(&rates);
       if (!(rates.norm() > kHolds)) continue;

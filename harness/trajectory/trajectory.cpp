@@ -17,9 +17,7 @@
 
 #include "harness/json/json_document.h"
 #include "harness/record/record.h"
-#include "harness/text/escape.h"
-#include "harness/text/files.h"
-#include "harness/text/hash.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/space.h"
 
 namespace loopbench::harness {

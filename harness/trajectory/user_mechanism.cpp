@@ -1,11 +1,10 @@
-#include "harness/trajectory/user_mechanism.h"
-
 #include <Eigen/Sparse>
 #include <Eigen/SparseQR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/algebra/factors.h"
 #include "mechanism/loops/tree_dynamics.h"
 

@@ -3,9 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "harness/text/escape.h"
-#include "harness/view/picture.h"
-#include "harness/view/writers.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {
@@ -128,44 +127,6 @@ std::string ToJson(const Picture& picture) {
 }
 namespace {
 
-// 0 title, 1 subtitle, 2 failure, 3 flag: outline of the given poses is shown
-constexpr const char* kBody = R"(<header>
-<h1>{0}</h1>
-<p class="soft">{1}</p>
-{2}</header>
-<main>
-<div>
-<div id="stage">
-<canvas id="canvas" tabindex="0" role="img" aria-label="Drawing of {0}; the lists beside it name its parts"
- aria-describedby="keys"></canvas>
-<div id="tip" hidden></div>
-</div>
-<p id="said" role="status" aria-live="polite"></p>
-<div class="controls">
-<div class="row">
-<label>Motion <select id="motion"></select></label>
-<button type="button" id="play" aria-pressed="false">Play</button>
-<input type="range" id="frame" min="0" max="1" step="any" value="0" aria-label="Frame of the motion">
-</div>
-<p id="motiontext" class="soft"></p>
-<div class="row">
-<label><input type="checkbox" id="names" checked> names</label>
-<label><input type="checkbox" id="centres" checked> centres of mass</label>
-<label id="pathslabel"><input type="checkbox" id="paths"> paths of named points</label>
-<label><input type="checkbox" id="given"{3}> as in the file, with open loops</label>
-<button type="button" id="fit">Whole</button>
-<button type="button" id="theme">Dark</button>
-</div>
-</div>
-<p id="keys" class="soft keys">Drag to turn (in the plane: to move), wheel or two fingers to zoom, <kbd>Shift</kbd> and
-drag to move. Keys: arrows, <kbd>+</kbd> <kbd>-</kbd> <kbd>0</kbd>, <kbd>Space</kbd> plays, <kbd>n</kbd> next motion,
-<kbd>g</kbd> as in the file, <kbd>t</kbd> light or dark.</p>
-</div>
-<aside id="lists" aria-label="Parts"></aside>
-</main>
-<noscript><p>The drawing needs JavaScript; loopbench view --format svg does not.</p></noscript>
-)";
-
 std::string Plural(std::size_t count, const char* one, const char* many) {
   return fmt::format("{} {}", count, count == 1 ? one : many);
 }
@@ -198,7 +159,10 @@ std::string ToHtml(const Picture& picture) {
                 EscapeXml(picture.message) + "</p>\n";
   std::string page = PageHead(title);
   page += "</style>\n</head>\n<body>\n";
-  page += fmt::format(kBody, title, subtitle, failure, picture.assembled ? "" : " checked");
+  // the box of the poses in the file is checked where the others are not assembled
+  page += fmt::format(fmt::runtime(kViewBody), fmt::arg("title", title),
+                      fmt::arg("subtitle", subtitle), fmt::arg("failure", failure),
+                      fmt::arg("given", picture.assembled ? "" : " checked"));
   page += "<script type=\"application/json\" id=\"picture\">" + ToJson(picture) + "</script>\n";
   page += "<script>\n";
   page += kSceneScript;
@@ -303,8 +267,7 @@ class Writer {
                      {"bodies", "bodies"}};
     for (const PictureLoop& loop : picture_.loops) {
       std::vector<std::string> names;
-      for (const int b : loop.bodies)
-        names.push_back(picture_.items[static_cast<std::size_t>(b)].name);
+      for (const int b : loop.bodies) names.push_back(picture_.items[b].name);
       AddRow({picture_.items[picture_.ItemOfJoint(loop.cut_joint)].name, Number(loop.gap, small_),
               Number(loop.turn, 1e-12), Number(loop.left, small_),
               fmt::format("{}", fmt::join(names, " "))},

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/view/picture.h"
+#include "harness/view/view.h"
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/singular_values.h"

@@ -1,5 +1,3 @@
-#include "harness/view/picture.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -7,7 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
+#include "harness/view/view.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/simplify/compile.h"
 #include "mechanism/simplify/structure.h"
@@ -27,12 +26,12 @@ std::string ForceText(const MechanismDescription& description, ForceDescription 
   std::vector<std::string> words;
   bool is_length = true;
   if (parts.joint != nullptr) {
-    const JointDescription& joint = description.joints[static_cast<std::size_t>(*parts.joint)];
+    const JointDescription& joint = description.joints[*parts.joint];
     words.push_back("at joint " + joint.name);
     is_length = ValueWords(joint.type, description.space, false).at(0).is_length();
   }
   for (const BodyPoint* point : parts.points) {
-    words.push_back("at " + description.bodies[static_cast<std::size_t>(point->body)].name + " " +
+    words.push_back("at " + description.bodies[point->body].name + " " +
                     VectorText(point->at, description.space));
   }
   if (parts.force != nullptr) {
@@ -61,8 +60,8 @@ void AddItems(const MechanismDescription& description, Picture* picture) {
   for (const JointDescription& joint : description.joints) {
     PictureItem& item = picture->items.emplace_back(PictureItem{ItemKind::kJoint, joint.name});
     item.detail = fmt::format("{} from {} to {}", ToString(joint.type),
-                              description.bodies[static_cast<std::size_t>(joint.from.body)].name,
-                              description.bodies[static_cast<std::size_t>(joint.to.body)].name);
+                              description.bodies[joint.from.body].name,
+                              description.bodies[joint.to.body].name);
     if (!joint.motions.empty()) item.detail += ", with a prescribed motion";
   }
   for (ForceDescription force : description.forces) {
@@ -83,9 +82,7 @@ void MarkGone(const MechanismDescription& description, Picture* picture) {
       item.gone = "does not move: part of the ground";
       continue;
     }
-    const std::string& host = compiled.parts[static_cast<std::size_t>(image.part)]
-                                  .description.bodies[static_cast<std::size_t>(image.body)]
-                                  .name;
+    const std::string& host = compiled.parts[image.part].description.bodies[image.body].name;
     if (host != item.name) item.gone = "moves as one with " + host;
   }
   for (std::size_t j = 0; j < compiled.joints.size(); ++j) {
@@ -98,7 +95,7 @@ void MarkGone(const MechanismDescription& description, Picture* picture) {
 /// Returns the opening of a cut joint in ground axes: rotation [rad] and shift [m].
 template <class Space>
 Direction<Space, double> OpennessOf(const Kinematics<Space, double>& kinematics, int joint) {
-  const JointState<Space, double>& state = kinematics.joints()[static_cast<std::size_t>(joint)];
+  const JointState<Space, double>& state = kinematics.joints()[joint];
   return state.Sum(state.Along(kinematics.ConstraintMismatch(joint), state.rows()), state.rows());
 }
 
@@ -199,7 +196,7 @@ class Maker {
   /// Adds loops; kinematics must be at the given poses.
   void AddLoops(const Structure& structure) {
     const auto add = [&](int joint) -> PictureLoop& {
-      const JointDescription& cut = description_.joints[static_cast<std::size_t>(joint)];
+      const JointDescription& cut = description_.joints[joint];
       PictureLoop& loop = picture_->loops.emplace_back();
       loop.cut_joint = joint;
       const Direction<Space, double> open = OpennessOf(kinematics_, joint);
@@ -246,7 +243,7 @@ Picture MakePicture(const MechanismDescription& description, const std::string& 
   }
   AddItems(description, &picture);
   for (int b = 1; b < std::ssize(description.bodies); ++b) {
-    const BodyDescription& body = description.bodies[static_cast<std::size_t>(b)];
+    const BodyDescription& body = description.bodies[b];
     for (const auto& [name, at] : body.points) {
       if (picture.points.size() == kMaxPoints) break;
       picture.points.push_back({body.name + ":" + name, {.body = b, .at = at}});

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/view/picture.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {
@@ -109,9 +109,7 @@ JointPlaces PlacesOf(const JointDescription& joint) {
 
 std::vector<std::vector<Vector3d>> Attachments(const MechanismDescription& description) {
   std::vector<std::vector<Vector3d>> points(description.bodies.size());
-  const auto add = [&](int body, const Vector3d& at) {
-    points[static_cast<std::size_t>(body)].push_back(at);
-  };
+  const auto add = [&](int body, const Vector3d& at) { points[body].push_back(at); };
   for (const JointDescription& joint : description.joints) {
     add(joint.from.body, joint.from.position);
     add(joint.to.body, joint.to.position);
@@ -344,8 +342,7 @@ class JointSymbol {
 
   /// Returns M in F at the start.
   Frame Relative() const {
-    const Frame P = picture_.start[static_cast<std::size_t>(from())],
-                Q = picture_.start[static_cast<std::size_t>(to())];
+    const Frame P = picture_.start[from()], Q = picture_.start[to()];
     return (P * places_.F).Inverse() * (Q * places_.M);
   }
 
@@ -440,7 +437,7 @@ PicturePlace AddForceShapes(const MechanismDescription& description, ForceDescri
                             Pen pen, const Picture& picture) {
   const ForceParts parts = PartsOf(force);
   if (parts.joint != nullptr) {
-    const JointDescription& joint = description.joints[static_cast<std::size_t>(*parts.joint)];
+    const JointDescription& joint = description.joints[*parts.joint];
     AddAtJoint(joint, ValueWords(joint.type, description.space, false).at(0).is_length(), force,
                pen);
     return {.body = joint.to.body, .at = joint.to.position};
@@ -480,12 +477,12 @@ void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>
     return PicturePlace{.body = index, .at = at};
   };
   const auto faces = HullFaces(points, 0.3 * pen.size());
-  PictureItem& item = picture->items[static_cast<std::size_t>(index)];
+  PictureItem& item = picture->items[index];
   Vector3d middle = Vector3d::Zero();
   for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
   for (const std::vector<int>& face : faces) {
     std::vector<PicturePlace> corners;
-    for (const int i : face) corners.push_back(on_body(points[static_cast<std::size_t>(i)]));
+    for (const int i : face) corners.push_back(on_body(points[i]));
     if (face.size() == 2) {
       middle = 0.5 * (corners[0].at + corners[1].at);
       pen.Add(ShapeKind::kBar, ShapeStyle::kBody, corners, 0.55);
@@ -507,8 +504,7 @@ void AddBody(const BodyDescription& body, int index, const std::vector<Vector3d>
   const bool inside = std::ranges::any_of(
       points, [&](const Vector3d& p) { return (p - body.com).norm() <= 0.5 * pen.size(); });
   if (!inside && !faces.empty() && faces.front().size() == 2) {
-    const Vector3d a = points[static_cast<std::size_t>(faces.front()[0])],
-                   along = points[static_cast<std::size_t>(faces.front()[1])] - a;
+    const Vector3d a = points[faces.front()[0]], along = points[faces.front()[1]] - a;
     const double share = std::clamp(along.dot(body.com - a) / along.squaredNorm(), 0.0, 1.0);
     const Vector3d foot = a + share * along;
     if ((foot - body.com).norm() > 0.6 * pen.size()) {
@@ -524,7 +520,7 @@ void AddShapes(const MechanismDescription& description, Picture* picture) {
   const auto points = Attachments(description);
   std::vector<bool> boxed(description.bodies.size(), false);
   for (const JointDescription& joint : description.joints) {
-    if (joint.type == JointType::kPrismatic) boxed[static_cast<std::size_t>(joint.to.body)] = true;
+    if (joint.type == JointType::kPrismatic) boxed[joint.to.body] = true;
   }
   for (std::size_t b = 1; b < description.bodies.size(); ++b) {
     AddBody(description.bodies[b], static_cast<int>(b), points[b], boxed[b], Pen(picture, b),

@@ -6,9 +6,8 @@
 #include <unordered_set>
 #include <utility>
 
-#include "harness/text/escape.h"
-#include "harness/text/words.h"
-#include "harness/view/writers.h"
+#include "harness/text/text.h"
+#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {

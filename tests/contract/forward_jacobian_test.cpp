@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "odca/odca.h"
 #include "tests/contract/allocations.h"

@@ -15,12 +15,10 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
 #include "harness/exchange/import.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/robustness_map.h"
+#include "harness/judge/judge.h"
 #include "harness/record/record.h"
-#include "harness/store/measurements.h"
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 #include "harness/trajectory/trajectory.h"
 
 namespace loopbench::fuzz {

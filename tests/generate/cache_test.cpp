@@ -12,7 +12,7 @@
 
 #include "harness/generate/generated.h"
 #include "harness/generate/record.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::generate {
 namespace {

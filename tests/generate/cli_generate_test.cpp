@@ -14,7 +14,7 @@
 
 #include "harness/config/mechanism_reader.h"
 #include "harness/integrator/arkode.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/harness/cli_fixture.h"
 

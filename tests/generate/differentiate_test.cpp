@@ -10,8 +10,8 @@
 #include "harness/generate/graph.h"
 #include "harness/generate/record.h"
 #include "harness/generate/recorded.h"
-#include "harness/run/case_identity.h"
-#include "harness/timing/subject.h"
+#include "harness/run/run.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::generate {
 namespace {

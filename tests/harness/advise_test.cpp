@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/cli_fixture.h"

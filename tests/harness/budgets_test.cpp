@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/include_arrows.h"
 #include "tests/harness/places.h"
 
@@ -46,34 +46,34 @@ constexpr Budget kBudgets[] = {
     {"odca",                    { 6724,  23,   5},  3900},
     {"lagrange",                {  383,   4,   4},   350},
     {"reduction",               { 1630,  12,   4},  1350},
-    {"harness/text",            { 1654,  13,   0},   900},
-    {"harness/json",            { 2004,   9,   1},  1300},
-    {"harness/record",          { 1520,  10,   3},  1200},
-    {"harness/store",           { 1656,   8,   3},  1300},
-    {"harness/config",          { 6322,  24,  11},  4000},
-    {"harness/analysis",        { 2130,   8,   9},  1200},
-    {"harness/generate",        { 2437,  12,   7},  1230},
+    {"harness/text",            { 1641,   7,   0},   900},
+    {"harness/json",            { 2000,   9,   1},  1300},
+    {"harness/record",          { 1471,   6,   3},  1200},
+    {"harness/store",           { 1609,   5,   3},  1300},
+    {"harness/config",          { 6262,  24,  11},  4000},
+    {"harness/analysis",        { 2097,   5,   9},  1200},
+    {"harness/generate",        { 2329,  12,   7},  1230},
     {"harness/integrator",      { 1339,   6,   5},   900},
-    {"harness/reference",       {  915,   4,   4},   800},
-    {"harness/trajectory",      { 2538,   9,  12},  1750},
-    {"harness/observers",       { 1147,   4,   7},  1000},
-    {"harness/run",             { 1857,  12,  14},  1700},
+    {"harness/reference",       {  906,   3,   4},   800},
+    {"harness/trajectory",      { 2501,   6,  12},  1750},
+    {"harness/observers",       { 1146,   4,   7},  1000},
+    {"harness/run",             { 1794,   7,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
-    {"harness/isolation",       {  826,   2,   3},   790},
-    {"harness/timing",          { 1367,  10,   7},  1050},
-    {"harness/suite",           { 2391,  10,  15},  1500},
-    {"harness/cluster",         {  491,   2,   5},   420},
+    {"harness/isolation",       {  823,   2,   3},   790},
+    {"harness/timing",          { 1339,   7,   7},  1050},
+    {"harness/suite",           { 2312,   6,  15},  1500},
+    {"harness/cluster",         {  484,   2,   5},   420},
     {"harness/advise",          {  645,   2,   8},   650},
-    {"harness/tables",          { 2018,  10,   5},  1500},
-    {"harness/judge",           { 3694,  18,   5},  2700},
-    {"harness/figures",         { 3105,  12,   7},  1900},
-    {"harness/view",            { 2397,   7,   8},  2050},
-    {"harness/exchange",        { 9035,  35,  10},  5000},
-    {"harness/report",          { 1090,   4,  10},  1100},
-    {"harness/history",         { 2041,  10,   7},  1500},
-    {"harness/cli",             { 7834,  24,  29},  3600},
+    {"harness/tables",          { 1955,   6,   5},  1500},
+    {"harness/judge",           { 3592,  11,   5},  2700},
+    {"harness/figures",         { 3018,   7,   7},  1900},
+    {"harness/view",            { 2346,   6,   8},  2050},
+    {"harness/exchange",        { 8399,  32,  10},  5000},
+    {"harness/report",          { 1073,   3,  10},  1100},
+    {"harness/history",         { 1951,   6,   7},  1500},
+    {"harness/cli",             { 7776,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92554, 472, 242}, 62000}
+    {"",                        {90909, 415, 242}, 62000}
 };
 // clang-format on
 

@@ -1,6 +1,4 @@
 // One identity everywhere: a case is its keys and its content, in stores, tables and judgements.
-#include "harness/run/case_identity.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,9 +6,10 @@
 #include <set>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/record/select.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/timing/time_cases.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
+#include "harness/suite/suite.h"
+#include "harness/timing/timing.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

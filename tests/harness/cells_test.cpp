@@ -1,7 +1,7 @@
 // Room on a terminal, held against what Unicode's East Asian Width and terminals say.
 #include <gtest/gtest.h>
 
-#include "harness/text/escape.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace cells_test {

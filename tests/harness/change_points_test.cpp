@@ -1,7 +1,5 @@
 // Where series change their level: the segmentation against a search of all of them, false alarms
 // and power on series whose answer is known.
-#include "harness/history/change_points.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,8 @@
 #include <limits>
 #include <random>
 #include <vector>
+
+#include "harness/history/history.h"
 
 namespace loopbench::harness {
 namespace change_points_test {

@@ -1,6 +1,4 @@
 // Planted data turn each verdict, and the committed rules are readable and answer to planted data.
-#include "harness/judge/claims.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/files.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace claims_test {

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <vector>
 
-#include "harness/store/measurements.h"
+#include "harness/store/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

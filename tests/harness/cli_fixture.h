@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

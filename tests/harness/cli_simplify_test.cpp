@@ -12,7 +12,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/store/result_store.h"
+#include "harness/store/store.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

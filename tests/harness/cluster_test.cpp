@@ -6,8 +6,7 @@
 #include <string>
 
 #include "harness/record/record.h"
-#include "harness/store/result_store.h"
-#include "harness/store/store_lock.h"
+#include "harness/store/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/history/history_page.h"
-#include "harness/judge/compare.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 namespace compare_ambiguous_test {

@@ -6,8 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/judge/compare.h"
-#include "harness/judge/demand.h"
+#include "harness/judge/judge.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "harness/judge/statistics.h"
+#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 namespace compare_statistics_test {

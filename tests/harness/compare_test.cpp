@@ -1,6 +1,4 @@
 // The gate: what is planted is caught, what is unchanged passes, what cannot be compared is said.
-#include "harness/judge/compare.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,8 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "harness/record/provenance.h"
-#include "harness/store/result_store.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
+#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace compare_test {

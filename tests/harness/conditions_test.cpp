@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/select.h"
-#include "harness/tables/columns.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "harness/config/benchmarks.h"
-#include "harness/text/files.h"
-#include "harness/timing/subject.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "mechanism/model/mechanism.h"
 #include "tests/harness/places.h"
 

@@ -10,8 +10,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/files.h"
-#include "harness/text/words.h"
+#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

@@ -16,9 +16,8 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
 #include "harness/json/file_kind.h"
-#include "harness/judge/claims.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/text/files.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/run/run_case.h"
-#include "harness/text/files.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "tests/harness/places.h"
 

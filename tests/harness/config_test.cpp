@@ -11,7 +11,7 @@
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/json/file_kind.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/analysis/structure_hints.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/places.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/figures/free_figure.h"
-#include "harness/text/files.h"
+#include "harness/figures/figures.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace distinct_points_test {

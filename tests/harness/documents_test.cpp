@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/warnings.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/record/measures.h"
+#include "harness/analysis/analysis.h"
+#include "harness/judge/judge.h"
+#include "harness/record/record.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

@@ -1,7 +1,5 @@
 // Ensembles: starts that are drawn far away stay on their branch, and runs that leave it are
 // counted.
-#include "harness/run/ensemble.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +7,8 @@
 #include <numbers>
 #include <set>
 
-#include "harness/text/files.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 

@@ -1,14 +1,12 @@
 // What users name reaches every medium as text and never as an instruction.
-#include "harness/text/escape.h"
-
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string>
 
-#include "harness/figures/panel.h"
-#include "harness/tables/table.h"
-#include "harness/text/files.h"
+#include "harness/figures/figures.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace escape_test {

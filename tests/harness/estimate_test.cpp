@@ -1,6 +1,4 @@
 // What pilots over a part of the horizon say of the whole.
-#include "harness/suite/estimate.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +7,7 @@
 #include <utility>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/record/select.h"
+#include "harness/record/record.h"
 #include "harness/suite/suite.h"
 
 namespace loopbench::harness {

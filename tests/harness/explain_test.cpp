@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/harness/cli_fixture.h"

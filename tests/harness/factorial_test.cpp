@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/tables/table_view.h"
+#include "harness/tables/tables.h"
 
 namespace loopbench::harness {
 namespace factorial_test {

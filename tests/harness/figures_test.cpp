@@ -13,10 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/axis.h"
-#include "harness/figures/figure_recipes.h"
-#include "harness/figures/panel.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace figures_test {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

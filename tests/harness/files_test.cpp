@@ -1,11 +1,11 @@
 // Files that are there whole or not at all.
-#include "harness/text/files.h"
-
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
 #include <csignal>
 #include <string>
+
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace files_test {

@@ -9,12 +9,11 @@
 #include <variant>
 #include <vector>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/run_case.h"
-#include "harness/tables/table_view.h"
-#include "harness/timing/time_cases.h"
+#include "harness/run/run.h"
+#include "harness/tables/tables.h"
+#include "harness/timing/timing.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

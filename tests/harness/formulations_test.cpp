@@ -5,10 +5,10 @@
 
 #include <stdexcept>
 
-#include "harness/figures/figure_recipes.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/tables/table_view.h"
-#include "harness/text/files.h"
+#include "harness/figures/figures.h"
+#include "harness/suite/suite.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"

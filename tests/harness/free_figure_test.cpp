@@ -1,6 +1,4 @@
 // A figure of any value against any other: labels, scales, curves, and nothing dropped.
-#include "harness/figures/free_figure.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/text/files.h"
+#include "harness/figures/figures.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace free_figure_test {

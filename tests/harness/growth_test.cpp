@@ -1,6 +1,4 @@
 // Growth exponents of synthetic drifts whose exponents are known.
-#include "harness/analysis/growth.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +11,8 @@
 #include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "harness/analysis/analysis.h"
 
 namespace loopbench::harness {
 namespace growth_test {

@@ -9,9 +9,8 @@
 #include <vector>
 
 #include "harness/history/history.h"
-#include "harness/record/provenance.h"
 #include "harness/record/record.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace history_test {

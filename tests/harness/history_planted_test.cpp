@@ -8,8 +8,8 @@
 #include <random>
 #include <sstream>
 
-#include "harness/history/history_series.h"
-#include "harness/judge/statistics.h"
+#include "harness/history/history.h"
+#include "harness/judge/judge.h"
 #include "tests/harness/history_of.h"
 
 namespace loopbench::harness {

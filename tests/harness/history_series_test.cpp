@@ -1,14 +1,12 @@
 // Series of a history, their steps, and the page that shows them.
-#include "harness/history/history_series.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "harness/history/history_page.h"
-#include "harness/text/files.h"
+#include "harness/history/history.h"
+#include "harness/text/text.h"
 #include "tests/harness/history_of.h"
 
 namespace loopbench::harness {

@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/history/history_series.h"
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 #include "tests/harness/history_of.h"
 
 namespace loopbench::harness {

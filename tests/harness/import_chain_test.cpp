@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/harness/import_texts.h"
 

@@ -10,7 +10,7 @@
 
 #include "harness/config/mechanism_reader.h"
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/import_texts.h"
 #include "tests/harness/places.h"
 

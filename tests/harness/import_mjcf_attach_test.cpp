@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/exchange/import.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/description/joint_frames.h"
 
 namespace loopbench::harness {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::architecture {
@@ -62,7 +62,7 @@ TEST(IncludeArrows, LeadFromTestsOverHarnessAndFormulationsToMechanism) {
     ExpectRefused(source, "\"tests/contract/oracle.h\"", "the other way");
   }
   ExpectAllowed("harness/record/record.cpp", "\"mechanism/description/outcome.h\"");
-  ExpectAllowed("tests/harness/store_test.cpp", "\"harness/text/files.h\"");
+  ExpectAllowed("tests/harness/store_test.cpp", "\"harness/text/text.h\"");
   ExpectRefused("mechanism/model/joint.h", "\"harness/record/record.h\"", "the other way");
   ExpectRefused("harness/record/record.cpp", "\"tests/contract/oracle.h\"", "the other way");
 }

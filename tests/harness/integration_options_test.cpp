@@ -8,10 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/run/case_identity.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/harness/integrator_problems.h"
 #include "tests/harness/places.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "harness/integrator/arkode.h"
-#include "harness/text/cpu_time.h"
+#include "harness/text/text.h"
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness {

@@ -4,11 +4,11 @@
 #include <filesystem>
 
 #include "examples/own-parts/half_velocity.h"
-#include "harness/analysis/warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
-#include "harness/figures/figure_recipes.h"
-#include "harness/suite/reference_cases.h"
-#include "harness/text/files.h"
+#include "harness/figures/figures.h"
+#include "harness/suite/suite.h"
+#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/level.h"
 #include "tests/harness/in_child.h"

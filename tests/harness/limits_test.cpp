@@ -7,8 +7,8 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/isolation/processes.h"
-#include "harness/text/terminal.h"
-#include "harness/timing/time_cases.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 #include "mechanism/model/dense_memory.h"
 #include "tests/harness/cli_fixture.h"
 

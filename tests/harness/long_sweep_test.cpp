@@ -10,9 +10,8 @@
 
 #include "harness/cli/commands.h"
 #include "harness/record/record.h"
-#include "harness/record/select.h"
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

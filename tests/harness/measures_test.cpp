@@ -1,12 +1,11 @@
 // The table of measures knows every key once, and all keys of a run.
-#include "harness/record/measures.h"
-
 #include <gtest/gtest.h>
 
 #include <set>
 #include <string_view>
 
-#include "harness/run/run_case.h"
+#include "harness/record/record.h"
+#include "harness/run/run.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

@@ -10,8 +10,8 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/run/run_case.h"
-#include "harness/text/files.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/simplify/redundancy.h"
 #include "tests/contract/generators.h"
 #include "tests/harness/places.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "harness/reference/reference.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/reference/cases.h"
 

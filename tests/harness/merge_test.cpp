@@ -8,9 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/measures.h"
-#include "harness/store/record_lines.h"
-#include "harness/store/store_lock.h"
+#include "harness/record/record.h"
+#include "harness/store/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "harness/record/record.h"
-#include "harness/store/store_lock.h"
+#include "harness/store/store.h"
 #include "harness/suite/suite.h"
 #include "tests/harness/cli_fixture.h"
 

@@ -1,9 +1,8 @@
-#include "harness/analysis/model_warnings.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
 #include "tests/harness/cli_fixture.h"
 

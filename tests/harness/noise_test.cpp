@@ -1,6 +1,4 @@
 // When the machine counts as noisy: planted numbers on either side of each threshold.
-#include "harness/record/noise.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,8 +7,8 @@
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
-#include "harness/timing/calibration.h"
-#include "harness/timing/time_cases.h"
+#include "harness/record/record.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 namespace noise_test {

@@ -17,8 +17,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

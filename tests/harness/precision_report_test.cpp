@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/figure_recipes.h"
-#include "harness/tables/table_view.h"
+#include "harness/figures/figures.h"
+#include "harness/tables/tables.h"
 
 namespace loopbench::harness {
 namespace precision_report_test {

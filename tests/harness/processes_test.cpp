@@ -15,9 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/text/cpu_time.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace processes_test {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/warnings.h"
-#include "harness/text/files.h"
+#include "harness/analysis/analysis.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/reference/cases.h"
 

@@ -1,5 +1,7 @@
 // Reports: what a page holds is what the records and the other commands say, whoever named things
 // and however many there are.
+#include "harness/report/report.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,10 +11,8 @@
 #include <random>
 
 #include "harness/config/formulations.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/report/html.h"
-#include "harness/report/report_data.h"
-#include "harness/tables/table_view.h"
+#include "harness/judge/judge.h"
+#include "harness/tables/tables.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/work_precision_records.h"
 

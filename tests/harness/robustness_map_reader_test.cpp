@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "harness/json/file_kind.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/text/files.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace robustness_map_reader_test {

@@ -7,10 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/judge_figures.h"
-#include "harness/judge/reports.h"
-#include "harness/judge/robustness_map.h"
-#include "harness/text/files.h"
+#include "harness/figures/figures.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
 #include "tests/harness/robustness_map_runs.h"
 
 namespace loopbench::harness {

@@ -1,6 +1,4 @@
 // Planted records turn each cell of a robustness map into each of its classes.
-#include "harness/judge/robustness_map.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/judge/judge.h"
 #include "tests/harness/robustness_map_runs.h"
 
 namespace loopbench::harness {

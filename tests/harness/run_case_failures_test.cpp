@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/record/record.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

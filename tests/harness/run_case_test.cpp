@@ -1,7 +1,5 @@
 // One case from start to record: what is in it, that it is the same every time, and how each kind
 // of failure ends in it.
-#include "harness/run/run_case.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,8 +10,8 @@
 #include <vector>
 
 #include "harness/record/record.h"
-#include "harness/run/case_identity.h"
-#include "harness/tables/columns.h"
+#include "harness/run/run.h"
+#include "harness/tables/tables.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 

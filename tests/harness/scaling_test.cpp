@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/growth.h"
-#include "harness/judge/statistics.h"
+#include "harness/analysis/analysis.h"
+#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 namespace scaling_test {

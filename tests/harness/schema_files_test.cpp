@@ -11,7 +11,7 @@
 #include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
 #include "harness/json/fields.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

@@ -1,6 +1,4 @@
 // Runs that take turns on one thread, and on several.
-#include "harness/run/side_by_side.h"
-
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -12,7 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/cpu_time.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {

@@ -3,9 +3,7 @@
 
 #include <cmath>
 
-#include "harness/run/case_identity.h"
-#include "harness/run/ensemble.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"

@@ -1,6 +1,4 @@
 // Forces at rest against closed forms: virtual work and the balance of the whole.
-#include "harness/trajectory/statics.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <map>
 
 #include "harness/config/mechanism_reader.h"
+#include "harness/trajectory/trajectory.h"
 #include "mechanism/simplify/structure.h"
 #include "tests/harness/places.h"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {

@@ -9,10 +9,10 @@
 #include <string>
 #include <tuple>
 
-#include "harness/judge/track.h"
-#include "harness/store/measurements.h"
-#include "harness/text/files.h"
-#include "harness/timing/subject.h"
+#include "harness/judge/judge.h"
+#include "harness/store/store.h"
+#include "harness/text/text.h"
+#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 namespace store_measurements_test {

@@ -1,4 +1,6 @@
 // The store keeps every value exactly, survives a crash, and names what it cannot read.
+#include "harness/store/store.h"
+
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -12,8 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/store/result_store.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace store_test {

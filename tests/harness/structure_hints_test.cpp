@@ -1,12 +1,11 @@
 // Idle freedoms, hints, and the degrees of freedom that a file expects.
-#include "harness/analysis/structure_hints.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "harness/text/files.h"
+#include "harness/analysis/analysis.h"
+#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

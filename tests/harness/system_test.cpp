@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "harness/integrator/arkode.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 

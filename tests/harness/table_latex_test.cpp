@@ -7,9 +7,8 @@
 #include <filesystem>
 #include <string>
 
-#include "harness/tables/columns.h"
-#include "harness/tables/table.h"
-#include "harness/text/files.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace table_latex_test {

@@ -1,6 +1,4 @@
 // Tables look as written here, character by character.
-#include "harness/tables/table.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/select.h"
-#include "harness/tables/columns.h"
-#include "harness/text/files.h"
+#include "harness/record/record.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace table_test {

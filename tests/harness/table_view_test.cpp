@@ -1,13 +1,11 @@
 // What a table of a store shows: rows, columns, order, groups and warnings.
-#include "harness/tables/table_view.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "harness/tables/columns.h"
-#include "harness/text/files.h"
+#include "harness/tables/tables.h"
+#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace table_view_test {

@@ -12,8 +12,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/escape.h"
-#include "harness/trajectory/check.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 

@@ -6,11 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/model_warnings.h"
-#include "harness/analysis/warnings.h"
-#include "harness/reference/error_meter.h"
-#include "harness/run/case_identity.h"
-#include "harness/text/files.h"
+#include "harness/analysis/analysis.h"
+#include "harness/reference/reference.h"
+#include "harness/run/run.h"
+#include "harness/text/text.h"
 #include "tests/reference/cases.h"
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"

@@ -1,4 +1,6 @@
 // Pictures of mechanisms: what is drawn is what there is, whoever named it and however large it is.
+#include "harness/view/view.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -8,8 +10,6 @@
 #include <regex>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/view/picture.h"
-#include "harness/view/writers.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/simplify/structure.h"

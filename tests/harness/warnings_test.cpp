@@ -1,7 +1,5 @@
 // Each warning is raised by its cause alone; runs of one problem judge each other;
 // and the runs that the rules were made for have them.
-#include "harness/analysis/warnings.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,9 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/model_warnings.h"
-#include "harness/tables/table_view.h"
-#include "harness/tables/warning_notes.h"
+#include "harness/analysis/analysis.h"
+#include "harness/tables/tables.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 

@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/figures/judge_figures.h"
-#include "harness/judge/reports.h"
-#include "harness/judge/work_precision.h"
+#include "harness/figures/figures.h"
+#include "harness/judge/judge.h"
 #include "tests/harness/work_precision_records.h"
 
 namespace loopbench::harness {

@@ -1,7 +1,5 @@
 // Error against cost: joins of runs and timings, fronts against domination by definition, the
 // cheapest methods, what is left out and why.
-#include "harness/judge/work_precision.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/files.h"
+#include "harness/judge/judge.h"
+#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/work_precision_records.h"
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 
 namespace loopbench::odca {
 namespace index_test {

@@ -2,8 +2,7 @@
 // frames, joints, closures, signs of speeds and forces, to round-off.
 #include <gtest/gtest.h>
 
-#include "harness/run/case_identity.h"
-#include "harness/run/peers.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/peers/gripper.h"
 #include "tests/peers/registered.h"

@@ -10,7 +10,7 @@
 
 #include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/export_names.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
 #include "tests/peers/expressible.h"

@@ -11,8 +11,7 @@
 
 #include "harness/exchange/export_mechanism.h"
 #include "harness/json/json_document.h"
-#include "harness/text/files.h"
-#include "harness/text/run_program.h"
+#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
 #include "tests/peers/expressible.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "harness/config/formulations.h"
-#include "harness/run/peers.h"
+#include "harness/run/run.h"
 #include "tests/contract/sample.h"
 
 namespace loopbench::testing {

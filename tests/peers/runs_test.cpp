@@ -2,9 +2,9 @@
 // a peer does not have is named.
 #include <gtest/gtest.h>
 
-#include "harness/analysis/warnings.h"
-#include "harness/run/peers.h"
-#include "harness/timing/time_cases.h"
+#include "harness/analysis/analysis.h"
+#include "harness/run/run.h"
+#include "harness/timing/timing.h"
 #include "tests/peers/registered.h"
 #include "tests/reference/cases.h"
 

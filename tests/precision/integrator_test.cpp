@@ -10,7 +10,7 @@
 #include "harness/config/mechanism_reader.h"
 #include "harness/integrator/arkode.h"
 #include "harness/precision/scalars.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

@@ -9,7 +9,7 @@
 #include <iostream>
 #include <limits>
 
-#include "harness/analysis/model_warnings.h"
+#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/precision/witness.h"
 #include "tests/precision/pendulum.h"

@@ -14,7 +14,7 @@
 
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

@@ -11,7 +11,7 @@
 
 #include "harness/exchange/import.h"
 #include "harness/observers/observer.h"
-#include "harness/text/files.h"
+#include "harness/text/text.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"

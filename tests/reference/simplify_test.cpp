@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/run/model_error.h"
+#include "harness/run/run.h"
 #include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 #include "tests/harness/places.h"

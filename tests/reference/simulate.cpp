@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "harness/run/run_case.h"
+#include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 

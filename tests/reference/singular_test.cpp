@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "harness/config/formulations.h"
-#include "harness/run/ensemble.h"
+#include "harness/run/run.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "tests/harness/integrator_problems.h"

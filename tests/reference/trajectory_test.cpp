@@ -1,4 +1,6 @@
 // Trajectories against closed forms and published numbers, and reactions against statics.
+#include "harness/trajectory/trajectory.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,9 +8,7 @@
 #include <numbers>
 
 #include "harness/observers/observer.h"
-#include "harness/text/files.h"
-#include "harness/trajectory/check.h"
-#include "harness/trajectory/user_mechanism.h"
+#include "harness/text/text.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"

@@ -129,10 +129,8 @@ void CheckDistinct(const JsonNode& node, const SweepGroup& group) {
     std::string all;
     for (const SweepAxis& axis : group.axes) {
       const Json& value = axis.values[i];
-      all += Compact(value.is_number_integer() && value == Json(value.get<double>())
-                         ? Json(value.get<double>())
-                         : Json(Compact(value)));
-      all += ' ';
+      const bool is_whole = value.is_number_integer() && value == Json(value.get<double>());
+      all += Compact(Json(Compact(is_whole ? Json(value.get<double>()) : value)));
     }
     if (known.insert(all).second) continue;
     const std::string values = group.axes.size() == 1 ? Compact(group.axes.front().values[i])

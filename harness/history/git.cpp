@@ -189,8 +189,10 @@ namespace {
 void RequireBranchName(const GitRepository& git, const std::string& branch) {
   // "--branch" rejects "-x" and "HEAD" as `git branch` does, and resolves "@{-1}"
   const ProgramResult checked = git.Try({"check-ref-format", "--branch", branch});
-  if (checked.status == 0 && checked.output == branch + "\n") return;
-  throw ConfigError(fmt::format("--branch: found \"{}\", expected the name of a branch", branch));
+  const bool is_reference = branch == "@" || branch.starts_with("refs/");
+  if (checked.status == 0 && checked.output == branch + "\n" && !is_reference) return;
+  throw ConfigError(fmt::format("--branch: found \"{}\", expected the name of a branch{}", branch,
+                                is_reference ? ", such as \"history\"" : ""));
 }
 
 void RequireHistory(const GitRepository& git, const std::string& branch, const std::string& at) {

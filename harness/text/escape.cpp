@@ -45,7 +45,8 @@ Character FirstOf(std::string_view text) {
 bool Acts(std::uint32_t code) {
   return code < 0x20 || (code >= 0x7F && code < 0xA0) ||  // controls
          (code >= 0x200E && code <= 0x200F) || (code >= 0x2028 && code <= 0x202E) ||
-         (code >= 0x2066 && code <= 0x2069) || code == 0x061C || code == 0xFEFF;  // direction
+         (code >= 0x2066 && code <= 0x2069) || code == 0x061C || code == 0xFEFF ||  // direction
+         (code & 0xFFFE) == 0xFFFE;                                                 // none in XML
 }
 
 std::string Shown(std::uint32_t code) {

@@ -133,7 +133,8 @@ template <class Space>
 std::string AssemblyFault(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
   const Start<double> start = Assemble<Space>(description, mechanism);
-  return start.outcome == Outcome::kFinished ? "" : start.message;
+  if (start.outcome != Outcome::kFinished) return start.message;
+  return start.has_given_speeds ? "" : "the given speeds contradict each other";
 }
 
 template <class Space>

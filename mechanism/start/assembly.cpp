@@ -117,6 +117,7 @@ class Assembler {
       if (fits && after.template lpNorm<Eigen::Infinity>() <= least &&
           change.norm() <= kSmallChange * start_.u.norm()) {
         start_.u += change;
+        start_.has_given_speeds = false;
         left = after;
       }
     }

@@ -22,6 +22,7 @@ struct Start {
   VectorX<S> q, u;
   double position_residual = 0.0;  ///< largest remaining violation [rad or m]
   double speed_residual = 0.0;     ///< largest remaining component of J u [rad/s or m/s]
+  bool has_given_speeds = true;    ///< as given; false: the nearest ones that fit
 };
 
 /// Guesses and fixed values of the coordinates of a mechanism in joint coordinates; 0 for others.

@@ -187,13 +187,13 @@ TEST(Sweep, StarGoesThroughAllElements) {
 }
 
 TEST(Sweep, ValuesMayBeOfAnyKind) {
-  const auto experiments = Read(Text(R"(, "sweep": [{"name": "problem", "field": "/problems",
+  const auto experiments = Read(Text(R"(, "sweep": [{"name": "scene", "field": "/problems",
       "values": [[{"mechanism": "mechanisms/pendulum.json", "horizon": 1}],
                  [{"mechanism": {"family": "chain", "bars": 3}, "horizon": 2}]]}])"));
   ASSERT_EQ(experiments.size(), 2u);
   EXPECT_EQ(experiments[0].problems.front().name, "pendulum");
   EXPECT_EQ(experiments[1].problems.front().name, "chain-3");
-  EXPECT_EQ(experiments[1].parameters.Text("problem").substr(0, 14), "[{\"mechanism\":");
+  EXPECT_EQ(experiments[1].parameters.Text("scene").substr(0, 14), "[{\"mechanism\":");
 }
 
 TEST(Sweep, MistakesNameTheAxisAndTheCombination) {
@@ -219,11 +219,15 @@ TEST(Sweep, ThatCannotBeMeantIsRefused) {
               {"found no \"problem\"", "did you mean \"problems\""});
   ExpectWords(error(R"([{"name": "rtol", "field": "/tolerances", "values": [1e-6]}])"),
               {"/sweep/0/name: found \"rtol\", expected a name that records do not use already"});
+  ExpectWords(error(R"([{"name": "cost", "field": "/tolerances", "values": [1e-6]}])"),
+              {"found \"cost\", expected a name that records do not use already"});
   ExpectWords(error(R"([{"name": "a=b", "field": "/tolerances", "values": [1e-6]}])"), {"letters"});
   ExpectWords(error(R"([{"name": "m", "field": "/tolerances", "values": []}])"),
               {"/sweep/0/values: found an empty array"});
   ExpectWords(error(R"([{"name": "m", "field": "/tolerances", "values": [1e-3, 0.001]}])"),
               {"/sweep/0: found 0.001 again"});
+  ExpectWords(error(R"([{"name": "m", "field": "/problems/0/horizon", "values": [1, 1.0, 2]}])"),
+              {"/sweep/0: found 1.0 again"});
   ExpectWords(error(R"([{"zip": [{"name": "a", "field": "/comment", "values": ["x", "y"]},
                                  {"name": "b", "field": "/name", "values": ["z"]}]}])"),
               {"/sweep/0/zip/1: found 1 values, expected 2, as many as \"a\" has"});

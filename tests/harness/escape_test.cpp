@@ -89,8 +89,9 @@ TEST(Escape, TablesEscapeTitlesHeadersCellsHeadingsAndNotes) {
 }
 
 TEST(Escape, GnuplotShowsAnyText) {
-  // two apostrophes in a row ended a string; '%' in the label of a tick was a format
-  const std::string text = "''a'' 'b' \"c\" `touch pwned` \\n @d $e %s {f}";
+  // two apostrophes in a row ended a string; '%' in the label of a tick was a format; digits after
+  // a sign belonged to its number
+  const std::string text = "''a'' 'b' \"c\" `touch pwned` \\n @d $e %s {f} $100 5\"4 r'12";
   const auto path = std::filesystem::path(testing::TempDir()) / "loopbench-escape.svg";
   const auto error = DrawWithGnuplot(path, {},
                                      "set title " + QuoteGnuplot(text) + "\nset xtics (" +

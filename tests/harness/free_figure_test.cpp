@@ -83,6 +83,24 @@ TEST(FreeFigure, AxesAreLogarithmicWhenTheySpanTwoDecadesOrWhenAsked) {
   EXPECT_FALSE(MakeFreeFigure(Runs(), wanted).figure.log_y);
 }
 
+/// Drift of exactly zero: no line leads over it, and a curve without points is not in the legend.
+TEST(FreeFigure, PointsThatALogarithmicAxisCannotShowAreGapsAndCounted) {
+  std::vector<Record> runs = Runs();
+  runs[2].Set("drift_position_max", 0.0);  // odca between two others
+  runs.push_back(RunOf("reduction", 1e-6, 0.0));
+  FreeFigure wanted = DriftOverTolerance();
+  wanted.log = "xy";
+  const FreeFigureResult result = MakeFreeFigure(runs, wanted);
+  ASSERT_EQ(result.figure.curves.size(), 3u);  // lagrange, odca below and above
+  EXPECT_EQ(result.figure.curves[1].label, "odca");
+  EXPECT_EQ(result.figure.curves[1].x, std::vector<double>{1e-10});
+  EXPECT_EQ(result.figure.curves[2].label, "");
+  EXPECT_EQ(result.figure.curves[2].x, std::vector<double>{1e-6});
+  EXPECT_EQ(result.remarks,
+            std::vector<std::string>{"2 of 6 runs cannot be drawn on logarithmic axes: rtol or "
+                                     "drift_position_max is not positive"});
+}
+
 TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   std::vector<Record> runs = Runs();
   runs[1].Set("outcome", std::string("singular"));  // with a drift

@@ -141,7 +141,8 @@ TEST_F(HistoryBranchTest, ABranchOfCodeIsNoHistory) {
   ExpectEnding(Shell("$lb history show --branch 'empty^'"), 2, {"\"empty^\""});
   // names that `git branch` rejects, and names that mean another branch
   Do("git checkout --quiet -b there && git checkout --quiet -");
-  for (const char* name : {"-x", "HEAD", "@{-1}", "a..b", "a.lock", "a/", "/a", ".a", "a\nb"}) {
+  for (const char* name :
+       {"-x", "HEAD", "@", "@{-1}", "refs/heads/a", "a..b", "a.lock", "a/", "/a", ".a", "a\nb"}) {
     ExpectEnding(Shell("$lb history add first '--branch=" + std::string(name) + "'"), 2,
                  {"expected the name of a branch"});
   }

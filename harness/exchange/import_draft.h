@@ -392,6 +392,8 @@ inline Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Qua
   return q.normalized();
 }
 
+/// Starts followers where their leaders place them. Leaders keep their start, by default zero.
+void PlaceFollowers(ImportDraft* draft);
 /// Read a format: fill the draft from the root element.
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);

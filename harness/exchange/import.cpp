@@ -373,16 +373,10 @@ void ImportDraft::CheckMasses() {
 }
 
 void ImportDraft::HoldFloatingParts() {
-  std::set<int> children;
-  for (const JointDescription& joint : description.joints) {
-    if (!joint.cut) children.insert(joint.to.body);
-  }
   for (const Island& island : FindIslands(description, Connection::kJoints)) {
     if (island.grounded) continue;
-    // the first body that no joint leads to, as the root of a tree
-    const auto root_at =
-        std::ranges::find_if_not(island.bodies, [&](int body) { return children.contains(body); });
-    const int root = root_at != island.bodies.end() ? *root_at : island.bodies.front();
+    const bool has_base = std::ranges::count(island.bodies, base) > 0;
+    const int root = has_base ? base : island.bodies.front();
     AddJoint(NameLater(description.bodies[root].name), JointType::kFree, {}, {root, {}});
     description.initial.coordinates.push_back({last_joint(), at_rest[root].AsCoordinates()});
   }

@@ -306,7 +306,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   }
   if (has_world) draft->NameGround("world");
   const std::vector<UrdfJoint> joints = ReadJoints(root, draft);
-  const int base = PlaceLinks(joints, root, has_world, draft);
+  const int base = draft->base = PlaceLinks(joints, root, has_world, draft);
   const int first = draft->last_joint() + 1;
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);

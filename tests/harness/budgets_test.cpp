@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3694,  18,   5},  2700},
     {"harness/figures",         { 3062,  12,   7},  1900},
     {"harness/view",            { 2397,   7,   8},  2050},
-    {"harness/exchange",        { 9185,  35,  10},  5000},
+    {"harness/exchange",        { 9180,  35,  10},  5000},
     {"harness/report",          { 1090,   4,  10},  1100},
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 7833,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92900, 486, 242}, 62000}
+    {"",                        {92895, 486, 242}, 62000}
 };
 // clang-format on
 

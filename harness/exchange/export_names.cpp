@@ -37,10 +37,7 @@ using Eigen::Vector3d;
 /// Returns the largest moment minus the sum of the others.
 double Excess(const Vector3d& moments) { return 2.0 * moments.maxCoeff() - moments.sum(); }
 
-/// Bounds round-off: an eigenvalue has an error of some eps times the largest; three are compared.
-double RoundOff(const Vector3d& moments) {
-  return 16.0 * std::numeric_limits<double>::epsilon() * moments.maxCoeff();
-}
+double RoundOff(const Vector3d& moments) { return kMomentRoundOff * moments.maxCoeff(); }
 
 }  // namespace
 

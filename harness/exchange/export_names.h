@@ -10,6 +10,10 @@
 
 namespace loopbench::exchange {
 
+/// Tolerance of principal moments of inertia, in parts of the largest: round-off of sums of rotated
+/// inertias and of their eigenvalues.
+inline constexpr double kMomentRoundOff = 0x1p-46;  // 64 units of round-off
+
 // Numbers of a model as vectors and matrices of Eigen.
 
 inline Vec ToVec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }

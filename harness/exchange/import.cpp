@@ -51,8 +51,6 @@ using MassFault = std::pair<std::string, std::string>;
 
 MassFault MassFaultOf(const BodyDescription& body) {
   constexpr double kPrinted = 0.01;  // precision of mechanism files (mechanism_bodies.cpp)
-  // each element of a sum of rotated inertias has some rounding errors of its largest moment
-  constexpr double kRoundOff = 64.0 * std::numeric_limits<double>::epsilon();
   if (!std::isfinite(body.mass) || !body.com.allFinite() || !body.inertia.allFinite()) {
     return {"numbers too large for its mass and inertia", "a body of finite mass and size"};
   }
@@ -64,7 +62,7 @@ MassFault MassFaultOf(const BodyDescription& body) {
   const std::string shown =
       fmt::format("principal moments {:.4g}, {:.4g}, {:.4g} kg m^2, with all that is fixed to it",
                   moments[0], moments[1], moments[2]);
-  if (!(moments[0] > kRoundOff * moments[2])) return {shown, "three that are > 0"};
+  if (!(moments[0] > exchange::kMomentRoundOff * moments[2])) return {shown, "three that are > 0"};
   if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
     return {
         shown,
@@ -377,7 +375,8 @@ void ImportDraft::CheckMasses() {
 void ImportDraft::HoldFloatingParts() {
   for (const Island& island : FindIslands(description, Connection::kJoints)) {
     if (island.grounded) continue;
-    const int root = island.bodies.front();
+    const bool has_base = std::ranges::count(island.bodies, base) > 0;
+    const int root = has_base ? base : island.bodies.front();
     AddJoint(NameLater(description.bodies[root].name), JointType::kFree, {}, {root, {}});
     description.initial.coordinates.push_back({last_joint(), at_rest[root].AsCoordinates()});
   }

@@ -208,6 +208,7 @@ class ImportDraft {
   MechanismDescription description;
   bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
   std::vector<Placement> at_rest;  ///< poses of bodies in ground axes at zero coordinates
+  int base = kGround;  ///< the body of its part that gets a free joint; by default the first one
 
   /// Adds a body; "" is replaced by the next free number. Rejects a name in use. The mass is
   /// initially 0.
@@ -392,6 +393,8 @@ inline Eigen::Quaterniond UnitQuaternion(const XmlValue& value, const Eigen::Qua
   return q.normalized();
 }
 
+/// Starts followers where their leaders place them. Leaders keep their start, by default zero.
+void PlaceFollowers(ImportDraft* draft);
 /// Read a format: fill the draft from the root element.
 void ReadMjcf(const XmlElement& root, ImportDraft* draft);
 void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft* draft);

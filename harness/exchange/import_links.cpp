@@ -233,10 +233,8 @@ BodyDescription Take(const JointDescription& joint, const Vector3d& at, const Ve
       BodyDescription rest = *body;
       AddMass({"", -lump.mass, lump.com, -lump.inertia, {}}, Frame(), &rest);
       const Vector3d left = SymmetricEigenvalues(rest.inertia);
-      constexpr double kSlack = 64.0 * std::numeric_limits<double>::epsilon();
-      if (!(left[0] > 0.9 * moments[0] && left[2] <= (1.0 + kSlack) * (left[0] + left[1]))) {
-        continue;
-      }
+      constexpr double kMost = 1.0 + exchange::kMomentRoundOff;
+      if (!(left[0] > 0.9 * moments[0] && left[2] <= kMost * (left[0] + left[1]))) continue;
       *body = rest;
       return lump;
     }

@@ -13,13 +13,10 @@ constexpr DroppedReason kMjcfReasons[] = {
     {"sensor", "there are no sensors"},
     {"extension", "there are no plugins", true},
     {"deformable", "bodies are rigid", true},
-    {"joint@frictionloss", kDryFriction, true},
     {"joint@springdamper", "stiffness and damping by frequency depend on masses of the start",
      true},
-    {"site@fromto", "a site is taken as the point at its `pos`"},
     {"option@timestep", "runs choose their own steps"},
     {"option@integrator", "runs choose their own integrator"},
-    {"option@density option@viscosity option@wind", kNoMedium, true},
     {"compiler@fusestatic", "bodies without joints stay bodies, welded"},
     // without influence on the motion
     {"visual statistic size custom light camera @group @user @margin @solimplimit @solreflimit "
@@ -34,7 +31,7 @@ constexpr DroppedReason kMjcfReasons[] = {
      "@fwdinv @override @sensor @midphase @nativeccd @autoreset @invdiscrete @sensornoise "
      "@refsafe @frictionloss @limit compiler@strippath compiler@texturedir "
      "compiler@discardvisual compiler@usethread compiler@convexhull "
-     "compiler@exactmeshinertia compiler@fitaabb compiler@saveinertial compiler@alignfree",
+     "compiler@fitaabb compiler@saveinertial",
      ""}};
 
 constexpr std::size_t kActuatorGroups = 31;  // groups that can be disabled
@@ -90,6 +87,8 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
   }
   flag("balanceinertia", &settings->balances_inertia);
   flag("autolimits", &settings->limits_by_range);
+  flag("exactmeshinertia", &settings->has_exact_meshes);
+  flag("alignfree", &settings->aligns_free);
   number("boundmass", &settings->least_mass, kNotNegative);
   number("boundinertia", &settings->least_inertia, kNotNegative);
   number("settotalmass", &settings->total_mass, {});
@@ -99,12 +98,6 @@ void ReadOption(const XmlElement& element, MjcfModel* model) {
   MjcfSettings& settings = model->settings;
   Vector3d& gravity = model->draft->description.gravity;
   if (const auto given = element.Attribute("gravity")) gravity = given->Vector();
-  for (const char* name : {"density", "viscosity", "wind"}) {
-    const auto given = element.Attribute(name);
-    const std::vector<double> medium = given ? given->Numbers(1, 3) : std::vector<double>();
-    const bool acts = std::ranges::any_of(medium, [](double value) { return value != 0.0; });
-    if (acts) model->draft->Drop(element, name, kNoMedium);
-  }
   if (const auto groups = element.Attribute("actuatorgroupdisable")) {
     for (const double group : groups->Numbers(0, kActuatorGroups)) {
       if (!(group >= 0.0 && group < kActuatorGroups) || group != std::floor(group)) {
@@ -128,14 +121,32 @@ void ReadFlags(const XmlElement& root, MjcfModel* model) {
                                       {"constraint", &has_constraints},
                                       {"actuation", &settings.has_actuation},
                                       {"clampctrl", &settings.clamps_controls},
+                                      {"limit", &settings.has_limits},
+                                      {"frictionloss", &settings.has_friction},
                                       {"contact", &settings.has_contact}}) {
       const auto given = flags.Attribute(name);
       if (given) *value = given->Choice<bool>({{"disable", false}, {"enable", true}});
     }
   }
   if (!has_gravity) model->draft->description.gravity.setZero();
-  if (!has_constraints) settings.has_equality = false;
+  if (!has_constraints) {
+    settings.has_equality = settings.has_limits = settings.has_friction = false;
+  }
   if (!has_passive) settings.has_springs = settings.has_dampers = false;
+}
+
+/// Notes a medium. Wind alone has no effect.
+void NoteMedium(const XmlElement& root, const MjcfModel& model) {
+  bool has_medium = false;
+  for (const char* name : {"density", "viscosity", "wind"}) {
+    for (const XmlElement& element : root.Children({"option"})) {
+      const auto given = element.Attribute(name);
+      const std::vector<double> medium = given ? given->Numbers(1, 3) : std::vector<double>();
+      if (std::ranges::all_of(medium, [](double value) { return value == 0.0; })) continue;
+      has_medium = has_medium || std::string_view(name) != "wind";
+      if (has_medium && model.settings.has_passive()) model.draft->Drop(element, name, kNoMedium);
+    }
+  }
 }
 
 /// Keeps meshes for the masses of geoms; the name of a mesh is by default its file's without
@@ -181,12 +192,17 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
   }
   for (const XmlElement& element : root.Children({"option"})) ReadOption(element, &model);
   ReadFlags(root, &model);
+  NoteMedium(root, model);
   for (const XmlElement& element : root.Children({"default"})) model.defaults.Read(element, "");
   ReadAssets(root, &model);
   const std::vector<XmlElement> worlds = root.Children({"worldbody"});
   if (worlds.empty()) root.Fail("no <worldbody>", "one");
   for (const XmlElement& world : worlds) ReadMjcfWorld(world, &model);
   AdjustMasses(&model);
+  // as in MuJoCo, negative ones alone have no effect
+  if (std::ranges::any_of(model.lifts, [](const auto& lift) { return lift.second > 0.0; })) {
+    for (const auto& [body, share] : model.lifts) draft->AddLift(body, share);
+  }
   ReadMjcfLoops(root, &model);
   ReadMjcfKeys(root, &model);
   model.defaults.IgnoreUnused();
@@ -250,19 +266,20 @@ void MjcfDefaults::IgnoreUnused() const {
 Quaterniond MjcfModel::OrientationOf(const XmlElement& element) const {
   constexpr const char* kWays[] = {"quat", "axisangle", "euler", "xyaxes", "zaxis"};
   std::optional<XmlValue> found;
-  std::string way;
   for (const XmlElement& layer : element.Layers()) {
-    std::string here;
+    std::optional<XmlValue> here;
     for (const char* one : kWays) {
-      auto value = layer.Attribute(one);
+      const auto value = layer.Attribute(one);
       if (!value) continue;
-      if (!here.empty()) value->Fail(fmt::format("one orientation: there is \"{}\" too", here));
-      here = one;
-      if (way.empty()) found = std::move(value);
+      if (here) value->Fail(fmt::format("one orientation: there is \"{}\" too", here->attribute()));
+      here = value;
     }
-    if (way.empty()) way = here;
+    // as in MuJoCo, a quaternion does not replace another notation of a default class
+    const bool is_weak = !found || found->attribute() == kWays[0];
+    if (here && is_weak && (!found || here->attribute() != kWays[0])) found = here;
   }
   if (!found) return Quaterniond::Identity();
+  const std::string& way = found->attribute();
   const auto unit = [&](const Vector3d& v) -> Vector3d {
     if (!(v.norm() > 0.0)) found->Fail("axes that are not zero");
     return v.normalized();
@@ -285,6 +302,16 @@ Quaterniond MjcfModel::OrientationOf(const XmlElement& element) const {
   const Vector3d x = unit({a[0], a[1], a[2]}), y_given(a[3], a[4], a[5]);
   const Vector3d y = unit(y_given - x.dot(y_given) * x);
   return FromAxes(x, y, x.cross(y));
+}
+
+double MjcfModel::PlaceAlong(const XmlValue& fromto, Placement* X) const {
+  const std::vector<double> ends = fromto.Numbers(6, 6);
+  const Vector3d from(ends.data()), to(ends.data() + 3);
+  const double length = (to - from).norm();
+  if (!(length > 0.0)) fromto.Fail("two different points");
+  X->p = 0.5 * (from + to);
+  X->q = TurnOfZ(from - to);
+  return length;
 }
 
 std::optional<MjcfLimits> MjcfModel::LimitsOf(const XmlElement& element, const std::string& flag,

@@ -53,10 +53,12 @@ struct MjcfSettings {
   std::string euler = "xyz";
   enum Inertia { kFromInertial, kFromGeoms, kAuto } inertia = kAuto;
   bool balances_inertia = false, limits_by_range = true;
+  bool has_exact_meshes = false;  ///< before MuJoCo 3.2.5
+  bool aligns_free = false;       ///< frames of free bodies are their inertial frames
   double least_mass = 0.0, least_inertia = 0.0, total_mass = -1.0;
   int first_group = 0, last_group = 5;
   bool has_contact = true, has_equality = true, has_springs = true, has_dampers = true;
-  bool has_actuation = true, clamps_controls = true;
+  bool has_actuation = true, clamps_controls = true, has_limits = true, has_friction = true;
   std::set<int> silent_groups;        ///< groups of disabled actuators
   std::filesystem::path mesh_folder;  ///< from the main file's folder
 
@@ -76,6 +78,12 @@ struct MjcfJoint : SerialJoint {
   double spring_reference = 0.0;  ///< its coordinate with a relaxed spring
   std::vector<double> drawn;      ///< its part of qpos in the drawn position
   int joint = -1;                 ///< of the mechanism, until chains are composed
+};
+
+/// Frame of a body in MuJoCo, in the body: of a free body with `align` its inertial frame.
+struct MjcfFrame {
+  Placement X;
+  bool has_axes = true;  ///< false: MuJoCo's axes are eigenvectors, X.q is the identity
 };
 
 /// One copy of the contents of a <replicate>, within a copy of each <replicate> around it.
@@ -100,7 +108,9 @@ class MjcfModel {
   std::map<std::string, XmlElement> meshes;
   mutable std::map<std::string, Solid> mesh_solids;  ///< of meshes that have been read
   std::map<std::string, std::size_t> joint_names;
-  std::set<int> links;  ///< bodies without mass between joints of one body of MuJoCo
+  std::set<int> links;               ///< bodies without mass between joints of one body of MuJoCo
+  std::map<int, MjcfFrame> aligned;  ///< by body
+  std::vector<std::pair<int, double>> lifts;  ///< bodies and their `gravcomp`
   std::map<const void*, std::vector<const MjcfReplica*>>
       replicates;  ///< copies of each <replicate>
 
@@ -132,12 +142,20 @@ class MjcfModel {
     const Eigen::Vector3d p = VectorOr(element.Attribute("pos"));
     return {OrientationOf(element), p};
   }
+  /// Returns the frame that MuJoCo gives to a body.
+  MjcfFrame FrameOf(int body) const {
+    const auto found = aligned.find(body);
+    return found != aligned.end() ? found->second : MjcfFrame();
+  }
+  /// Moves position and axes of a site or geom to the line of its `fromto`. Returns the length.
+  double PlaceAlong(const XmlValue& fromto, Placement* X) const;
   /// Returns the limits in `range`, if `flag` or, without it, the range itself makes them active.
   std::optional<MjcfLimits> LimitsOf(const XmlElement& element, const std::string& flag,
                                      const std::string& range) const;
   /// Notes that limits of a joint or tendon are dropped, with or without a range.
   void NoteLimits(const XmlElement& element, const char* reason) const {
     const auto flag = element.Attribute("limited"), range = element.Attribute("range");
+    if (!settings.has_limits) return;
     if ((flag && flag->text() == "true") || LimitsOf(element, "limited", "range")) {
       draft->Drop(element, range ? "range" : "limited", reason);
     }

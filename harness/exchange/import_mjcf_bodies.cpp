@@ -30,13 +30,7 @@ Vector3d PlaceAndSize(const MjcfModel& model, const XmlElement& geom, Type type,
   std::vector<double> sizes = size->Numbers(has_ends ? 1 : kSizes[type], 3);
   sizes.resize(3);
   if (!has_ends) return Vector3d(sizes.data());
-  const std::vector<double> ends = along->Numbers(6, 6);
-  const Vector3d from(ends.data()), to(ends.data() + 3);
-  const double length = (to - from).norm();
-  if (!(length > 0.0)) along->Fail("two different points");
-  X->p = 0.5 * (from + to);
-  // z along the line, from the second end to the first as in MuJoCo: shapes are symmetric
-  X->q = TurnOfZ(to - from);
+  const double length = model.PlaceAlong(*along, X);
   if (type == kCapsule || type == kCylinder) return {sizes[0], 0.5 * length, 0.0};
   return {sizes[0], sizes[0], 0.5 * length};
 }
@@ -90,7 +84,9 @@ Solid ReadMeshSolid(const MjcfModel& model, const XmlElement& asset) {
   using enum MeshRule;
   constexpr XmlChoice<MeshRule> kRules[] = {
       {"convex", kEnclosed}, {"legacy", kPyramids}, {"exact", kEnclosed}, {"shell", kShell}};
-  const MeshRule rule = inertia ? inertia->Choice(kRules) : kPyramids;
+  const MeshRule rule = inertia                           ? inertia->Choice(kRules)
+                        : model.settings.has_exact_meshes ? kEnclosed
+                                                          : kPyramids;
   const Vector3d scale = VectorOr(asset.Attribute("scale"), Vector3d::Ones());
   const Vector3d origin = VectorOr(asset.Attribute("refpos"));
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
@@ -274,7 +270,9 @@ void Gather(MjcfModel* model, const MjcfPlaced& placed, Contents* contents) {
 void ReadSites(const std::vector<MjcfPlaced>& sites, int body, MjcfModel* model) {
   for (const MjcfPlaced& site : sites) {
     const auto given = site.element.Attribute("name");
-    const Placement X = site.X * model->PlacementOf(site.element);
+    Placement X = model->PlacementOf(site.element);
+    if (const auto along = site.element.Attribute("fromto")) model->PlaceAlong(*along, &X);
+    X = site.X * X;
     if (!given) continue;
     const std::string name = model->NewName("site", *given, site.replica);
     if (!model->sites.emplace(name, FrameOn{body, X}).second) {
@@ -304,8 +302,10 @@ BodyDescription ReadInertial(const MjcfPlaced& placed, const MjcfModel& model) {
   return read;
 }
 
-/// Reads masses. `is_fixed`: fixed to the ground, where masses matter only for a total mass.
-void ReadMasses(Contents& contents, int body, bool is_fixed, MjcfModel* model) {
+/// Reads masses and returns the inertial frame. `is_fixed`: fixed to the ground, where masses
+/// matter only for a total mass. `own`: the pose of the body, without frames around it.
+MjcfFrame ReadMasses(Contents& contents, int body, bool is_fixed, const Placement& own,
+                     MjcfModel* model) {
   const std::vector<MjcfPlaced>& inertials = contents["inertial"];
   const bool has_inertial = !inertials.empty();
   if (inertials.size() > 1) {
@@ -316,20 +316,46 @@ void ReadMasses(Contents& contents, int body, bool is_fixed, MjcfModel* model) {
                            (settings.inertia == MjcfSettings::kAuto && !has_inertial);
   const bool is_idle = is_fixed && settings.total_mass <= 0.0;
   std::vector<PlacedSolid> parts;
+  bool has_axes = true;
   for (const MjcfPlaced& geom : contents["geom"]) {
     PlacedSolid part;
-    if (wants_geoms && ReadGeom(*model, geom, is_idle, &part)) parts.push_back(part);
+    if (!wants_geoms || !ReadGeom(*model, geom, is_idle, &part)) continue;
+    has_axes = parts.empty() && !geom.element.Attribute("mesh");
+    parts.push_back(part);
   }
   BodyDescription masses = SumOf(parts);
   const bool from_geoms = masses.mass > 0.0;  // as in MuJoCo: otherwise <inertial> remains
-  if (from_geoms && has_inertial) {
-    model->draft->DropWhole(inertials[0].element, "inertiafromgeom asks for the geoms' masses");
+  Placement X = own;
+  if (from_geoms) {
+    X = {parts[0].X.q, masses.com};
+    if (has_inertial) {
+      model->draft->DropWhole(inertials[0].element, "inertiafromgeom asks for the geoms' masses");
+    }
   } else if (has_inertial) {
     masses = ReadInertial(inertials[0], *model);
+    X = inertials[0].X * model->PlacementOf(inertials[0].element);
+    has_axes = !inertials[0].element.Attribute("fullinertia");
+  } else if (settings.least_mass > 0.0) {
+    masses.com = own.p;  // in MuJoCo, the pose of such a body is its inertial frame too
   }
   model->draft->SetMass(body, masses.mass, masses.com, masses.inertia);
   IgnoreGeoms(contents["geom"],
               from_geoms ? "no shape here, only its mass: " : "dropped: ", *model);
+  if (!has_axes) X.q.setIdentity();
+  return {X, has_axes};
+}
+
+/// Returns true if MuJoCo moves the frame of the body to its inertial frame.
+bool IsAligned(Contents& contents, const MjcfSettings& settings) {
+  if (contents["joint"].size() != 1 || !contents["body"].empty()) return false;
+  const XmlElement& joint = contents["joint"][0].element;
+  const auto type = joint.Attribute("type"), align = joint.Attribute("align");
+  const bool is_free = joint.tag() == "freejoint" || (type && type->text() == "free");
+  const bool aligns =
+      align
+          ? align->Choice<bool>({{"false", false}, {"true", true}, {"auto", settings.aligns_free}})
+          : settings.aligns_free;
+  return is_free && aligns;
 }
 
 /// Reads a body. `is_fixed`: the parent is the ground or is fixed to it.
@@ -340,15 +366,16 @@ void ReadBody(const MjcfPlaced& placed, int parent, bool is_fixed, MjcfModel* mo
   const auto name = element.Attribute("name");
   const int body =
       draft->AddBody(element, name ? model->NewName("body", *name, placed.replica) : "");
-  const Placement X_PB = placed.X * model->PlacementOf(element);
+  const Placement own = model->PlacementOf(element), X_PB = placed.X * own;
   draft->at_rest[body] = draft->at_rest[parent] * X_PB;
   Contents contents;
   Gather(model, {element, {}, childclass, placed.replica}, &contents);
   is_fixed = is_fixed && contents["joint"].empty();
-  ReadMasses(contents, body, is_fixed, model);
+  const MjcfFrame inertial = ReadMasses(contents, body, is_fixed, own, model);
+  if (IsAligned(contents, model->settings)) model->aligned.emplace(body, inertial);
   ReadSites(contents["site"], body, model);
   const double lift = element.Number("gravcomp", 0.0);
-  if (lift != 0.0 && model->settings.has_passive()) draft->AddLift(body, lift);
+  if (lift != 0.0 && model->settings.has_passive()) model->lifts.emplace_back(body, lift);
   if (BoolOr(element.Attribute("mocap"))) {
     draft->Note(element, "mocap", "stays where the file draws it", true);
   }

@@ -28,7 +28,8 @@ constexpr std::pair<const char*, const char*> kReferences[] = {
 constexpr std::pair<const char*, const char*> kSettings[] = {
     {"angle", "degree"},         {"eulerseq", "xyz"},          {"autolimits", "true"},
     {"inertiafromgeom", "auto"}, {"inertiagrouprange", "0 5"}, {"balanceinertia", "false"},
-    {"boundmass", "0"},          {"boundinertia", "0"},        {"settotalmass", "-1"}};
+    {"boundmass", "0"},          {"boundinertia", "0"},        {"settotalmass", "-1"},
+    {"alignfree", "false"},      {"exactmeshinertia", "false"}};
 
 /// Sections of elements that refer to others.
 constexpr auto kReferring = {"tendon", "equality", "actuator"};
@@ -56,6 +57,13 @@ class Includer {
   /// Resolves a model, whose file is in `folder`.
   void Resolve(Element* root, const fs::path& folder) {
     Include(root, folder);
+    if (Setting(root, "strippath", "false") == "true") {
+      ForElements(root, {"asset"}, [](Element* one, const char*) {
+        const std::string file = ValueOf(one, "file");
+        if (file.empty() || std::string_view(one->Name()) != "mesh") return;
+        one->SetAttribute("file", file.substr(file.find_last_of("/\\") + 1).c_str());
+      });
+    }
     for (Element* place : InWorlds(root, "attach")) Attach(place, root, folder);
   }
 

@@ -57,7 +57,8 @@ MjcfJoint ReadJoint(MjcfModel* written, const MjcfPlaced& placed) {
   };
   joint.reference = angle_or_length("ref");
   joint.spring_reference = angle_or_length("springref");
-  model.DropNonzero(joint.element, "frictionloss", kDryFriction);
+  if (model.settings.has_friction) model.DropNonzero(joint.element, "frictionloss", kDryFriction);
+  if (!model.settings.has_passive()) joint.element.Attribute("springdamper");
   model.NoteLimits(joint.element, kNoEnds);
   if (BoolOr(joint.element.Attribute("actuatorgravcomp")) &&
       (!model.settings.has_actuation || model.LimitsOf(joint.element, kEffortFlag, kEffortRange))) {
@@ -82,9 +83,9 @@ void AddJoint(MjcfModel* model, const XmlElement& body, int parent, int child,
   JointDescription& made = draft->AddJoint(name, joint.type, {parent, X_PF}, {child, X_BJ});
   joint.joint = draft->last_joint();
   if (is_free) {
-    const Eigen::Quaterniond& q = X_PB.q;
+    const auto& [q, p] = X_PB * model->FrameOf(child).X;
     draft->description.initial.coordinates.push_back({joint.joint, X_PB.AsCoordinates()});
-    joint.drawn = {X_PB.p.x(), X_PB.p.y(), X_PB.p.z(), q.w(), q.x(), q.y(), q.z()};
+    joint.drawn = {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()};
   } else if (joint.num_q() == 1) {
     const bool turns = joint.type == JointType::kRevolute;
     const Vector3d own = turns ? Vector3d::UnitZ() : Vector3d::UnitX();
@@ -113,13 +114,17 @@ double Within(const std::optional<MjcfLimits>& limits, double value) {
 /// Coefficients of 1, of the length and of its rate.
 using Linear3 = std::array<double, 3>;
 
-/// Gain and bias of an actuator.
+/// Fields of an actuator in MuJoCo. Each layer overwrites some of them.
 struct Law {
   std::vector<double> gain = {1.0, 0.0, 0.0}, bias = {0.0, 0.0, 0.0};
   std::string gain_type = "fixed", bias_type = "none", dynamics = "none";
   double inherited_range = 0.0;  ///< ratio of the control's range to the joint's; 0: its own
   bool is_other = false;         ///< a layer of another kind has set unsupported parameters
 
+  bool inherits_range() const {
+    return inherited_range > 0.0 && gain_type == "fixed" && bias_type == "affine" &&
+           gain[0] == -bias[1];
+  }
   bool is_linear() const {
     return !is_other && dynamics == "none" && (gain_type == "fixed" || gain_type == "affine") &&
            (bias_type == "none" || bias_type == "affine");
@@ -134,29 +139,33 @@ struct Law {
   }
 };
 
-/// Sets the law of a <position>, <velocity> or <damper>.
+/// Applies a <position>, <velocity> or <damper>. Missing gains keep the values of the layers below
+/// (MuJoCo: OneActuator() in xml_native_reader.cc, mjs_setToPosition() and others in user_api.cc).
 void SetServo(const XmlElement& layer, Law* law) {
   const auto kp = layer.Attribute("kp"), kv = layer.Attribute("kv");
+  if (layer.tag() == "damper") {
+    const double inherited = law->gain_type == "affine" ? -law->gain[2] : 0.0;
+    law->gain = {0.0, 0.0, -NumberOr(kv, inherited, kNotNegative)};
+    law->gain_type = "affine";
+    law->bias_type = law->dynamics = "none";
+    return;
+  }
   law->gain_type = "fixed";
   law->bias_type = "affine";
   if (layer.tag() == "velocity") {
-    law->gain[0] = NumberOr(kv, 1.0, kNotNegative);
+    law->gain[0] = NumberOr(kv, law->gain[0], kNotNegative);
     law->bias = {0.0, 0.0, -law->gain[0]};
-  } else if (layer.tag() == "damper") {
-    law->gain = {0.0, 0.0, -NumberOr(kv, 1.0, kNotNegative)};
-    law->gain_type = "affine";
-    law->bias_type = "none";
-  } else {
-    law->gain[0] = NumberOr(kp, 1.0, kNotNegative);
-    law->bias[1] = -law->gain[0];
-    if (kv) law->bias[2] = -kv->Number(kNotNegative);
-    law->inherited_range = layer.Number("inheritrange", 0.0, kNotNegative);
-    // these need inertias or a state
-    for (const char* name : {"dampratio", "timeconst"}) {
-      if (layer.Number(name, 0.0) != 0.0) law->is_other = true;
-    }
+    law->dynamics = "none";
+    return;
   }
-  law->dynamics = "none";
+  law->gain[0] = NumberOr(kp, law->gain[0], kNotNegative);
+  law->bias[1] = -law->gain[0];
+  if (kv) law->bias[2] = -kv->Number(kNotNegative);
+  if (const auto ratio = layer.Attribute("dampratio")) law->bias[2] = ratio->Number(kNotNegative);
+  if (const auto time = layer.Attribute("timeconst")) {
+    law->dynamics = time->Number(kNotNegative) == 0.0 ? "none" : "filterexact";
+  }
+  law->inherited_range = layer.Number("inheritrange", law->inherited_range, kNotNegative);
 }
 
 /// Returns the law from layers of all kinds of actuators, where the nearest one has precedence. In
@@ -167,7 +176,10 @@ Law LawOf(const XmlElement& actuator) {
   for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
     const std::string tag = layer->tag();
     if (tag == "motor") {
-      law = Law();
+      law.gain[0] = 1.0;
+      law.gain_type = "fixed";
+      law.bias_type = law.dynamics = "none";
+      law.is_other = false;
     } else if (tag == "position" || tag == "velocity" || tag == "damper") {
       SetServo(*layer, &law);
     } else if (tag != "general") {
@@ -208,7 +220,7 @@ constexpr const char* kNoMotor =
 /// Returns the range of an actuator's control.
 std::optional<MjcfLimits> ControlRange(const XmlElement& actuator, const Law& law,
                                        const MjcfJoint& joint, const MjcfModel& model) {
-  if (law.inherited_range <= 0.0) return model.LimitsOf(actuator, "ctrllimited", "ctrlrange");
+  if (!law.inherits_range()) return model.LimitsOf(actuator, "ctrllimited", "ctrlrange");
   auto range = model.LimitsOf(joint.element, "limited", "range");
   if (!range) return std::nullopt;
   const double unit = joint.type == JointType::kRevolute ? model.settings.Angle(1.0) : 1.0;

@@ -5,6 +5,9 @@ namespace loopbench::harness {
 
 namespace {
 
+constexpr const char* kUnknownAxes =
+    "MuJoCo's axes of a free body with align are its principal axes; here they are the file's";
+
 std::string NameOr(const XmlElement& element, const std::string& otherwise) {
   const auto name = element.Attribute("name");
   return name ? name->Name() : otherwise;
@@ -29,9 +32,11 @@ void AddClosure(const XmlElement& equality, MjcfModel* model) {
     first.body = model->BodyNamed(equality.Required("body1", "the name of a body"));
     if (body2) second.body = model->BodyNamed(*body2);
   }
+  const MjcfFrame frame1 = model->FrameOf(first.body), frame2 = model->FrameOf(second.body);
+  const Placement X1 = rest[first.body] * frame1.X, X2 = rest[second.body] * frame2.X;
   if (!site1 && is_weld) {
     second.X.p = VectorOr(equality.Attribute("anchor"));
-    first.X = rest[first.body].Inverse() * rest[second.body] * second.X;
+    first.X = X1.Inverse() * X2 * second.X;
     if (const auto pose = equality.Attribute("relpose")) {
       // a zero quaternion selects the drawn poses
       const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
@@ -40,7 +45,12 @@ void AddClosure(const XmlElement& equality, MjcfModel* model) {
     }
   } else if (!site1) {
     first.X.p = equality.Required("anchor", "3 numbers").Vector();
-    second.X = rest[second.body].Inverse() * rest[first.body] * first.X;
+    second.X = X2.Inverse() * X1 * first.X;
+  }
+  if (!site1) {
+    first.X = frame1.X * first.X;
+    second.X = frame2.X * second.X;
+    if (!frame1.has_axes || !frame2.has_axes) model->draft->Note(equality, kUnknownAxes, true);
   }
   equality.Attribute("anchor");  // not used with sites
   if (is_weld) equality.Attribute("relpose");
@@ -251,13 +261,17 @@ void ReadTendon(const XmlElement& element, const std::vector<int>& groups, MjcfM
     AddSpring(tendon, *ends, LengthOf(*ends, model->where_springs_are_free), model);
   } else {
     tendon.Ignore();
-    for (const char* key : {"stiffness", "damping"}) {
+    for (const auto& [key, acts] : {std::pair{"stiffness", model->settings.has_springs},
+                                    {"damping", model->settings.has_dampers}}) {
+      if (!acts) continue;
       model->DropNonzero(
           tendon, key,
           "only spatial tendons straight between two sites of two bodies are springs here");
     }
   }
-  model->DropNonzero(tendon, "frictionloss", "there is no dry friction");
+  if (model->settings.has_friction) {
+    model->DropNonzero(tendon, "frictionloss", "there is no dry friction");
+  }
   model->DropNonzero(tendon, "armature", "tendons have no inertia");
 }
 
@@ -284,9 +298,17 @@ void SetMjcfStart(MjcfModel* model, const XmlElement& key, const std::vector<dou
     if (joint.type == JointType::kFree) {
       // position in ground axes, angular velocity in body axes
       coordinates = {q[3], q[4], q[5], q[6], q[0], q[1], q[2]};
-      const Vector3d w =
-          Quaterniond(q[3], q[4], q[5], q[6]).normalized() * Vector3d(u[3], u[4], u[5]);
-      speeds = {w.x(), w.y(), w.z(), u[0], u[1], u[2]};
+      const Placement X_WI(Quaterniond(q[3], q[4], q[5], q[6]).normalized(), Vector3d(q));
+      const Vector3d w = X_WI.q * Vector3d(u[3], u[4], u[5]);
+      Vector3d v(u[0], u[1], u[2]);
+      if (const auto it = model->aligned.find(ours.to.body); it != model->aligned.end()) {
+        const Placement X_WB = X_WI * it->second.X.Inverse();
+        coordinates = X_WB.AsCoordinates();
+        v += w.cross(X_WB.p - X_WI.p);
+        const bool is_known = it->second.has_axes || (!positions && w.isZero(0.0));
+        if (!is_known) model->draft->Note(key, kUnknownAxes, true);
+      }
+      speeds = {w.x(), w.y(), w.z(), v.x(), v.y(), v.z()};
     } else if (joint.num_q() == 1) {
       coordinates = {q[0] - joint.reference};
       speeds = {u[0]};

@@ -353,8 +353,9 @@ SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user)
 void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   const SdfFile file{draft, VersionOf(root)};
   const auto world = root.Child("world");
-  RefuseIncludes(root);
   const XmlElement& top = world ? *world : root;
+  RefuseIncludes(root);
+  RefuseIncludes(top);
   if (world && !root.Children({"model"}).empty()) {
     root.Fail("a <world> and a <model> beside it", "one of the two");
   }

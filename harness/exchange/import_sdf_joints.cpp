@@ -124,6 +124,10 @@ void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportD
 void ReadAxes(const std::vector<XmlElement>& axes, std::size_t num_own, const SdfScope& scope,
               Couplings* couplings) {
   ImportDraft* draft = scope.file.draft;
+  if (num_own == 0) {
+    for (const XmlElement& axis : axes) draft->DropWhole(axis, "joints of this type have no axis");
+    return;
+  }
   for (std::size_t i = 0; i < axes.size(); ++i) {
     ReadDynamics(axes[i], num_own == 1 && i == 0, draft);
     const auto mimic = axes[i].Child("mimic");
@@ -294,9 +298,11 @@ void ReadSdfJoints(const SdfScope& scope) {
   Couplings couplings;
   ReadJoints(scope, &couplings);
   for (const Coupling& mimic : couplings.mimics) ReadMimic(mimic);
-  if (couplings.gearboxes.empty()) return;
-  const Turns turns(scope.file.draft->description);
-  for (const Coupling& one : couplings.gearboxes) ReadGearbox(one.element, *one.scope, turns);
+  if (!couplings.gearboxes.empty()) {
+    const Turns turns(scope.file.draft->description);
+    for (const Coupling& one : couplings.gearboxes) ReadGearbox(one.element, *one.scope, turns);
+  }
+  PlaceFollowers(scope.file.draft);
 }
 
 }  // namespace loopbench::harness

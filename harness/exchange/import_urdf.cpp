@@ -150,8 +150,16 @@ void AddJoint(const UrdfJoint& read, ImportDraft* draft) {
   JointDescription& joint =
       draft->AddJoint(name, read.type, {read.parent, read.X_PC}, {read.child, {}});
   ReadAxis(element, &joint, draft);
+  if (const auto type = element.Attribute("type")->text();
+      type != "revolute" && type != "prismatic") {
+    const auto limit = element.Child("limit");
+    if (limit) draft->DropWhole(*limit, "joints of this type have no limits");
+  }
   const auto dynamics = element.Child("dynamics");
   if (!dynamics) return;
+  if (read.type == JointType::kWeld) {
+    return draft->DropWhole(*dynamics, "a fixed joint does not move");
+  }
   const double c = dynamics->Number("damping", 0.0, kNotNegative);
   if (NumValues(read.type, SpaceKind::kSpatial, true) == 1) {
     draft->AddSpringAndDamper(0.0, 0.0, c);
@@ -203,10 +211,14 @@ void ReadTransmission(const XmlElement& element, ImportDraft* draft) {
   }
 }
 
-/// Followers start where their leaders place them. Other joints start at zero.
+}  // namespace
+
 void PlaceFollowers(ImportDraft* draft) {
   MechanismDescription& d = draft->description;
   std::vector<double> start(d.joints.size(), 0.0);
+  for (const JointValues& given : d.initial.coordinates) {
+    if (given.values.size() == 1) start[given.joint] = given.values[0];
+  }
   for (std::size_t j = 0; j < start.size(); ++j) {  // followers of a factor zero
     for (const PrescribedMotion& motion : d.joints[j].motions) {
       start[j] = std::get<Polynomial>(motion.value).coefficients[0];
@@ -218,11 +230,22 @@ void PlaceFollowers(ImportDraft* draft) {
       start[follower.joint] = (mimic.offset - leader.ratio * start[leader.joint]) / follower.ratio;
     }
   }
-  for (int j = 0; j < std::ssize(start); ++j) {
-    const bool is_free = d.joints[j].motions.empty();
-    if (is_free && start[j] != 0.0) d.initial.coordinates.push_back({j, {start[j]}});
+  for (const CouplingDescription& mimic : d.couplings) {
+    const int j = mimic.parts[0].joint;
+    const auto given = std::ranges::find(d.initial.coordinates, j, &JointValues::joint);
+    if (given == d.initial.coordinates.end()) {
+      if (start[j] != 0.0) d.initial.coordinates.push_back({j, {start[j]}});
+    } else if (given->values[0] != start[j]) {
+      draft->Note(draft->element(d.joints[j].to.body),
+                  fmt::format("joint \"{}\" starts at {:.6g}, where it follows another joint",
+                              d.joints[j].name, start[j]),
+                  true);
+      given->values[0] = start[j];
+    }
   }
 }
+
+namespace {
 
 // Loops, which URDF itself excludes: extensions of other programs.
 
@@ -283,7 +306,7 @@ void ReadUrdf(const XmlElement& root, const ImportOptions& options, ImportDraft*
   }
   if (has_world) draft->NameGround("world");
   const std::vector<UrdfJoint> joints = ReadJoints(root, draft);
-  const int base = PlaceLinks(joints, root, has_world, draft);
+  const int base = draft->base = PlaceLinks(joints, root, has_world, draft);
   const int first = draft->last_joint() + 1;
   for (const UrdfJoint& joint : joints) AddJoint(joint, draft);
   for (int i = 0; i < std::ssize(joints); ++i) AddMimic(joints[i], first + i, draft);

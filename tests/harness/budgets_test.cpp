@@ -68,12 +68,12 @@ constexpr Budget kBudgets[] = {
     {"harness/judge",           { 3592,  11,   5},  2700},
     {"harness/figures",         { 3018,   7,   7},  1900},
     {"harness/view",            { 2346,   6,   8},  2050},
-    {"harness/exchange",        { 8399,  32,  10},  5000},
+    {"harness/exchange",        { 8544,  32,  10},  5000},
     {"harness/report",          { 1073,   3,  10},  1100},
     {"harness/history",         { 1953,   6,   7},  1500},
     {"harness/cli",             { 7776,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {90913, 415, 242}, 62000}
+    {"",                        {91058, 415, 242}, 62000}
 };
 // clang-format on
 

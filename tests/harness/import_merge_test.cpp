@@ -1,6 +1,7 @@
 // Parts fixed together are one body: the sum has mass and inertia, the parts need not.
 #include <gtest/gtest.h>
 
+#include "harness/exchange/export_names.h"
 #include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {
@@ -319,6 +320,15 @@ TEST(ImportMerge, LimitsNeedNoRange) {
                                    kInertial + "</body></worldbody></mujoco>");
     EXPECT_FALSE(HasNote(imported, "<joint", "without ends")) << joint;
   }
+}
+
+TEST(ImportMerge, ExportersAcceptTheMomentsOfImporters) {
+  // the largest moment exceeds the sum by round-off of a sum of rotated inertias
+  exchange::Body body;
+  body.inertia = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0 + 2e-14};
+  EXPECT_EQ(exchange::FaultOfInertia(body, false), "");
+  body.inertia[8] = 2.0 + 1e-12;
+  EXPECT_NE(exchange::FaultOfInertia(body, false), "");
 }
 
 }  // namespace import_merge_test

@@ -53,7 +53,7 @@ TEST(ImportMjcf, ServosUnderAConstantControlAreSpringsAndDampers) {
   ExpectNote(limited, "<position> forcerange", "no largest effort");
   const Imported both = with("<position joint=\"j\"/><motor joint=\"j\"/>", "2 3");
   EXPECT_EQ(ForcesOf<JointSpring>(both)[0].rest, 2.0 - 0.5 + 3.0);
-  ExpectNote(with("<position joint=\"j\" dampratio=\"1\"/>", "1"), "<position>", "only motors");
+  ExpectNote(with("<position joint=\"j\" dampratio=\"1\"/>", "1"), "<position>", "damping ratio");
 }
 
 /// The efforts on joint "j", which stands alone.
@@ -149,6 +149,48 @@ TEST(ImportMjcf, ActuatorsOfAllKindsHaveOneDefault) {
                             "<actuator><motor joint=\"j\" class=\"x\"/></actuator>"
                             "<keyframe><key ctrl=\"1\"/></keyframe>");
   EXPECT_FALSE(HasNote(kept, "<position>", ""));
+}
+
+TEST(ImportMjcf, ServosKeepTheGainsOfTheLayersBelow) {
+  struct Row {
+    std::string below, actuator;
+    double stiffness, damping;
+  };
+  // at control 0.8; values of MuJoCo 3.14
+  const std::string affine = "<general gainprm=\"4\" biastype=\"affine\" biasprm=\"0.3 -2 -0.6\"/>",
+                    damper = "<damper kv=\"3\" ctrlrange=\"0 1\"/>";
+  for (const auto& [below, actuator, k, c] :
+       std::vector<Row>{{"<position kp=\"7\"/>", "position", 7, 0},
+                        {"<position kp=\"7\"/>", "position kv=\"0.4\"", 7, 0.4},
+                        {"<position kp=\"7\" kv=\"0.7\"/>", "position kp=\"2\"", 2, 0.7},
+                        {"<position kp=\"7\" dampratio=\"1\"/>", "position kv=\"0.5\"", 7, 0.5},
+                        {"<position timeconst=\"1\"/>", "position timeconst=\"0\"", 1, 0},
+                        {"<general dyntype=\"filter\"/>", "position", 0, 0},
+                        {"<position kp=\"7\"/>", "velocity", 0, 7},
+                        {"<velocity kv=\"5\"/>", "velocity", 0, 5},
+                        {"<velocity kv=\"5\"/>", "position kp=\"2\"", 2, 5},
+                        {"<general gainprm=\"4\"/>", "position", 4, 0},
+                        {affine, "position kp=\"2\"", 2, 0.6},
+                        {affine, "velocity", 0, 4},
+                        {affine + "<motor/>", "position kp=\"3\"", 3, 0.6},
+                        {damper, "damper ctrlrange=\"0 1\"", 0, 2.4},
+                        {damper, "position kp=\"2\"", 2, 0},
+                        {"<position kp=\"7\" kv=\"1\"/>", "damper ctrlrange=\"0 1\"", 0, 0},
+                        {"", "damper ctrlrange=\"0 1\"", 0, 0}}) {
+    SCOPED_TRACE(below + " " + actuator);
+    const Imported imported = Read("<joint name=\"j\"/>", "<default>" + below + "</default>",
+                                   "<actuator><" + actuator +
+                                       " joint=\"j\"/></actuator>"
+                                       "<keyframe><key ctrl=\"0.8\"/></keyframe>");
+    const auto springs = ForcesOf<JointSpring>(imported);
+    const auto dampers = ForcesOf<JointDamper>(imported);
+    EXPECT_NEAR(springs.empty() ? 0.0 : springs[0].stiffness, k, kEps);
+    EXPECT_NEAR(dampers.empty() ? 0.0 : dampers[0].damping, c, kEps);
+  }
+  // a motor does not inherit the range of the joint
+  EXPECT_EQ(Efforts("<default><position inheritrange=\"1\"/></default>",
+                    "<motor joint=\"j\" ctrlrange=\"-1 1\"/>", "3", "range=\"-90 90\""),
+            Values{1});
 }
 
 }  // namespace import_mjcf_actuators_test

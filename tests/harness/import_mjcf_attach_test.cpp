@@ -263,6 +263,11 @@ TEST_F(ImportMjcfAttach, MeshesAreFoundBesideTheirModel) {
         "<mujoco><asset><model name=\"box\" file=\"parts/box.xml\"/></asset><worldbody>"
         "<attach model=\"box\" prefix=\"p_\"/></worldbody></mujoco>");
   EXPECT_NEAR(Read().description.bodies[1].mass, 10.0, 1e-13);
+  Write("main.xml",
+        "<mujoco><compiler meshdir=\"parts/meshes\" strippath=\"true\"/><asset><mesh name=\"m\" "
+        "file=\"away/cube.obj\"/></asset><worldbody><body><joint/><geom type=\"mesh\" mesh=\"m\" "
+        "density=\"10\"/></body></worldbody></mujoco>");
+  EXPECT_NEAR(Read().description.bodies[1].mass, 10.0, 1e-13);
 }
 
 TEST_F(ImportMjcfAttach, FaultsAreNamed) {

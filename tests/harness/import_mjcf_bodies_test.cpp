@@ -270,5 +270,70 @@ TEST(ImportMjcf, WeightIsCarriedWhilePassiveForcesAct) {
   EXPECT_EQ(lifts("spring=\"disable\" damper=\"disable\""), 0u);
 }
 
+TEST(ImportMjcf, BodiesThatHaveOnlyABoundedMassHaveItAtTheirOwnPosition) {
+  // body_ipos of MuJoCo 2.2.2 to 3.14: the position, without frames around the body
+  const Imported imported = ImportText(
+      "<mujoco><compiler boundmass=\"0.2\" boundinertia=\"0.01\"/><worldbody>"
+      "<frame pos=\"1 1 1\"><body name=\"b\" pos=\"0.3 0.2 0.1\"><joint/></body></frame>"
+      "</worldbody></mujoco>",
+      "file.xml");
+  EXPECT_EQ(imported.description.bodies[1].mass, 0.2);
+  EXPECT_EQ(imported.description.bodies[1].com, Eigen::Vector3d(0.3, 0.2, 0.1));
+}
+
+TEST(ImportMjcf, QuaternionsDoNotReplaceOtherOrientationsOfAClass) {
+  const auto com = [](const std::string& below, const std::string& own) {
+    return ImportText(
+               "<mujoco><default><site " + below +
+                   "/></default><worldbody><body name=\"b\"><joint/>" + kInertial +
+                   "<site name=\"s\" " + own +
+                   "/></body></worldbody><equality><weld site1=\"s\" site2=\"w\"/></equality>"
+                   "<worldbody><site name=\"w\" quat=\"1 0 0 0\"/></worldbody></mujoco>",
+               "file.xml")
+        .description.joints.back()
+        .from.rotation;
+  };
+  const Eigen::Vector3d x = kPi / 2 * Eigen::Vector3d::UnitX(),
+                        y = kPi / 2 * Eigen::Vector3d::UnitY();
+  const std::string turn_x = "euler=\"90 0 0\"", turn_y = "axisangle=\"0 1 0 90\"",
+                    quat_y = "quat=\"1 0 1 0\"";
+  EXPECT_LE((com(turn_x, quat_y) - x).norm(), 10 * kEps);
+  EXPECT_LE((com(turn_x, turn_y) - y).norm(), 10 * kEps);
+  EXPECT_LE((com("quat=\"1 1 0 0\"", quat_y) - y).norm(), 10 * kEps);
+  EXPECT_LE((com(quat_y, turn_x) - x).norm(), 10 * kEps);
+}
+
+TEST(ImportMjcf, SitesWithEndsAreBetweenThem) {
+  const Imported imported = Read("<joint/><site name=\"s\" fromto=\"0 0 0 0.4 0.2 0.6\"/>");
+  EXPECT_LE((imported.description.bodies[1].points.at("s") - Eigen::Vector3d(0.2, 0.1, 0.3)).norm(),
+            kEps);
+}
+
+TEST(ImportMjcf, NegativeGravityCompensationNeedsAPositiveOne) {
+  EXPECT_TRUE(ForcesOf<PointForce>(Read("<joint/>", "", "", "gravcomp=\"-0.5\"")).empty());
+  const Imported both =
+      Read("<joint/><body gravcomp=\"0.5\"><joint/>" + std::string(kInertial) + "</body>", "", "",
+           "gravcomp=\"-0.5\"");
+  EXPECT_EQ(ForcesOf<PointForce>(both).size(), 2u);
+}
+
+TEST(ImportMjcf, MeshesAreExactIfTheCompilerSaysSo) {
+  // two tetrahedra at one point: their pyramids from the centroid overlap
+  const auto mass = [](const std::string& compiler) {
+    return ImportText(
+               "<mujoco>" + compiler +
+                   "<asset><mesh name=\"m\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1 9 0 0 10 0 0 9 1 0 9 "
+                   "0 1\" "
+                   "face=\"0 2 1 0 1 3 0 3 2 1 2 3 4 6 5 4 5 7 4 7 6 5 6 "
+                   "7\"/></asset><worldbody><body><joint/>"
+                   "<geom type=\"mesh\" mesh=\"m\" density=\"1\"/></body></worldbody></mujoco>",
+               "file.xml")
+        .description.bodies[1]
+        .mass;
+  };
+  EXPECT_NEAR(mass("<compiler exactmeshinertia=\"true\"/>"), 1.0 / 3.0, kEps);
+  EXPECT_GT(mass(""), 0.5);
+}
+
 }  // namespace import_mjcf_bodies_test
 }  // namespace loopbench::harness

@@ -143,5 +143,53 @@ TEST(ImportMjcf, KeysHaveAsManyNumbersAsTheModel) {
   }
 }
 
+/// A free body whose inertial frame is at 1 0 0, with z along x of the body.
+Imported Aligned(const std::string& before, const std::string& joint, const std::string& inertia,
+                 const std::string& after) {
+  return ImportText("<mujoco>" + before + "<worldbody><body name=\"b\">" + joint +
+                        "<inertial pos=\"1 0 0\" mass=\"1\" " + inertia + "/></body></worldbody>" +
+                        after + "</mujoco>",
+                    "file.xml");
+}
+
+TEST(ImportMjcf, KeysOfAlignedBodiesAreOfTheirInertialFrames) {
+  const std::string align = "<freejoint align=\"true\"/>",
+                    compiler = "<compiler alignfree=\"true\"/>",
+                    axes = "zaxis=\"1 0 0\" diaginertia=\"1 1 1\"",
+                    full = "fullinertia=\"1 1 1 0.1 0 0\"",
+                    key = "<keyframe><key qpos=\"0 0 2 1 0 0 0\" qvel=\"1 2 3 0 0 4\"/></keyframe>";
+  for (const Imported& imported :
+       {Aligned("", align, axes, key), Aligned(compiler, "<freejoint/>", axes, key),
+        Aligned(compiler, "<joint type=\"free\"/>", axes, key)}) {
+    const auto& initial = imported.description.initial;
+    const std::vector<double>&q = initial.coordinates[0].values, &u = initial.speeds[0].values;
+    const Eigen::Quaterniond R(q[0], q[1], q[2], q[3]);
+    const Eigen::Vector3d centre = R * Eigen::Vector3d::UnitX(), w(u[0], u[1], u[2]);
+    EXPECT_LE((centre - Eigen::Vector3d::UnitZ()).norm(), 10 * kEps);
+    EXPECT_LE((Eigen::Vector3d(q[4], q[5], q[6]) + centre - Eigen::Vector3d(0, 0, 2)).norm(),
+              10 * kEps);
+    EXPECT_LE((w - Eigen::Vector3d(0, 0, 4)).norm(), 10 * kEps);
+    EXPECT_LE(
+        (Eigen::Vector3d(u[3], u[4], u[5]) + w.cross(centre) - Eigen::Vector3d(1, 2, 3)).norm(),
+        10 * kEps);
+    EXPECT_FALSE(HasNote(imported, "<key", "principal axes"));
+  }
+  const Imported off = Aligned(compiler, "<freejoint align=\"false\"/>", axes, key);
+  EXPECT_EQ(off.description.initial.coordinates[0].values,
+            (std::vector<double>{1, 0, 0, 0, 0, 0, 2}));
+  // the velocity of the centre of mass needs no axes
+  ExpectNote(Aligned("", align, full, key), "<key", "principal axes");
+  const Imported moved =
+      Aligned("", align, full, "<keyframe><key qvel=\"1 2 3 0 0 0\"/></keyframe>");
+  EXPECT_EQ(moved.description.initial.speeds[0].values, (std::vector<double>{0, 0, 0, 1, 2, 3}));
+  EXPECT_FALSE(HasNote(moved, "<key", "principal axes"));
+  // anchors are in MuJoCo's frame of the body too
+  const std::string connect = "<equality><connect body1=\"b\" anchor=\"0 0 1\"/></equality>";
+  const Imported anchored = Aligned("", align, axes, connect);
+  EXPECT_LE((anchored.description.joints.back().from.position - Eigen::Vector3d(2, 0, 0)).norm(),
+            10 * kEps);
+  ExpectNote(Aligned("", align, full, connect), "<connect>", "principal axes");
+}
+
 }  // namespace import_mjcf_start_test
 }  // namespace loopbench::harness

@@ -1,6 +1,8 @@
 // MJCF as a whole: classes of defaults, what is dropped, what is refused.
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "tests/harness/import_mjcf_texts.h"
 
 namespace loopbench::harness {
@@ -209,6 +211,45 @@ TEST(ImportMjcf, GravityInThePlaneIsAlongYToTheLastBit) {
       EXPECT_LE(imported.description.gravity.y(), 0.0);
     }
   }
+}
+
+TEST(ImportMjcf, PartsThatAreDisabledDoNotChangeTheMotion) {
+  const auto flagged = [](const std::string& option) {
+    const Imported imported = Two(
+        option +
+        "<default><joint range=\"-1 1\" frictionloss=\"1\" springdamper=\"1 1\"/></default><tendon>"
+        "<fixed stiffness=\"3\" damping=\"1\" frictionloss=\"2\" range=\"0 1\"><joint joint=\"j\" "
+        "coef=\"1\"/></fixed></tendon>");
+    std::set<std::string> parts;
+    for (const ImportNote& note : imported.notes) {
+      if (note.changes_motion) parts.insert(note.element.substr(note.element.rfind(' ') + 1));
+    }
+    return parts;
+  };
+  const auto flag = [](const std::string& name) {
+    return "<option density=\"1\"><flag " + name + "=\"disable\"/></option>";
+  };
+  using Parts = std::set<std::string>;
+  const Parts passive = {"density", "springdamper", "stiffness", "damping"};
+  Parts all = passive;
+  all.insert({"range", "frictionloss"});
+  EXPECT_EQ(flagged(flag("contact")), all);
+  EXPECT_EQ(flagged(flag("constraint")), passive);
+  EXPECT_EQ(flagged(flag("passive")), (Parts{"range", "frictionloss"}));
+  for (const char* name : {"limit", "frictionloss", "spring", "damper"}) {
+    const std::string key = name;
+    Parts left = all;
+    left.erase(key == "limit"    ? "range"
+               : key == "spring" ? "stiffness"
+               : key == "damper" ? "damping"
+                                 : key);
+    EXPECT_EQ(flagged(flag(name)), left) << name;
+  }
+  // wind needs a medium
+  all.erase("density");
+  EXPECT_EQ(flagged("<option wind=\"1 0 0\"/>"), all);
+  all.insert({"viscosity", "wind"});
+  EXPECT_EQ(flagged("<option wind=\"1 0 0\" viscosity=\"1\"/>"), all);
 }
 
 }  // namespace import_mjcf_test

@@ -215,5 +215,27 @@ TEST(ImportSdfCouplings, ThreadsOfScrews) {
   }
 }
 
+TEST(ImportSdfCouplings, FollowersStartWhereLeadersPlaceThem) {
+  const auto start = [](const std::string& own) {
+    return Read(Link("a") + Link("b") +
+                Joint("f", "revolute", "world", "b",
+                      "<axis><mimic joint=\"j\"><multiplier>2</multiplier><offset>0.5</offset>"
+                      "</mimic>" +
+                          own + "</axis>") +
+                Joint("j", "revolute", "world", "a",
+                      "<axis><initial_position>0.25</initial_position></axis>"));
+  };
+  const auto value = [](const Imported& imported, int joint) {
+    const auto& all = imported.description.initial.coordinates;
+    return std::ranges::find(all, joint, &JointValues::joint)->values[0];
+  };
+  const Imported placed = start("");
+  EXPECT_EQ(value(placed, 0), 1.0);
+  EXPECT_EQ(value(placed, 1), 0.25);
+  const Imported moved = start("<initial_position>3</initial_position>");
+  EXPECT_EQ(value(moved, 0), 1.0);
+  ExpectNote(moved, "<link name=\"b\">", "starts at 1");
+}
+
 }  // namespace import_sdf_couplings_test
 }  // namespace loopbench::harness

@@ -261,7 +261,7 @@ TEST(ImportSdf, JointsOfTwoAxesStartWhereBothSay) {
   EXPECT_EQ(imported.description.initial.coordinates[0].values, (std::vector<double>{0.5, 0.25}));
   const Imported ball = Read(Link("a") + Joint("j", "ball", "world", "a", axes), "1.6");
   EXPECT_TRUE(ball.description.initial.coordinates.empty());
-  ExpectNote(ball, "<initial_position>", "no coordinate of this axis");
+  ExpectNote(ball, "<axis>", "no axis");
   // a second axis that is none of the joint's takes nothing from the first
   const Imported revolute = Read(Link("a") + Joint("j", "revolute", "world", "a", axes), "1.6");
   ASSERT_EQ(revolute.description.initial.coordinates.size(), 1u);
@@ -382,6 +382,23 @@ TEST(ImportSdf, WhatCannotBeSaidIsRefusedWithItsLine) {
   ExpectRefusal(Sdf(a + Joint("j", "ball", "a", "world", "")),
                 {"file.xml:4: <child>: found \"world\"", "can be the <parent>"});
   ExpectRefusal("<sdf version=\"1.9\"/>", {"found no <model>"});
+}
+
+TEST(ImportSdf, AxesOfBallsAndFixedJointsDoNotChangeTheMotion) {
+  for (const std::string type : {"ball", "fixed"}) {
+    const Imported imported =
+        Read(Link("a") + Link("b") + Joint("i", "revolute", "world", "a") +
+             Joint("j", type, "a", "b",
+                   "<axis><limit><lower>0</lower><upper>0</upper></limit><dynamics><damping>1"
+                   "</damping><friction>1</friction></dynamics></axis>"));
+    ExpectNote(imported, "<axis>", "no axis");
+    EXPECT_EQ(std::ranges::count(imported.notes, true, &ImportNote::changes_motion), 0) << type;
+  }
+}
+
+TEST(ImportSdf, AWorldOfIncludesOnlyNamesThem) {
+  ExpectRefusal("<sdf version=\"1.9\"><world name=\"w\">\n<include/></world></sdf>",
+                {"file.xml:2: <include>", "in another file"});
 }
 
 }  // namespace import_sdf_test

@@ -123,6 +123,24 @@ TEST(ImportUrdf, TheRootIsFixedUnlessItFloats) {
   const Imported floating = ImportText(robot, "file.urdf", options);
   EXPECT_EQ(JointNamed(floating, "a").type, JointType::kFree);
   EXPECT_EQ(floating.description.bodies.size(), 3u);
+  const std::string reverse = Robot(Link("b") + Link("a") + Joint("j", "continuous", "a", "b"));
+  const Imported root = ImportText(reverse, "file.urdf", options);
+  EXPECT_EQ(JointNamed(root, "a").type, JointType::kFree);
+}
+
+TEST(ImportUrdf, LimitsAndDynamicsMatterOnlyOnJointsThatHaveThem) {
+  const auto changes = [](const std::string& type, const std::string& inside) {
+    const Imported imported = ImportText(
+        Robot(Link("world", "") + Link("a") + Link("b") + Joint("i", "continuous", "world", "a") +
+              Joint("j", type, "a", "b", inside)),
+        "file.urdf");
+    return std::ranges::count(imported.notes, true, &ImportNote::changes_motion);
+  };
+  const std::string limit = "<limit lower=\"0\" upper=\"0\" effort=\"1\" velocity=\"2\"/>",
+                    dynamics = "<dynamics damping=\"0.1\" friction=\"0.2\"/>";
+  EXPECT_EQ(changes("revolute", limit + dynamics), 2);
+  EXPECT_EQ(changes("continuous", limit), 0);
+  EXPECT_EQ(changes("fixed", limit + dynamics), 0);
 }
 
 TEST(ImportUrdf, GravityIsSaidByTheOption) {
@@ -142,7 +160,7 @@ TEST(ImportUrdf, EveryKindOfDroppedElementHasItsNote) {
   const Imported imported = ImportText(
       Robot(Link("world", "") +
             Link("a", kMass + "<visual><geometry/></visual><collision/><odd/>") + Link("b") +
-            Joint("j", "continuous", "world", "a",
+            Joint("j", "revolute", "world", "a",
                   "<limit effort=\"1\"/><dynamics damping=\"0.5\" friction=\"0.1\"/><calibration/>"
                   "<safety_controller/>") +
             Joint("k", "floating", "a", "b", "<dynamics damping=\"1\"/><mimic joint=\"j\"/>") +

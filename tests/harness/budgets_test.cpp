@@ -43,7 +43,7 @@ constexpr Budget kBudgets[] = {
     {"mechanism/start",         { 2141,  17,   4},   700},
     {"mechanism/formulation",   { 2738,  21,   4},  1500},
     {"mechanism/simplify",      { 3344,  20,   5},  2600},
-    {"odca",                    { 6724,  23,   5},  3900},
+    {"odca",                    { 6672,  21,   5},  3900},
     {"lagrange",                {  383,   4,   4},   350},
     {"reduction",               { 1630,  12,   4},  1350},
     {"harness/text",            { 1653,  13,   0},   900},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 2041,  10,   7},  1500},
     {"harness/cli",             { 7833,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {92466, 472, 242}, 62000}
+    {"",                        {92414, 470, 242}, 62000}
 };
 // clang-format on
 

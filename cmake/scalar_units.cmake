@@ -5,7 +5,7 @@ function(loopbench_add_scalar_units result name prologue)
   set(sources ${${result}})
   foreach(group ${ARGN}
     "drives force_elements forces joint joint_planar kinematics mechanism time_function joint_directions joint_measures \
-self_stress body_equations tree_dynamics joins odca sweep"
+self_stress body_equations tree_dynamics odca sweep"
     "constraint_solver coupled_solver factored_state level* passage system* null_space dense_reduction dense_equations \
 lagrange"
     "factors"

@@ -62,7 +62,7 @@ struct ClosingSide {
 /// A cut joint between the ends of two arms, or of one and Ground. It is imposed at one point, the
 /// origin Mo of the frame on its body Q, along axes of the frame on its body P (joint.h). Its sides
 /// may have drifted apart, so both ends have all six components. Quantities equal those of
-/// mechanism/model/kinematics.cpp and joins.cpp, in axes of P.
+/// mechanism/model/kinematics.cpp and sweep.cpp, in axes of P.
 class Closing {
  public:
   /// Rejects a response across the joint with an eigenvalue below `limit` relative to the response
@@ -273,7 +273,7 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
       tip.constants = arm.tip;
       tip.ground = arm.ground;
     }
-    SetPacks(packs);
+    EndChains();
     sign_.setZero((num_u_ + kLanes - 1) / kLanes * kLanes);
     angle_ = speed_ = sine_ = cosine_ = rate_ = sign_;
     index_.assign(static_cast<std::size_t>(sign_.size()), 0);
@@ -286,8 +286,8 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
         sign_[at] = arms.arms[i].bodies[k].sign;
       }
     }
-    about1_.resize(packs.size());
-    about2_.resize(packs.size());
+    about1_.resize(packs_.size());
+    about2_.resize(packs_.size());
     free_.resize(singles_.size());
     end_about2_.resize(singles_.size());
     LayClosings(arms);

@@ -42,7 +42,7 @@ class PackKinds {
     }
     kind_of_pack_.push_back(known->second);
   }
-  std::size_t size() const { return kind_of_pack_.size(); }
+  int size() const { return static_cast<int>(kind_of_pack_.size()); }
   const Pack& operator[](int pack) const { return kinds_[kind_of_pack_[pack]]; }
 
  private:
@@ -90,7 +90,8 @@ class ChainSweep : public ShortCut<Space, T> {
     double slack = 0.0;
   };
 
-  /// Appends a chain with so many pieces of this length. `packs` are those of all chains.
+  /// Appends a chain with so many pieces of this length. `packs` are those of the group that is
+  /// being filled, perhaps by several chains.
   Chain& AddChain(std::span<const Link<double>> links, int pieces, int length,
                   std::vector<Link<Lanes>>& packs) {
     Chain& chain = chains_.emplace_back();
@@ -99,25 +100,25 @@ class ChainSweep : public ShortCut<Space, T> {
     chain.first_single = static_cast<int>(singles_.size());
     auto link = links.begin();
     for (; pieces > 0; --pieces, ++num_pieces_) {
-      if (num_pieces_ % kLanes == 0) {
+      const int lane = lane_of(num_pieces_);
+      if (lane == 0) {
         Group& group = groups_.emplace_back();
-        group.pack = static_cast<int>(packs.size());
+        group.pack = packs_.size();
         group.length = length;
-        packs.resize(packs.size() + length);
+        packs.resize(length);
       }
-      for (int i = 0; i < length; ++i) {
-        SetLane(packs[groups_.back().pack + i], num_pieces_ % kLanes, *link++);
-      }
+      for (Link<Lanes>& pack : packs) SetLane(pack, lane, *link++);
+      if (lane + 1 < kLanes) continue;
+      for (const Link<Lanes>& pack : packs) packs_.Add(pack);
     }
     singles_.insert(singles_.end(), link, links.end());
     chain.singles = static_cast<int>(singles_.size()) - chain.first_single;
     return chain;
   }
   /// Ends the layout of all chains.
-  void SetPacks(const std::vector<Link<Lanes>>& packs) {
-    for (const Link<Lanes>& pack : packs) packs_.Add(pack);
-    packed_ = static_cast<int>(packs.size()) * kLanes;
-    cuts_.resize(packs.size());
+  void EndChains() {
+    packed_ = packs_.size() * kLanes;
+    cuts_.resize(packs_.size());
     end_cuts_.resize(num_pieces_ + singles_.size());
   }
   // of unsigned numbers, whose division is one instruction

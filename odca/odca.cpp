@@ -68,12 +68,11 @@ Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {
   kinematics_ = &kinematics;
   by_short_cut_ = false;
   const Outcome outcome = sweep_.Assemble(kinematics);
-  const Joins<Space, S>& joins = sweep_.joins();
-  this->conditioning_ = {.rank = LoopRank(mechanism_, joins.dependent_rows()),
-                         .rcond = static_cast<double>(joins.rcond()),
-                         .smallest_weight = static_cast<double>(joins.smallest_weight()),
-                         .is_regularized = joins.smallest_weight() < S(1),
-                         .worst_joint = joins.worst_joint()};
+  this->conditioning_ = {.rank = LoopRank(mechanism_, sweep_.dependent_rows()),
+                         .rcond = static_cast<double>(sweep_.rcond()),
+                         .smallest_weight = static_cast<double>(sweep_.smallest_weight()),
+                         .is_regularized = sweep_.smallest_weight() < S(1),
+                         .worst_joint = sweep_.worst_joint()};
   return outcome;
 }
 

@@ -289,8 +289,8 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
       single_closures_.insert(single_closures_.end(), path.closures.begin() + packed,
                               path.closures.end());
     }
-    this->SetPacks(packs);
-    turned_packs_.resize(packs.size());
+    this->EndChains();
+    turned_packs_.resize(packs_.size());
   }
 
   /// Closures of a group that begins with this piece of its path.

@@ -1,5 +1,35 @@
-// O-DCA's vector pass over assembled joins (joins.h): free accelerations go up, forces come down.
-// If rank was lost, a second pass corrects the first.
+// The numeric half of O-DCA: matrices at one position, before any force, which are Z of every
+// assembly and T and V of every join; then vectors, up and down the assembly tree.
+//
+// Everything is in ground axes. Quantities of a body are taken at its centre of mass, quantities of
+// a joint at Mo, the origin of the frame fixed on its body Q; r_P and r_Q lead from the two centres
+// of mass to Mo. Equation numbers refer to the paper; README.md indexes them.
+//
+// An assembly with boundary bodies 1..h responds to the forces F of bodies outside by
+//
+//   A = Z F + b
+//
+// A joint from P to Q demands D^T (A_Q - A_P - g) = 0 at Mo and carries the force D phi on Q and
+// -D phi on P. On the centres of mass that is, with n = [0; w x (w x r)],
+//
+//   c_Q^T A_Q + c_P^T A_P + c0 = 0           the demand                        (12)
+//   c_Q phi on Q,  c_P phi on P              the force
+//
+//   c_Q =  S(r_Q)^T D,    c_P = -S(r_P)^T D,    c0 = D^T (n_Q - n_P - g)
+//
+// With C the rows c^T of all joints of a node, on the union of its children's boundaries:
+//
+//   Y   = C Z                                                                  (67)
+//   X   = Y C^T                                                                (16, 66)
+//   phi = -X^+ (C b + c0 + Y F)
+//   Z'  = Z - Y^T X^+ Y                                                        (26-28, 71)
+//   b'  = b - Y^T X^+ (C b + c0)
+//
+// X^+ is computed as T^T T (loop_solver.h). With V = T Y and s = T (C b + c0) the last three are
+//
+//   phi = -T^T (s + V F),      Z' = Z - V^T V,      b' = b - V^T s.
+//
+// V and T are kept for vectors: free accelerations go up, forces come down.
 //
 //   up     s   = T (C b + c0)             from the children's b                (21, 68)
 //          b'  = b - V^T s                to the parent                        (29-30, 72)
@@ -7,10 +37,9 @@
 //          F_body += C^T phi              on the bodies of the joints          (18, 39, 47-48, 65)
 //   leaf   A   = M^-1 F_body + b                                               (1-4, 45-46)
 //
-// Symbols, axes and points of reference are defined in joins.h: a motion or force of a body is at
-// its centre of mass, in ground axes. The outside force on the side of an open joint is this
-// joint's phi. On a body it is the sum over its joints that close further up. Both are known when
-// the downward pass reaches a node. Accelerations of assemblies are never formed.
+// The outside force on the side of an open joint is this joint's phi. On a body it is the sum over
+// its joints that close further up. Both are known when the downward pass reaches a node.
+// Accelerations of assemblies are never formed.
 //
 // Joins close loops one after another. If constraints are dependent, one join may be much worse
 // conditioned than the simultaneous solution of all constraints, and round-off spoils the result.
@@ -19,20 +48,83 @@
 //   A += sweep(b = 0, c0 = r),
 //
 // squares the error; a regularization weight w becomes 1 - (1 - w)^2.
+//
+// Construction allocates all memory; no matrix is larger than the largest join of the plan.
 #pragma once
 
-#include "odca/joins.h"
+#include <memory>
+#include <vector>
+
+#include "mechanism/algebra/known_size.h"
+#include "mechanism/algebra/lower_triangle.h"
+#include "mechanism/description/outcome.h"
+#include "mechanism/formulation/options.h"
+#include "mechanism/loops/loop_solver.h"
+#include "mechanism/model/kinematics.h"
+#include "odca/plan.h"
 
 namespace loopbench::odca {
+
+/// Behind the parameters of a lambda: its captures must not go through memory.
+#define LOOPBENCH_INLINED __attribute__((always_inline))
+
+template <class Size>
+inline constexpr bool kIsKnown = kKnownSize<Size> != 0;
+
+/// Calls `call` with the rows of a node and the numbers of each of its handles, as constants for
+/// one joint that leaves one direction free, or three in space, and for boundaries of bodies alone
+/// or of rows of such joints alone.
+template <class Space, class S, class Call>
+[[gnu::always_inline]] inline auto WithSizes(const PlanNode& node, const Call& call) {
+  return WithSize<S, Space::kDim, Space::kDim - 1>(node.width, [&](auto width) {
+    return node.joints.size() == 1 ? WithSize<S, Space::kDim - 1, 3>(
+                                         node.rows, [&](auto rows) { return call(rows, width); })
+                                   : call(node.rows, width);
+  });
+}
+/// Returns the rows of a joint of a node, given those sizes.
+template <class Space, class Rows, class Width>
+auto RowsOf(const NodeJoint& joint, Rows rows, Width) {
+  if constexpr (kIsKnown<Rows>) {
+    return rows;
+  } else if constexpr (kKnownSize<Width> == Space::kDim - 1) {
+    return Width();
+  } else {
+    return joint.rows;
+  }
+}
+/// Returns true if a handle is a body, given the numbers of each handle of its node.
+template <class Space, class Width>
+bool IsBody(const Handle& handle, Width) {
+  return kIsKnown<Width> ? kKnownSize<Width> == Space::kDim : handle.is_body();
+}
+/// Calls `call` with the numbers of a handle; `width`: the numbers of each handle of its node.
+template <class Space, class S, class Width, class Call>
+[[gnu::always_inline]] inline auto WithWidth(const Handle& handle, Width width, const Call& call) {
+  if constexpr (kIsKnown<Width>) {
+    return call(width);
+  } else {
+    return WithSize<S, Space::kDim - 1, Space::kDim, Space::kDim - 2>(handle.width, call);
+  }
+}
+/// Returns the numbers of a block, a constant if both of its sides are constants.
+template <class Rows, class Columns>
+auto Product(Rows rows, Columns columns) {
+  if constexpr (kIsKnown<Rows> && kIsKnown<Columns>) {
+    return std::integral_constant<int, Rows::value * Columns::value>();
+  } else {
+    return rows * columns;
+  }
+}
 
 template <class Space, class S>
 class Sweep {
  public:
-  /// `plan` and `mechanism` must outlive the sweep.
+  /// `mechanism` and `plan` must outlive this. Plan joints index the mechanism's joints.
   Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver);
 
+  /// Assembles from the leaves up, at the current positions.
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
-  const Joins<Space, S>& joins() const { return joins_; }
 
   /// By body: free accelerations b (empty if zero) and wrenches M b. By joint: c0, and for tree
   /// joints BodyEquations::known(), the acceleration with the components c0.
@@ -54,10 +146,160 @@ class Sweep {
   /// has no such joint.
   std::span<const Components<Space, S>> multipliers() const { return phi_; }
 
-  /// Multiply-adds since the last Assemble() began.
-  long operations() const { return joins_.operations() + operations_; }
+  /// Acceleration of leaf n by a wrench.
+  Acceleration<Space, S> Response(int n, const Wrench<Space, S>& F) const {
+    if (plan_.leaves()[n].end >= 0) {
+      Components<Space, S> x = AlongTree(n, F);
+      ApplyTreeTransposed(n, x);
+      return HeldAcceleration(n, Acceleration<Space, S>::Zero(), x);
+    }
+    return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
+  }
+  /// Returns the given part of a held body's acceleration, without its free directions. It is the
+  /// acceleration of the holder (null on Ground), moved to the body, with c0 of the hold. If the
+  /// hold is a tree joint, `known` (null if zero) replaces c0. Adds the generalised forces of F - M
+  /// (given part) to `along`.
+  Acceleration<Space, S> Hang(int n, const Acceleration<Space, S>* holder,
+                              const Wrench<Space, S>& F, const Components<Space, S>& c0,
+                              const Acceleration<Space, S>* known,
+                              Components<Space, S>& along) const;
+  /// v := L^-1 v and v := L^-T v for N = L L^T of the tree of leaf n.
+  void ApplyTree(int n, Components<Space, S>& v) const {
+    WithTree(n, [&](auto size, const S* L) { SolveLower(L, size, &v[0]); });
+  }
+  void ApplyTreeTransposed(int n, Components<Space, S>& v) const {
+    WithTree(n, [&](auto size, const S* L) { SolveLowerTransposed(L, size, &v[0]); });
+  }
+  /// L^-1 H^T F
+  Components<Space, S> AlongTree(int n, const Wrench<Space, S>& F) const;
+  /// L^-1 H^T c of each row c of a side of a held leaf, in the first components.
+  const Acceleration<Space, S>* AlongTree(const PlanSide& side) const { return &Mc_[Offset(side)]; }
+  Acceleration<Space, S> HeldAcceleration(int n, const Acceleration<Space, S>& given,
+                                          const Components<Space, S>& x) const;
+  /// Returns the wrench of the hold on a held body. A: the body's acceleration; F: sum of the other
+  /// wrenches on it. Then phi of this wrench, and the opposite wrench at the holder.
+  Wrench<Space, S> HoldingWrench(int n, const Acceleration<Space, S>& A,
+                                 const Wrench<Space, S>& F) const {
+    return Wrench<Space, S>(bodies_[n].rotational * A.angular, A.linear * bodies_[n].mass) - F;
+  }
+  Components<Space, S> HoldingForce(int n, const Wrench<Space, S>& holding) const;
+  Wrench<Space, S> OnHolder(int n, const Wrench<Space, S>& holding) const {
+    return -ShiftForce<Space, S>(holding, bodies_[n].from_holder);
+  }
+  /// Rows c of a joint, at the centres of mass: the wrenches on P and Q that unit forces along D
+  /// make.
+  const Wrench<Space, S>* c(int joint, bool at_Q, int rows) const {
+    return &c_[c_offset_[joint] + (at_Q ? rows : 0)];
+  }
+  const Wrench<Space, S>* c_P(const NodeJoint& joint) const {
+    return c(joint.index, false, joint.rows);
+  }
+  const Wrench<Space, S>* c_Q(const NodeJoint& joint) const {
+    return c(joint.index, true, joint.rows);
+  }
+  /// V of an inner node on one of its kept handles: row after row.
+  const S* V(const PlanNode& node, int n, const Handle& handle) const {
+    return &Y_[places_[n].y + handle.number * node.rows];
+  }
+  /// v := T v for the rows of an inner node, and v := T^T v.
+  template <class Rows>
+  void Apply(const PlanNode& node, int n, Rows rows, S* v) const {
+    if (node.closes_loop) {
+      loops_[places_[n].loop].Apply(Eigen::Map<MatrixX<S>>(v, rows, 1));
+    } else {
+      SolveLower(&X_[places_[n].x], rows, v);
+    }
+  }
+  template <class Rows>
+  void ApplyTransposed(const PlanNode& node, int n, Rows rows, S* v) const {
+    if (node.closes_loop) {
+      loops_[places_[n].loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, rows));
+    } else {
+      SolveLowerTransposed(&X_[places_[n].x], rows, v);
+    }
+  }
+
+  /// Returns true if Assemble() dropped or regularized a direction; solutions are then refined.
+  bool regularized() const { return regularized_; }
+  int dependent_rows() const { return dependent_rows_; }
+  S rcond() const { return rcond_; }
+  S smallest_weight() const { return smallest_weight_; }
+  int worst_joint() const { return worst_joint_; }
+  /// Multiply-adds since the last Assemble() began, counted as they were done (an
+  /// eigen-decomposition as if it were a Cholesky factorisation).
+  long operations() const { return operations_; }
+  /// Returns the entries of the largest matrix stored for one join: X or one Z.
+  int largest_matrix() const { return largest_matrix_; }
 
  private:
+  /// Storage of a node's numbers.
+  struct Place {
+    /// First number of Z, `size` x `size`, both triangles, in blocks of handles: block (e, f)
+    /// at size * f.place + f.width * e.place, by columns.
+    int z = 0;
+    int size = 0;   ///< of the boundary
+    int y = 0;      ///< first number of Y: of each handle before the join, row after row
+    int x = 0;      ///< first number of X
+    int loop = -1;  ///< index of the loop solver
+    int hold = 0;   ///< of a held leaf, first of its free directions
+    int tree = 0;   ///< of the last leaf of a tree, first number of its N
+    int bodies = 1;
+  };
+  /// Inertia in ground axes; the rotational one of held bodies alone.
+  struct Body {
+    typename Inertia<Space, S>::Matrix rotational, rotational_inverse;
+    S mass = S(0), per_mass = S(0);
+    /// Of a held body: from the holder's centre of mass to its own, and from there to Mo.
+    Linear<Space, S> from_holder, to_hold;
+  };
+  /// A free direction of a held body, and the body's inertia times it.
+  struct FreeDirection {
+    int column = 0;  ///< its index among the free directions of the tree
+    Acceleration<Space, S> h;
+    Wrench<Space, S> Mh;
+  };
+  bool IsLeaf(int n) const { return n < plan_.num_leaves(); }
+  enum class Pass { kPhysical, kGeometric, kRegularized };
+
+  bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
+  void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n);
+  void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n);
+  template <class Rows>
+  void FillRows(const Kinematics<Space, S>& kinematics, Masses masses, const PlanSide& side,
+                Rows rows);
+  int Offset(const PlanSide& side) const {
+    return c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
+  }
+  /// Calls `call` with the number of free directions on the path to a held leaf, as a constant up
+  /// to three, and with these; the other, with the number of all of its tree, and N or its factor.
+  template <class Call>
+  [[gnu::always_inline]] auto WithPath(int n, const Call& call) const {
+    const FreeDirection* free = free_.data() + places_[n].hold;
+    return WithSize<S, 1, 2, 3>(plan_.leaves()[n].path,
+                                [&](auto size) LOOPBENCH_INLINED { return call(size, free); });
+  }
+  template <class Call>
+  [[gnu::always_inline]] auto WithTree(int n, const Call& call) const {
+    const S* N = trees_.data() + places_[plan_.leaves()[n].end].tree;
+    return WithSize<S, 1, 2, 3>(plan_.leaves()[n].free,
+                                [&](auto size) LOOPBENCH_INLINED { return call(size, N); });
+  }
+  template <class Rows, class Width>
+  void FormResponse(const PlanNode& node, const Place& place, Rows rows, Width width);
+  template <class Rows>
+  bool FactorFloating(const Place& place, Rows rows);
+  JointMatrix<S> FreeResponseAt(const PlanNode& node, const NodeJoint& joint) const;
+  bool FactorLoop(const PlanNode& node, const Place& place, Pass pass);
+  template <class Rows, class Width>
+  void ApplyToKept(const PlanNode& node, const Place& place, Rows rows, Width width);
+  template <class Rows, class Width, class Numbers>
+  void RespondAt(const PlanNode& node, const Handle& side, const Handle& handle,
+                 const Wrench<Space, S>* c, Rows count, Width known, Numbers width, bool adds,
+                 S* Y) const;
+  template <class Rows, class Width>
+  void Eliminate(const PlanNode& node, const Place& place, Rows rows, Width width);
+  void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);
+
   /// Passes one node upwards, and downwards.
   template <class Rows, class Width>
   void Up(const PlanNode& node, int n, Rows rows, Width width,
@@ -73,8 +315,27 @@ class Sweep {
   void Residual(std::span<const Components<Space, S>> c0,
                 std::span<const Acceleration<Space, S>> A);
 
+  const Mechanism<Space, S>& mechanism_;
   const Plan& plan_;
-  Joins<Space, S> joins_;
+  SolverKind solver_;
+  std::vector<Place> places_;
+  std::vector<Body> bodies_;  ///< by leaf
+  std::vector<FreeDirection> free_;
+  std::vector<S> trees_;  ///< N of each tree, or its factor as lower_triangle.h has it
+  std::vector<S> Z_;
+  std::vector<S> Y_;                        ///< Y of each node; on handles that stay then V = T Y
+  std::vector<Wrench<Space, S>> c_;         ///< rows c_P, then c_Q of each joint
+  std::vector<Acceleration<Space, S>> Mc_;  ///< responses to c; of a hold, duals of its c
+  std::vector<int> c_offset_;               ///< of each mechanism joint in c_
+  std::vector<S> X_;
+  std::vector<LoopSolver<S>> loops_;
+  MatrixX<S> columns_;
+  std::vector<int> lone_leaves_;  ///< leaves without sides: inside trees, or without joints
+  int largest_matrix_ = 0;
+  bool regularized_ = false;
+  int dependent_rows_ = 0, worst_joint_ = -1;
+  S rcond_ = S(1), smallest_weight_ = S(1);
+  double regularization_ = kRegularization;
   std::vector<S> b_;  ///< of all handles, by slot: a join changes those that stay
   std::vector<S> F_;  ///< phi of all rows, then wrenches of bodies
   /// Accelerations of free leaves without joint forces; of held leaves the given ones.

@@ -171,14 +171,14 @@ struct Response {
 template <class Space>
 std::vector<Response> Responses(const Odca<Space, double>& odca) {
   constexpr int d = Space::kDim;
-  const Joins<Space, double>& joins = odca.sweep().joins();
+  const Sweep<Space, double>& sweep = odca.sweep();
   const Plan& plan = odca.plan();
   std::vector<Response> responses;
   for (int n = 0; n < plan.num_leaves(); ++n) {
     RealMatrix Z(d, d);
     for (int k = 0; k < d; ++k) {
       const auto unit = Wrench<Space, double>::Unit(k);
-      Z.col(k) = joins.Response(n, unit).eigen().template cast<Real>();
+      Z.col(k) = sweep.Response(n, unit).eigen().template cast<Real>();
     }
     responses.push_back({{n + 1}, {n + 1}, Z, false});
   }
@@ -204,7 +204,7 @@ std::vector<Response> Responses(const Odca<Space, double>& odca) {
         }
         const auto V = [&](const Handle& handle) {
           using RowByRow = Eigen::Matrix<double, Eigen::Dynamic, d, Eigen::RowMajor>;
-          return RealMatrix(Eigen::Map<const RowByRow>(joins.V(node, n, handle), node.rows, d)
+          return RealMatrix(Eigen::Map<const RowByRow>(sweep.V(node, n, handle), node.rows, d)
                                 .template cast<Real>());
         };
         block -= V(at_e).transpose() * V(at_f);

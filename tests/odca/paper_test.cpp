@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <vector>
 
 #include "mechanism/description/library.h"
@@ -78,28 +79,23 @@ void HoldChain(const MechanismDescription& description, int n, std::uint64_t see
   }
 }
 
-TEST(PaperTest, ChainsClosedOnGroundInThePlane) {
+template <class Space>
+void HoldChains(SpaceKind space, std::initializer_list<int> sizes, const char* name) {
   Tally tally;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    for (const int n : {3, 5, 8}) {
-      HoldChain<Planar>(ChainOfKinds(n, SpaceKind::kPlanar, seed), n, seed, tally);
-    }
+    for (const int n : sizes) HoldChain<Space>(ChainOfKinds(n, space, seed), n, seed, tally);
   }
-  tally.Print("plane, chains");
+  tally.Print(name);
   EXPECT_LE(3 * tally.left_out, tally.scenes);
   EXPECT_GE(tally.assemblies, tally.scenes);
 }
 
+TEST(PaperTest, ChainsClosedOnGroundInThePlane) {
+  HoldChains<Planar>(SpaceKind::kPlanar, {3, 5, 8}, "plane, chains");
+}
+
 TEST(PaperTest, ChainsClosedOnGroundInSpace) {
-  Tally tally;
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    for (const int n : {4, 7}) {
-      HoldChain<Spatial>(ChainOfKinds(n, SpaceKind::kSpatial, seed), n, seed, tally);
-    }
-  }
-  tally.Print("space, chains");
-  EXPECT_LE(3 * tally.left_out, tally.scenes);
-  EXPECT_GE(tally.assemblies, tally.scenes);
+  HoldChains<Spatial>(SpaceKind::kSpatial, {4, 7}, "space, chains");
 }
 
 /// What stands in (7) beside H udot, less Hdot u with H differentiated in ground axes: where the

@@ -7,6 +7,7 @@
 
 #include "mechanism/description/library.h"
 #include "odca/odca.h"
+#include "tests/contract/builder.h"
 #include "tests/contract/comparison.h"
 #include "tests/contract/system_with.h"
 
@@ -17,10 +18,8 @@ namespace sweep_test {
 long Operations(const MechanismDescription& description, SolverKind solver) {
   const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
   testing::SystemWith<Odca, Planar, double> odca(mechanism, {.solver = solver});
-  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q()), udot;
-  for (const JointValues& values : description.initial.coordinates) {
-    q[mechanism.joints()[values.joint].q_offset] = values.values[0];
-  }
+  const VectorX<double> q = testing::DescribedCoordinates(description, mechanism);
+  VectorX<double> udot;
   const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
   EXPECT_EQ(odca->Evaluate(0.0, q, u, udot), Outcome::kFinished);
   return odca.solver().sweep().operations();
@@ -45,10 +44,10 @@ TEST(SweepTest, NoMatrixIsLargerThanThePlansLargestJoin) {
     for (const PlanNode& node : odca.plan().nodes()) {
       boundary = std::max(boundary, node.kept_numbers);
     }
-    EXPECT_LE(odca.sweep().joins().largest_matrix(), std::max(rows * rows, boundary * boundary));
+    EXPECT_LE(odca.sweep().largest_matrix(), std::max(rows * rows, boundary * boundary));
   }
   const Mechanism<Planar, double> chain(Chain(1000), Coordinates::kJoint);
-  EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().joins().largest_matrix()), 16)
+  EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().largest_matrix()), 16)
       << "two handles of two rows";
 }
 

@@ -15,10 +15,47 @@
 namespace loopbench::odca::arms {
 namespace arm_sweep_test {
 
+Both Compare(const Mechanism<Spatial, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
+             const Numbers& u, int bodies_of_group = kBodiesOfGroup) {
+  return odca::Compare(mechanism, MakeArmSweep(mechanism, 3, bodies_of_group).get(), speeds, q, u);
+}
+
 /// Both right-hand sides.
 class ArmSweepTest : public ::testing::TestWithParam<SpeedsUsed> {};
 INSTANTIATE_TEST_SUITE_P(Speeds, ArmSweepTest,
                          ::testing::Values(SpeedsUsed::kGiven, SpeedsUsed::kCompleted));
+
+/// Angles are drawn at random, so cut joints are as far apart as the bodies are long.
+TEST_P(ArmSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
+  std::vector<Paths> shapes = {{.open = 1000}, {.closed = 1000}};
+  for (const int n : {1, 2, 3, 7, 8, 9, 16, 17, 33, 64, 100}) {
+    shapes.push_back({.open = n});
+    shapes.push_back({.open = n, .closed = 11, .also_closed = n});
+    if (n < 7) continue;  // fewer bodies have no freedom, a test of its own
+    for (const JointType cut :
+         {JointType::kRevolute, JointType::kSpherical, JointType::kPrismatic,
+          JointType::kCylindrical, JointType::kWeld, JointType::kTranslation,
+          JointType::kSchoenflies, JointType::kPointOnLine, JointType::kPointInPlane}) {
+      shapes.push_back({.closed = n, .cut = cut});
+    }
+  }
+  Tally tally;
+  for (const Paths& shape : shapes) {
+    const int bodies = shape.open + shape.closed + shape.also_closed;
+    for (std::uint64_t seed = 1; seed <= (bodies < 1000 ? 12u : 2u); ++seed) {
+      const MechanismDescription arms = RandomArms(shape, 100 * seed + bodies);
+      const Mechanism<Spatial, double> mechanism(arms, Coordinates::kJoint);
+      Random random(seed);
+      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+      const Both both = seed % 2 == 0 ? Compare(mechanism, GetParam(), q, u, 4 * kLanes)
+                                      : Compare(mechanism, GetParam(), q, u);
+      ASSERT_EQ(both.outcome, Outcome::kFinished);
+      tally.Add(both, bodies, arms.name);
+    }
+  }
+  tally.Finish(0.05);
+}
 
 /// Two to five bodies between pins on Ground have no freedom, and one redundant row or more.
 TEST_P(ArmSweepTest, LeavesLoopsWithoutFreedomToTheGeneralSweep) {

@@ -2,24 +2,54 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <limits>
+#include <numbers>
+#include <numeric>
 
 #include "mechanism/description/library.h"
 #include "odca/path_links.h"
+#include "tests/contract/allocations.h"
 #include "tests/odca/served.h"
 
 namespace loopbench::odca::pins {
 namespace path_sweep_test {
 
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
 Both Compare(const Mechanism<Planar, double>& mechanism, SpeedsUsed speeds, const Numbers& q,
-             const Numbers& u) {
-  return odca::Compare(mechanism, MakePathSweep(mechanism, 3).get(), speeds, q, u);
+             const Numbers& u, int bodies_of_group = kBodiesOfGroup) {
+  return odca::Compare(mechanism, MakePathSweep(mechanism, 3, bodies_of_group).get(), speeds, q, u);
 }
 
 /// Both right-hand sides.
 class PathSweepTest : public ::testing::TestWithParam<SpeedsUsed> {};
 INSTANTIATE_TEST_SUITE_P(Speeds, PathSweepTest,
                          ::testing::Values(SpeedsUsed::kGiven, SpeedsUsed::kCompleted));
+
+TEST_P(PathSweepTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
+  Tally tally, of_long;
+  for (int n = 1; n <= 80; ++n) {
+    // more than 40 bodies: two paths, of several groups, whose places follow each other
+    const bool is_long = n > 40;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      const MechanismDescription path = RandomPath(n, 100 * seed + n, is_long);
+      const Mechanism<Planar, double> mechanism(path, Coordinates::kJoint);
+      ASSERT_NE(MakePathSweep(mechanism), nullptr) << path.name;
+      Random random(seed);
+      const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+      const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+      const Both both = is_long ? Compare(mechanism, GetParam(), q, u, 2 * kLanes)
+                                : Compare(mechanism, GetParam(), q, u);
+      ASSERT_EQ(both.outcome, Outcome::kFinished);
+      (is_long ? of_long : tally).Add(both, n, path.name);
+    }
+  }
+  tally.Finish(0.1);
+  // long ones have three times as many joints that may be near their limit
+  of_long.Finish(0.3);
+}
 
 TEST_P(PathSweepTest, AgreesOnChainsAndLadders) {
   const auto hold = [&](const MechanismDescription& description) {
@@ -87,13 +117,34 @@ TEST_P(PathSweepTest, RefusesAChainThatIsStretchedOut) {
 TEST(PathSweep, ProjectsNothingNearADegeneratePosition) {
   const MechanismDescription ladder = Ladder(3, 1e-4, 0.5);
   const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
-  Numbers q = testing::DescribedCoordinates(ladder, mechanism);
-  q.array() += 1e-7;
+  Numbers q = Numbers::Zero(mechanism.num_q());
+  for (const JointValues& start : ladder.initial.coordinates) {
+    q[mechanism.joints()[start.joint].q_offset] = start.values[0] + 1e-7;
+  }
   Numbers u = Numbers::Ones(mechanism.num_u());
   const Numbers q_before = q, u_before = u;
   EXPECT_FALSE(MakePathSweep(mechanism)->Project(In(q), In(u), 1e-15));
   EXPECT_EQ(q, q_before);
   EXPECT_EQ(u, u_before);
+}
+
+TEST_P(PathSweepTest, AllocatesNothing) {
+  if (testing::CountAllocations() < 0) GTEST_SKIP() << "the sanitizer owns malloc";
+  for (const int windows : {20, 4200}) {
+    const MechanismDescription ladder = Ladder(windows, 1.0, 0.5);
+    const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
+    const auto sweep = MakePathSweep(mechanism, 2);
+    Numbers q = Numbers::Zero(mechanism.num_q());
+    for (const JointValues& start : ladder.initial.coordinates) {
+      q[mechanism.joints()[start.joint].q_offset] = start.values[0];
+    }
+    const Numbers u = Numbers::Ones(mechanism.num_u());
+    Numbers qdot = u, udot = u;
+    const long before = testing::CountAllocations();
+    EXPECT_TRUE(sweep->Evaluate(GetParam(), nullptr, In(q), In(u), In(qdot), In(udot)));
+    EXPECT_TRUE(sweep->Project(In(q), In(qdot), 0.0));
+    EXPECT_EQ(testing::CountAllocations(), before);
+  }
 }
 
 /// Cranks at an angle from the line in which all bars lie: wherever the general sweep regularizes,
@@ -105,8 +156,11 @@ TEST(PathSweep, LeavesWhatIsRegularizedToTheGeneralSweep) {
     for (double angle = 1e-5; angle < 0.3; angle *= 1.3) {
       const MechanismDescription ladder = Ladder(windows, angle, 0.5);
       const Mechanism<Planar, double> mechanism(ladder, Coordinates::kJoint);
-      const Numbers q = testing::DescribedCoordinates(ladder, mechanism);
+      Numbers q = Numbers::Zero(mechanism.num_q());
       const Numbers u = Numbers::Ones(mechanism.num_u());
+      for (const JointValues& start : ladder.initial.coordinates) {
+        q[mechanism.joints()[start.joint].q_offset] = start.values[0];
+      }
       const Both both = Compare(mechanism, SpeedsUsed::kGiven, q, u);
       if (both.general.smallest_weight < 1.0) regularized = std::max(regularized, angle);
       if (both.evaluated) answered = std::min(answered, angle);

@@ -123,19 +123,8 @@ struct AlongPaths {
   using Space = Planar;
   static constexpr auto kName = "Paths";
   static auto Make(const Mechanism<Planar, double>& mechanism, int threads = 1,
-                   int group = pins::kBodiesOfGroup, const PlanOptions& = {}) {
+                   int group = pins::kBodiesOfGroup) {
     return pins::MakePathSweep(mechanism, threads, group);
-  }
-  /// Calls hold(largest share of refused states, mechanism, seed, bodies of a group, plan). More
-  /// than 40 bodies are two paths, of several groups, whose places follow each other. They have
-  /// three times as many joints that may be near their limit.
-  static void ForEachDrifted(const auto& hold) {
-    for (int n = 1; n <= 80; ++n) {
-      for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-        hold(n > 40 ? 0.3 : 0.1, Draw(n, seed), seed, n > 40 ? 2 * kLanes : pins::kBodiesOfGroup,
-             PlanOptionsOf(SolverKind::kRankRevealing));
-      }
-    }
   }
   static MechanismDescription Closed(int n, std::uint64_t seed) {
     return testing::RandomChain(n, SpaceKind::kPlanar, seed);
@@ -144,7 +133,6 @@ struct AlongPaths {
   static constexpr int kOneFreedom = 3;           ///< bodies of a closed chain
   static constexpr bool kNearDegenerate = false;  ///< such chains come near degenerate positions
   static constexpr bool kTakesForces = false;     ///< other than gravity
-  static constexpr int kMostUnserved = 0;         ///< of a plan's mechanisms
   static MechanismDescription Draw(int n, std::uint64_t seed) {
     return RandomPath(n, 100 * seed + n, n > 40);
   }
@@ -155,27 +143,14 @@ struct OverAssemblies {
   using Space = Planar;
   static constexpr auto kName = "Assemblies";
   static auto Make(const Mechanism<Planar, double>& mechanism, int /*threads*/ = 1,
-                   int /*group*/ = 0,
-                   const PlanOptions& options = PlanOptionsOf(SolverKind::kRankRevealing)) {
+                   int /*group*/ = 0) {
+    const PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
     return pins::MakeAssemblySweep(mechanism, MakePlan(mechanism, options));
-  }
-  static void ForEachDrifted(const auto& hold) {
-    for (const Grounding grounding : {Grounding::kEager, Grounding::kAtRoot}) {
-      for (const BoundaryBasis basis : {BoundaryBasis::kBodies, BoundaryBasis::kCheapest}) {
-        for (int n = 1; n <= 40; ++n) {
-          for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-            hold(0.05, RandomBranches(n, 100 * seed + n, seed % 2 == 0 ? n : 0), seed, 0,
-                 {.grounding = grounding, .basis = basis});
-          }
-        }
-      }
-    }
   }
   static constexpr SpaceKind kSpace = SpaceKind::kPlanar;
   static constexpr int kOneFreedom = 3;
   static constexpr bool kNearDegenerate = false;
   static constexpr bool kTakesForces = true;
-  static constexpr int kMostUnserved = 79;
   static MechanismDescription Draw(int n, std::uint64_t seed) {
     return RandomBranches(n, 100 * seed + n);
   }
@@ -197,30 +172,8 @@ struct AlongArms {
   using Space = Spatial;
   static constexpr auto kName = "Arms";
   static auto Make(const Mechanism<Spatial, double>& mechanism, int threads = 1,
-                   int group = arms::kBodiesOfGroup, const PlanOptions& = {}) {
+                   int group = arms::kBodiesOfGroup) {
     return arms::MakeArmSweep(mechanism, threads, group);
-  }
-  static void ForEachDrifted(const auto& hold) {
-    std::vector<Paths> shapes = {{.open = 1000}, {.closed = 1000}};
-    for (const int n : {1, 2, 3, 7, 8, 9, 16, 17, 33, 64, 100}) {
-      shapes.push_back({.open = n});
-      shapes.push_back({.open = n, .closed = 11, .also_closed = n});
-      if (n < 7) continue;  // fewer bodies have no freedom, a test of its own
-      for (const JointType cut :
-           {JointType::kRevolute, JointType::kSpherical, JointType::kPrismatic,
-            JointType::kCylindrical, JointType::kWeld, JointType::kTranslation,
-            JointType::kSchoenflies, JointType::kPointOnLine, JointType::kPointInPlane}) {
-        shapes.push_back({.closed = n, .cut = cut});
-      }
-    }
-    for (const Paths& shape : shapes) {
-      const int bodies = shape.open + shape.closed + shape.also_closed;
-      for (std::uint64_t seed = 1; seed <= (bodies < 1000 ? 12u : 2u); ++seed) {
-        hold(0.05, RandomArms(shape, 100 * seed + bodies), seed,
-             seed % 2 == 0 ? 4 * kLanes : arms::kBodiesOfGroup,
-             PlanOptionsOf(SolverKind::kRankRevealing));
-      }
-    }
   }
   static MechanismDescription Closed(int n, std::uint64_t seed) {
     return testing::RandomChain(n, SpaceKind::kSpatial, seed);
@@ -229,7 +182,6 @@ struct AlongArms {
   static constexpr int kOneFreedom = 6;
   static constexpr bool kNearDegenerate = true;
   static constexpr bool kTakesForces = false;
-  static constexpr int kMostUnserved = 0;
   static MechanismDescription Draw(int n, std::uint64_t seed) {
     const bool closed = n > kOneFreedom && seed % 2 == 0;
     return RandomArms({.open = closed ? 0 : n, .closed = closed ? n : 0}, 100 * seed + n);

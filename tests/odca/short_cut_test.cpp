@@ -4,9 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <map>
 #include <optional>
-#include <tuple>
 
 #include "lagrange/lagrange.h"
 #include "tests/contract/allocations.h"
@@ -61,33 +59,6 @@ struct Names {
 };
 using All = ::testing::Types<AlongPaths, OverAssemblies, AlongArms>;
 TYPED_TEST_SUITE(ShortCutTest, All, Names);
-
-/// Coordinates are drawn at random, so cut joints are as far apart as the bodies are long.
-TYPED_TEST(ShortCutTest, AgreesWithTheGeneralSweepWhereverJointsHaveDrifted) {
-  std::map<std::tuple<SpeedsUsed, double, Grounding, BoundaryBasis>, Tally> tallies;
-  TypeParam::ForEachDrifted([&](double refused, const MechanismDescription& drawn,
-                                std::uint64_t seed, int group, const PlanOptions& plan) {
-    const auto model = TestFixture::Make(drawn);
-    const auto sweep = TypeParam::Make(model, 3, group, plan);
-    Random random(seed);
-    const Numbers q = RandomNumbers(random, model.num_q(), 4.0);
-    const Numbers u = RandomNumbers(random, model.num_u(), 2.0);
-    for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
-      Tally& tally = tallies[{speeds, refused, plan.grounding, plan.basis}];
-      if (sweep == nullptr) {  // the general sweep has less to multiply
-        ++tally.unserved;
-      } else {
-        const Both both = Compare(model, sweep.get(), speeds, q, u, plan);
-        tally.Add(both, model.num_bodies() - 1, drawn.name);
-      }
-    }
-  });
-  for (const auto& [key, tally] : tallies) {
-    tally.Finish(std::get<double>(key));
-    EXPECT_LE(tally.unserved, TypeParam::kMostUnserved);
-    EXPECT_LE(2 * tally.regularized, tally.states);
-  }
-}
 
 /// Masses over eight decades, several pins in one point of a body, a pin at its centre of mass: a
 /// force that is right to eps of the heavy body is not for the light one, so neither sweep has more

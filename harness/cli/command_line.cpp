@@ -57,6 +57,15 @@ std::vector<std::string> CommandNames(const CLI::App& app) {
                              [](const CLI::App* command) { return command->get_name(); });
 }
 
+/// Options of a command and of the commands within it.
+std::vector<const CLI::Option*> AllOptions(const CLI::App& command) {
+  std::vector<const CLI::Option*> all = command.get_options();
+  for (const CLI::App* part : Subcommands(command)) {
+    for (const CLI::Option* option : part->get_options()) all.push_back(option);
+  }
+  return all;
+}
+
 std::string Joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, " "));
 }
@@ -137,17 +146,39 @@ std::string Quoted(const std::string& text) {  // for fish and zsh, between sing
   return quoted + "'";
 }
 
-/// Returns the arms of "case $command-$before": words that may follow an option with a list of
-/// values, formatted by `line`.
+/// Words that may follow a command: commands within it, or values of its first argument.
+std::vector<std::string> WordsAfter(const CLI::App& command) {
+  std::vector<std::string> words = CommandNames(command);
+  for (const CLI::Option* option : command.get_options()) {
+    if (words.empty() && option->get_positional()) words = ValuesOf(*option);
+  }
+  return words;
+}
+
+std::string AllOptionNames(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : AllOptions(command)) {
+    for (const std::string& name : option->get_lnames()) AddOnce(names, "--" + name);
+  }
+  return Joined(names);
+}
+
+/// Returns the arms of "case $command-$before": words that may follow a command, or an option with
+/// a list of values, formatted by `line`.
 template <class Line>
 std::string ValueArms(const CLI::App& app, Line line) {
   std::string arms;
   for (const CLI::App* command : Subcommands(app)) {
-    for (const CLI::Option* option : command->get_options()) {
+    const std::string& name = command->get_name();
+    if (const auto words = WordsAfter(*command); !words.empty()) {
+      arms += fmt::format("    '{0} {0}') {1} ;;\n", name,
+                          line(Joined(words) + " " + AllOptionNames(*command)));
+    }
+    for (const CLI::Option* option : AllOptions(*command)) {
       const std::vector<std::string> values = ValuesOf(*option);
       if (values.empty() || option->get_lnames().empty()) continue;
-      arms += fmt::format("    '{} --{}') {} ;;\n", command->get_name(),
-                          option->get_lnames().front(), line(Joined(values)));
+      arms += fmt::format("    '{} --{}') {} ;;\n", name, option->get_lnames().front(),
+                          line(Joined(values)));
     }
   }
   return arms;
@@ -157,8 +188,7 @@ template <class Line>
 std::string OptionArms(const CLI::App& app, Line line) {
   std::string arms;
   for (const CLI::App* command : Subcommands(app)) {
-    arms += fmt::format("    '{} '*) {} ;;\n", command->get_name(),
-                        line(Joined(OptionNames(*command))));
+    arms += fmt::format("    '{} '*) {} ;;\n", command->get_name(), line(AllOptionNames(*command)));
   }
   return arms;
 }
@@ -212,7 +242,12 @@ std::string FishScript(const CLI::App& app) {
     const std::string& name = command->get_name();
     script += fmt::format("complete -c loopbench -n __fish_use_subcommand -f -a {} -d {}\n", name,
                           Quoted(command->get_description()));
-    for (const CLI::Option* option : command->get_options()) {
+    if (const auto words = WordsAfter(*command); !words.empty()) {
+      script +=
+          fmt::format("complete -c loopbench -n '__fish_seen_subcommand_from {}' -f -a '{}'\n",
+                      name, Joined(words));
+    }
+    for (const CLI::Option* option : AllOptions(*command)) {
       if (option->get_lnames().empty()) continue;
       const std::vector<std::string> values = ValuesOf(*option);
       script +=

@@ -71,9 +71,9 @@ constexpr Budget kBudgets[] = {
     {"harness/exchange",        { 8544,  32,  10},  5000},
     {"harness/report",          { 1073,   3,  10},  1100},
     {"harness/history",         { 1953,   6,   7},  1500},
-    {"harness/cli",             { 7776,  24,  29},  3600},
+    {"harness/cli",             { 7811,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {91006, 413, 242}, 62000}
+    {"",                        {91041, 413, 242}, 62000}
 };
 // clang-format on
 

@@ -112,6 +112,9 @@ TEST_F(CliDocumentsTest, BashCompletesCommandsOptionsValuesAndFiles) {
   EXPECT_EQ(complete("loopbench table out --format = la", 5), "latex\n");
   EXPECT_EQ(complete("loopbench table ou", 2), "\n");  // readline then completes names of files
   EXPECT_EQ(complete("loopbench run tiny.json --re", 3), "--rerun\n");
+  EXPECT_EQ(complete("loopbench history sh", 2), "show\n");
+  EXPECT_EQ(complete("loopbench history show --bra", 3), "--branch\n");
+  EXPECT_EQ(complete("loopbench completion z", 2), "zsh\n");
 }
 
 TEST_F(CliDocumentsTest, TheManualPageHasEveryCommandAndOption) {

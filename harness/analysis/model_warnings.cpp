@@ -189,6 +189,11 @@ std::vector<Warning> FindWarnings(const MechanismDescription& description,
   } else {
     std::ranges::move(FindGuessWarnings(description, structure.start.q),
                       std::back_inserter(warnings));
+    if (!structure.start.has_given_speeds) {
+      warnings.push_back({WarningKind::kRounded,
+                          "the given speeds contradict each other by less than \"accuracy\": the "
+                          "nearest that fit replace them"});
+    }
   }
   AddRankWarnings(description, structure, &warnings);
   for (const Island& island : structure.islands) {

@@ -266,6 +266,7 @@ TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
     EXPECT_EQ(start.outcome == Outcome::kFinished, unit < 1e-3) << start.message;
     EXPECT_EQ(start.message.find("they fit with an") == std::string::npos, unit < 1e-3);
     if (unit == 1e-3) continue;
+    EXPECT_FALSE(start.has_given_speeds);
     EXPECT_LT((start.u - exact.u).lpNorm<Eigen::Infinity>(), unit);
     EXPECT_LT(start.speed_residual, 64 * std::numeric_limits<double>::epsilon());
   }

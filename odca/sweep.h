@@ -1,9 +1,9 @@
-// The numeric half of O-DCA: matrices at one position, before any force, which are Z of every
-// assembly and T and V of every join; then vectors, up and down the assembly tree.
+// The numeric half of O-DCA. Matrices depend on positions alone: Z of every assembly, T and V of
+// every join. Then vectors go up and down the assembly tree.
 //
-// Everything is in ground axes. Quantities of a body are taken at its centre of mass, quantities of
-// a joint at Mo, the origin of the frame fixed on its body Q; r_P and r_Q lead from the two centres
-// of mass to Mo. Equation numbers refer to the paper; README.md indexes them.
+// Everything is in ground axes. Quantities of a body are taken at its centre of mass. Quantities of
+// a joint are taken at Mo, the origin of the frame fixed on its body Q. r_P and r_Q lead from the
+// two centres of mass to Mo. Equation numbers refer to the paper; README.md indexes them.
 //
 // An assembly with boundary bodies 1..h responds to the forces F of bodies outside by
 //
@@ -71,9 +71,9 @@ namespace loopbench::odca {
 template <class Size>
 inline constexpr bool kIsKnown = kKnownSize<Size> != 0;
 
-/// Calls `call` with the rows of a node and the numbers of each of its handles, as constants for
-/// one joint that leaves one direction free, or three in space, and for boundaries of bodies alone
-/// or of rows of such joints alone.
+/// Calls `call` with the rows of a node and the numbers of each handle. Rows are a constant for one
+/// joint that leaves one direction free, or three in space. Numbers are a constant if all handles
+/// are bodies, or all are rows of such joints.
 template <class Space, class S, class Call>
 [[gnu::always_inline]] inline auto WithSizes(const PlanNode& node, const Call& call) {
   return WithSize<S, Space::kDim, Space::kDim - 1>(node.width, [&](auto width) {
@@ -249,7 +249,7 @@ class Sweep {
   struct Body {
     typename Inertia<Space, S>::Matrix rotational, rotational_inverse;
     S mass = S(0), per_mass = S(0);
-    /// Of a held body: from the holder's centre of mass to its own, and from there to Mo.
+    /// For held bodies: from the holder's centre of mass to the body's, and from there to Mo.
     Linear<Space, S> from_holder, to_hold;
   };
   /// A free direction of a held body, and the body's inertia times it.
@@ -270,8 +270,9 @@ class Sweep {
   int Offset(const PlanSide& side) const {
     return c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
   }
-  /// Calls `call` with the number of free directions on the path to a held leaf, as a constant up
-  /// to three, and with these; the other, with the number of all of its tree, and N or its factor.
+  /// Calls `call` with the number of free directions on the path to a held leaf, and with these.
+  /// The number is a constant up to three. WithTree() takes all free directions of the leaf's tree,
+  /// and N or its factor.
   template <class Call>
   [[gnu::always_inline]] auto WithPath(int n, const Call& call) const {
     const FreeDirection* free = free_.data() + places_[n].hold;

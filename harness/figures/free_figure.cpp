@@ -290,10 +290,9 @@ std::vector<std::string> RemarksOn(std::span<const Record> rows, const Figure& f
   // a joined curve may include several tolerances; a cloud of points needs a choice
   const bool is_cloud = std::ranges::any_of(
       figure.curves, [](const Curve& curve) { return curve.points && !curve.line; });
-  if (!is_cloud)
-    std::erase_if(mixed, [](const std::string& key) {
-      return key == "rtol" || key == "atol" || key == "step";
-    });
+  if (!is_cloud) {
+    for (const char* key : {"rtol", "atol", "step"}) mixed.erase(key);
+  }
   if (!mixed.empty()) {
     remarks.push_back(
         fmt::format("curves mix values of {}; --group KEY,KEY separates and "

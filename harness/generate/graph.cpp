@@ -307,7 +307,7 @@ struct Rule {
     const int by_exponent = graph.Is(db, 0.0) ? db : Times(db, Times(y, Of(kLog, a)));
     return Add(by_base, by_exponent);
   }
-  /// Of the least or the largest of a and b.
+  /// The derivative of min(a, b) or max(a, b).
   int Extreme(bool is_least) const {
     const bool first_is_less = values[a] < values[b];
     graph.Compare(Relation::kLess, a, b, first_is_less);

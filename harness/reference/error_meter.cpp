@@ -48,7 +48,7 @@ void ErrorMeter::Write(Record& record) const {
   for (const Distance& distance : distances_) {
     const bool moves = distance.speed > kMoves * largest.speed;
     if (moves) late = std::max(late, std::abs(distance.late));
-    // no shift at all is one that counts
+    // a shift of zero is permitted, so the path error is at most the distance
     shape =
         std::max(shape, moves ? std::min(distance.shape, distance.position) : distance.position);
   }

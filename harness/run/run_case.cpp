@@ -201,8 +201,10 @@ Record RunCase(const Experiment& experiment, const Case& entry, const Reference*
     record.Set("position_goal", std::max(goal, kRedundantOpen * link));
   }
 
-  // fixed steps have no tolerance to be judged by
-  const bool is_unjudged = entry.step > 0.0 && held.series == nullptr && held.reference == nullptr;
+  // fixed steps have no tolerance to be judged by; pilots lack the reference of their experiment
+  const bool is_unjudged = entry.step > 0.0 && held.series == nullptr &&
+                           held.reference == nullptr &&
+                           (reference != nullptr || !experiment.reference);
   if ((experiment.refine || is_unjudged) && !IsPeer(record) && HasFinished(record)) {
     WriteRefinement(experiment, entry, beside, record);
   }

@@ -188,8 +188,8 @@ class MergedStores {
 /// Returns a store's file: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
 std::filesystem::path StoreFile(const std::filesystem::path& path);
 
-/// True if the file of a store is too large to hold in memory (32 MiB and more): readers then use
-/// only a part of it if possible.
+/// True if the file of a store is too large to hold in memory (32 MiB and more). Readers then load
+/// as few records as possible.
 bool IsLarge(const std::filesystem::path& file);
 
 /// Appends records to a file of JSON Lines. Lines are never changed, and a record is on disk when

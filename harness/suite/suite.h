@@ -106,7 +106,7 @@ struct Rate {
   /// CPU time at which the step limit ends the run [s].
   double most_s = std::numeric_limits<double>::infinity();
 
-  /// Returns the CPU time that grows with the horizon, for this part of it [s].
+  /// Returns the CPU time for a part of the horizon, without the fixed time [s].
   double Running(double part) const {
     const double to = std::min(part, ends_at);
     return std::min(

@@ -142,7 +142,7 @@ std::string EscapeXml(std::string_view text);
 /// apostrophe in front, which spreadsheets hide. JSON contains such texts unchanged.
 std::string EscapeCsv(std::string_view text);
 
-/// Quotes a string for gnuplot; no character of it is special.
+/// Quotes a string for gnuplot: all characters appear as given.
 std::string QuoteGnuplot(std::string_view text);
 
 /// Quotes the label of a tick, which gnuplot would read as a format.
@@ -182,8 +182,8 @@ class ConfigError : public std::runtime_error {
 
 // Whole files, read and written at once.
 
-/// A failed operation of the system: a full disk, a limit, a missing file. It is no result of a
-/// method, so no record is made of it (processes.h).
+/// A failed operation of the system: a full disk, a limit, a missing file. Runs make
+/// no record then, because a method did not cause it (processes.h).
 class SystemFault : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -90,8 +90,9 @@ class Assembler {
     target = target.cwiseQuotient(units);
     start_.u = start_.u.cwiseQuotient(units_.columns);
     const VectorX<double> miss = target - J * start_.u;
-    const double size = 1.0 + target.norm() + start_.u.norm() * Extent(mechanism_, units_);
-    const bool off = miss.norm() > 64 * std::numeric_limits<double>::epsilon() * size;
+    const double size =
+        1.0 + target.stableNorm() + start_.u.stableNorm() * Extent(mechanism_, units_);
+    const bool off = miss.stableNorm() > 64 * std::numeric_limits<double>::epsilon() * size;
     if (off && mechanism_.num_u() > 0) {
       VectorX<double> change =
           LeastSquares(LoopRows(kinematics_, units_, units, given_cut_, given_u_),

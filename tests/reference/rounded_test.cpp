@@ -272,6 +272,15 @@ TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
   }
 }
 
+/// Squares of these speeds overflow.
+TEST(RoundedInput, HugeSpeedsThatContradictEachOtherDoNotFit) {
+  MechanismDescription description =
+      ReadMechanism(kConfigs / "mechanisms/four-bar.json").description;
+  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  description.initial.speeds = {{0, {1e300}}, {1, {1.0}}, {2, {1.0}}};
+  EXPECT_EQ(Assemble<Planar>(description, mechanism).outcome, Outcome::kInconsistentStart);
+}
+
 /// Four decimals: the position closes with the default accuracy, but the given speed does not fit.
 TEST(RoundedInput, SpeedsThatDoNotFitNameTheAccuracyWithWhichTheyDo) {
   MechanismDescription description =

@@ -124,7 +124,7 @@ Run MergeParts(std::span<const Run> parts) {
     }
   }
   whole.drift = MergeDrift(parts);
-  whole.is_redundant = std::ranges::any_of(parts, &Run::is_redundant);
+  whole.least_open = std::ranges::max(parts, {}, &Run::least_open).least_open;
   return whole;
 }
 namespace {

@@ -72,6 +72,7 @@ struct CouplingDescription {
   std::string name;
   std::vector<Part> parts;  ///< at most one per joint
   double offset = 0.0;
+  bool in_loops = false;  ///< constraints of joints that depend on it are released
 };
 
 /// Initial values of one joint's coordinates or speeds (one number; free joints: see joint.h).

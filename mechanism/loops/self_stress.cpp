@@ -79,22 +79,27 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
   z_.setZero(m + D_);
   y_.setZero(H_ + D_);
   along_.setZero(d_);
-  feedback_.setZero(mechanism.num_moving_rows() > 0 ? mechanism.num_equations()
-                                                    : mechanism.num_rows());
+  const bool has_others = mechanism.num_moving_rows() > 0 || !coupled_.empty();
+  feedback_.setZero(has_others ? mechanism.num_equations() : mechanism.num_rows());
   share_ = feedback_;
-  is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0 &&
-              mechanism.num_moving_rows() == 0;
+  is_exact_ = D_ == 0 && loops_.size() == 1 && loops_.front().num_drives == 0 && !has_others;
 }
 
 /// In joint coordinates the forest is the tree of the mechanism, in absolute ones a forest of
-/// joints without released directions. All other constraints close loops.
+/// joints without released directions, the same one if couplings are given along it. All other
+/// constraints close loops.
 template <class Space, class S>
 void SelfStress<Space, S>::Span() {
   const auto& joints = mechanism_->joints();
   const bool in_joints = mechanism_->coordinates() == Coordinates::kJoint;
   std::vector<std::vector<int>> joints_of(static_cast<std::size_t>(mechanism_->num_bodies()));
+  for (int c = 0; c < mechanism_->num_coordinate_couplings(); ++c) {
+    if (mechanism_->couplings()[c].in_loops) coupled_.push_back({c, {}});
+  }
   const auto usable = [&](int j) {
-    return in_joints ? joints[j].in_tree() : !joints[j].in_tree() && joints[j].num_released == 0;
+    if (in_joints) return joints[j].in_tree();
+    return !joints[j].in_tree() && joints[j].num_released == 0 &&
+           (coupled_.empty() || !joints[j].is_cut);
   };
   for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
     if (!usable(j)) continue;
@@ -146,8 +151,32 @@ void SelfStress<Space, S>::Span() {
     r_ += joints[j].num_constraints();
     d_ += joints[j].num_released;
   }
-  r_ += mechanism_->num_moving_rows();
+  r_ += static_cast<int>(coupled_.size()) + mechanism_->num_moving_rows();
   d_ -= mechanism_->num_moving_rows();
+}
+
+template <class Space, class S>
+void SelfStress<Space, S>::Couple() {
+  for (std::size_t i = 0; i < coupled_.size(); ++i) {
+    CoupledRow& coupled = coupled_[i];
+    coupled.coefficients.clear();
+    S sum(0);
+    for (const auto& [joint, ratio] : mechanism_->couplings()[coupled.coupling].parts) {
+      const auto edge = std::ranges::find(edges_, joint, &Edge::joint);
+      if (edge == edges_.end() || edge->num_columns == 0) continue;  // prescribed in the tree
+      const int column = ColumnOf(*edge, 0);
+      coupled.coefficients.push_back({column, ratio * column_scale_[column]});
+      sum += coupled.coefficients.back().value * coupled.coefficients.back().value;
+    }
+    using std::sqrt;
+    const int row = FirstCoupledRow() + static_cast<int>(i);
+    inverse_scale_[row] = sqrt(sum);
+    row_scale_[row] = S(1) / inverse_scale_[row];
+    for (Coefficient& coefficient : coupled.coefficients) {
+      coefficient.value *= row_scale_[row];
+      if (coefficient.column < H_) rows_(coefficient.column, row) = coefficient.value;
+    }
+  }
 }
 
 /// Rotations count as lengths.
@@ -156,7 +185,7 @@ void SelfStress<Space, S>::Arrange(const Kinematics<Space, S>& kinematics) {
   is_arranged_ = true;
   arranged_ = kinematics.released();
   rows_.setZero();  // other columns may belong to a moving row
-  int next_moving = r_ - mechanism_->num_moving_rows(), next = r_;
+  int next_moving = FirstMovingRow(), next = r_;
   for (const Released& out : arranged_) {
     Loop& loop = *std::ranges::find(loops_, out.joint, &Loop::joint);
     for (std::size_t q = 0; q < out.directions.size(); ++q) {
@@ -179,6 +208,7 @@ void SelfStress<Space, S>::Arrange(const Kinematics<Space, S>& kinematics) {
       column_scale_[ColumnOf(edge, i)] = edge.parts[i].turns ? per_length : S(1);
     }
   }
+  Couple();
 }
 
 template <class Space, class S>
@@ -284,6 +314,11 @@ std::vector<Released> SelfStress<Space, S>::Choose(const Kinematics<Space, S>& k
       rows.row(next++) = rows_.col(loop.row(k)).transpose().template cast<double>();
     }
   }
+  for (int row = FirstCoupledRow(); row < FirstMovingRow(); ++row) {
+    quotas.push_back({next, 1, 1, 1});
+    joints.push_back(-1);
+    rows.row(next++) = rows_.col(row).transpose().template cast<double>();
+  }
   std::vector<Released> released = RowChoice(rows, quotas, r_).BeyondQuotas(joints);
   // rows count imposed directions first
   for (Released& out : released) {
@@ -310,7 +345,15 @@ SpatialVector<Space, S, Kind> SelfStress<Space, S>::TurnWithP(
 template <class Space, class S>
 void SelfStress<Space, S>::SetForest(const Kinematics<Space, S>& kinematics, S* z, int count) {
   const int m = r_ + d_, size = m + D_;
-  for (int q = 0; q < count; ++q) std::fill_n(z + q * size + m, D_, S(0));
+  for (int q = 0; q < count; ++q) {
+    std::fill_n(z + q * size + m, D_, S(0));
+    for (std::size_t i = 0; i < coupled_.size(); ++i) {
+      const S force = z[q * size + FirstCoupledRow() + static_cast<int>(i)];
+      for (const Coefficient& one : coupled_[i].coefficients) {
+        if (one.column >= H_) z[q * size + m + one.column - H_] -= one.value * force;
+      }
+    }
+  }
   for (const Loop& loop : loops_) {
     for (int q = 0; q < count; ++q) {
       Wrench<Space, S> F = Wrench<Space, S>::Zero();
@@ -373,6 +416,10 @@ void SelfStress<Space, S>::MeasureSpeeds(const Kinematics<Space, S>& kinematics)
     if (loop.num_drives == 0) continue;
     const Components<Space, S> speed = kinematics.ConstraintSpeed(loop.joint);
     for (int k = 0; k < loop.num_drives; ++k) z_[loop.row(k)] = row_scale_[loop.row(k)] * speed[k];
+  }
+  for (std::size_t i = 0; i < coupled_.size(); ++i) {
+    const int row = FirstCoupledRow() + static_cast<int>(i);
+    z_[row] = row_scale_[row] * kinematics.CouplingSpeed(coupled_[i].coupling);
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];
@@ -469,8 +516,12 @@ void SelfStress<Space, S>::ToRows(VectorX<S>& rows) const {
     }
   }
   for (int i = 0; i < mechanism_->num_moving_rows(); ++i) {
-    const int row = r_ - mechanism_->num_moving_rows() + i;
+    const int row = FirstMovingRow() + i;
     rows[FirstMovingEquation() + i] = z_[row] * inverse_scale_[row];
+  }
+  for (std::size_t i = 0; i < coupled_.size(); ++i) {
+    const int row = FirstCoupledRow() + static_cast<int>(i);
+    rows[mechanism_->num_rows() + coupled_[i].coupling] = z_[row] * inverse_scale_[row];
   }
   for (const int child : forest_) {
     const Edge& edge = edges_[child];

@@ -21,7 +21,8 @@
 //
 // D are the directions constrained by joints of the forest; joint coordinates have none. Each joint
 // imposes its part of U: direction k becomes D_k + sum_q T_kq D_q over its released directions q.
-// A moving row (mechanism.h) is one more row of U, imposed as it is.
+// A moving row (mechanism.h) is one more row of U, imposed as it is. So is a coupling on which
+// released constraints depend: its row contains a constant for each of its joints.
 // For one loop in joint coordinates this is complete, and solvers solve (1). Otherwise a solution
 // x0 violates c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong to one
 // joint, and rho must lie along W. The solution is x0 + y with U_b^T J y = U_b^T W W^T rho.
@@ -101,7 +102,8 @@ class SelfStress {
     bool is_reversed = false;
     Linear<Space, S> arm, arm_rate;  ///< from it to the point of the loop's joint
   };
-  /// A joint that closes a loop. Rows of loops are imposed ones, moving ones, then released ones.
+  /// A joint that closes a loop. Rows of loops are imposed ones, those of couplings, moving ones,
+  /// then released ones.
   struct Loop {
     int joint = 0, imposed = 0;      ///< first row
     std::vector<int> rows_released;  ///< of its released directions: moving or not imposed
@@ -115,10 +117,24 @@ class SelfStress {
     }
     int directions() const { return num_imposed + num_released; }
   };
+  /// A coupling's coefficient of a joint of the forest, in scale.
+  struct Coefficient {
+    int column = 0;  ///< of J
+    S value = S(0);
+  };
+  /// A coupling among the rows, which come after imposed ones of loops.
+  struct CoupledRow {
+    int coupling = 0;
+    std::vector<Coefficient> coefficients;
+  };
   int FirstMovingEquation() const {
     return mechanism_->num_rows() + mechanism_->num_coordinate_couplings();
   }
+  int FirstMovingRow() const { return r_ - mechanism_->num_moving_rows(); }
+  int FirstCoupledRow() const { return FirstMovingRow() - static_cast<int>(coupled_.size()); }
   void Span();
+  /// Coefficients and scales of couplings.
+  void Couple();
   /// Sets rows, parts and scales for the released directions of `kinematics`.
   void Arrange(const Kinematics<Space, S>& kinematics);
   std::vector<Link> LinksOf(int joint) const;
@@ -152,16 +168,17 @@ class SelfStress {
   std::vector<Edge> edges_;  ///< by child body
   std::vector<int> forest_;  ///< children of the forest's joints
   std::vector<Loop> loops_;
+  std::vector<CoupledRow> coupled_;
   bool is_exact_ = false, is_arranged_ = false;
   std::vector<Released> arranged_;
-  int r_ = 0, d_ = 0;  ///< imposed (with moving) and released rows of loops
+  int r_ = 0, d_ = 0;  ///< imposed rows (of couplings and moving ones, too), and released ones
   int H_ = 0, D_ = 0;  ///< columns of J_H and J_D
   MatrixX<S> rows_;    ///< J_H transposed; rows and columns in scale
   /// Factors of rows and their inverses, and of columns: 1 / length.
   VectorX<S> row_scale_, inverse_scale_, column_scale_;
   MatrixX<S> gram_, C_;  ///< Cholesky factors, C = W^T W
-  /// Numbers by rows of J: imposed and moving ones of loops, released ones, those of the forest. W
-  /// has -T, 1 and -J_D^T W_c there.
+  /// Numbers by rows of J: r_ imposed ones, d_ released ones, those of the forest. W has -T, 1 and
+  /// -J_D^T W_c there.
   MatrixX<S> W_;
   VectorX<S> z_;
   VectorX<S> y_;  ///< numbers by columns of J

@@ -51,10 +51,9 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   if constexpr (Space::kRot == 1) {
     return q + (turns_are_counted_ ? whole_turns_[index] : WholeTurns(index, q));
   }
-  // Space measures an angle modulo a turn; take the one next to the last accepted.
+  // Space measures an angle modulo a turn; take the one next to that expected by the last speed.
   using std::remainder;
-  S near = accepted_[index];
-  if (!accepted_speeds_.empty()) near += accepted_speeds_[index] * (time_ - accepted_time_);
+  const S near = accepted_[index] + accepted_speeds_[index] * (time_ - accepted_time_);
   return near + remainder(q - near, S(2 * std::numbers::pi_v<S>));
 }
 
@@ -122,12 +121,9 @@ void Kinematics<Space, S>::AcceptStep() {
     if (mechanism_->joints()[index].kind->num_u != 1) continue;
     if (!turns_are_counted_) whole_turns_[index] = WholeTurns(index, Measured(index));
     accepted_[index] = JointCoordinate(index);
+    if constexpr (Space::kRot == 3) accepted_speeds_[index] = JointSpeed(index);
   }
   turns_are_counted_ = true;
-  if (accepted_speeds_.empty()) return;
-  for (const Coupling<S>& coupling : mechanism_->couplings()) {
-    for (const auto& [joint, ratio] : coupling.parts) accepted_speeds_[joint] = JointSpeed(joint);
-  }
   accepted_time_ = time_;
 }
 

@@ -63,7 +63,7 @@ Kinematics<Space, S>::Kinematics(const Mechanism<Space, S>& mechanism)
       joint_poses_(joints_.size()),
       drives_(mechanism.drives().size()),
       accepted_(joints_.size(), S(0)),
-      accepted_speeds_(mechanism.num_coordinate_couplings() == 0 ? 0 : joints_.size(), S(0)),
+      accepted_speeds_(joints_.size(), S(0)),
       turns_(mechanism.couplings().size(), S(0)),
       whole_turns_(joints_.size(), S(0)),
       q_(VectorX<S>::Zero(mechanism.num_q())),

@@ -216,7 +216,7 @@ class Kinematics {
   void ContinueFrom(int joint, const S& coordinate) {
     turns_are_counted_ = false;
     accepted_[joint] = coordinate;
-    if (!accepted_speeds_.empty()) accepted_speeds_[joint] = S(0);
+    accepted_speeds_[joint] = S(0);
   }
   /// Continues measured angles from the initial values of the mechanism, as at first.
   void ForgetSteps();
@@ -269,8 +269,8 @@ class Kinematics {
   std::vector<Pose<Space, S>> joint_poses_;
   std::vector<TimeValue<S>> drives_;
   std::vector<S> accepted_;  ///< last accepted coordinate of each joint
-  /// With couplings: speeds of joints and the time there, by which angles are expected between
-  /// accepted steps; by coupling, the turns that measured angles lack.
+  /// In space: speeds of cut joints and the time there, by which angles are expected between
+  /// accepted steps. By coupling: the turns that measured angles lack.
   std::vector<S> accepted_speeds_, turns_;
   S accepted_time_ = S(0);
   std::vector<S> whole_turns_;

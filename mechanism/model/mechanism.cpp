@@ -143,6 +143,7 @@ Joint<Space, S> Mechanism<Space, S>::MakeJoint(const MechanismDescription& descr
   joint.X_PF = SidePose<Space, S>(user.from, user, description.bodies[joint.from].com);
   joint.X_QM = SidePose<Space, S>(user.to, user, description.bodies[joint.to].com);
   joint.description = index;
+  joint.is_cut = user.cut;
   joint.first_drive = static_cast<int>(drives_.size());
   joint.num_drives = static_cast<int>(user.motions.size());
   for (const PrescribedMotion& motion : user.motions) {
@@ -219,6 +220,7 @@ void Mechanism<Space, S>::AddCouplings(const MechanismDescription& description) 
     Coupling<S>& coupling = couplings_.emplace_back();
     coupling.name = given.name;
     coupling.offset = S(given.offset);
+    coupling.in_loops = given.in_loops;
     for (const auto& [index, ratio] : given.parts) {
       const Joint<Space, S>& joint = joints_[index];
       coupling.parts.push_back({index, S(ratio)});

@@ -38,6 +38,7 @@ struct Joint {
   int first_drive = 0, num_drives = 0;  ///< its prescribed coordinates, in Mechanism::drives()
   int num_released = 0;                 ///< directions of D that are not imposed (redundancy.h)
   bool on_loop = false;                 ///< its bodies are also connected otherwise
+  bool is_cut = false;                  ///< closes a loop in joint coordinates by description
   Pose<Space, S> X_PF, X_QM;            ///< seen from the centres of mass of P and Q
   double initial = 0.0;                 ///< initial value of its only coordinate, or 0
 
@@ -77,6 +78,7 @@ struct Coupling {
     return open;
   }
   bool is_moving_row = false;  ///< imposes a released direction instead (MovingRow); no parts
+  bool in_loops = false;       ///< constraints of joints depend on it (redundancy.h)
 };
 
 /// Inertia along the coordinate of a joint, or along a rate given by a drive.

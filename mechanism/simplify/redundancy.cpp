@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "mechanism/description/parts.h"
 #include "mechanism/loops/excursion.h"
@@ -135,42 +136,38 @@ std::vector<Released> Release(const Excursion<Space>& position,
   const std::vector<int>& constraints = mechanism.constraints();
   const DirectionRows& at = position.rows();
   std::vector<Quota> quotas;
+  int row = 0;
   for (std::size_t c = 0; c < constraints.size(); ++c) {
     quotas.push_back({at.first[c], at.count[c], 0, 0});
+    row += at.count[c];
   }
+  for (; row < at.rows.rows(); ++row) quotas.push_back({row, 1, 1, 1});  // couplings stay
   const RowChoice best(at.rows, quotas, position.rank());
   for (std::size_t c = 0; c < quotas.size(); ++c) quotas[c].keep = best.taken(c);
   if (quotas.size() > 1) AdaptQuotas(everywhere, position.rank(), quotas);
-  return RowChoice(at.rows, quotas, position.rank()).BeyondQuotas(constraints);
+  std::vector<int> joints = constraints;
+  joints.resize(quotas.size(), -1);
+  return RowChoice(at.rows, quotas, position.rank()).BeyondQuotas(joints);
 }
 
-/// Redundancy of one part: bodies that joints connect.
+/// Redundancy of a part without prescribed motions, from the positions of `start`, whose loops are
+/// open by `residual` [m]. Zero rows if the part is too large.
 template <class Space>
-Redundancy Find(const MechanismDescription& description) {
+Redundancy FindFrom(const Kinematics<Space, double>& start, double residual,
+                    const MechanismDescription& free) {
   Redundancy result;
-  const Mechanism<Space, double> driven(description, Coordinates::kJoint);
-  result.cut = driven.constraints();
-  if (driven.num_rows() == 0) return result;
-  const Start<double> start = Assemble<Space>(description, driven);
-  if (start.outcome == Outcome::kInconsistentStart) return result;
-
-  // a constraint is redundant if others of joints imply it, couplings or not
-  MechanismDescription free = description;
-  for (JointDescription& joint : free.joints) joint.motions.clear();
-  free.couplings.clear();
-  for (int index : result.cut) free.joints[index].cut = true;  // the same forest
   const Mechanism<Space, double> mechanism(free, Coordinates::kJoint);
-  Kinematics<Space, double> at_start(driven);
-  at_start.UpdatePosition(start.q);
-  const VectorX<double> q = at_start.CoordinatesIn(mechanism);
-  Kinematics<Space, double> undriven(mechanism);
-  undriven.UpdatePosition(q);
-  const bool independent = description.accuracy <= kRankRatio && AreIndependent(undriven);
+  const VectorX<double> q = start.CoordinatesIn(mechanism);
+  Kinematics<Space, double> here(mechanism);
+  here.UpdatePosition(q);
+  const bool independent =
+      free.couplings.empty() && free.accuracy <= kRankRatio && AreIndependent(here);
   if (!independent && mechanism.num_u() > kMaxAnalysedSpeeds) return result;
-  result.rows = result.rank = result.rank_at_start = mechanism.num_rows();
+  result.num_couplings = static_cast<int>(free.couplings.size());
+  result.rows = result.rank = result.rank_at_start = mechanism.num_equations();
   if (independent) return result;
   // rounded axes leave no motion, or none that closes to round-off
-  for (const double accuracy : {0.0, description.accuracy}) {
+  for (const double accuracy : {0.0, free.accuracy}) {
     Excursion<Space> excursion(mechanism, q, accuracy);
     result.rank = result.rank_at_start = excursion.rank();
     if (result.rank == result.rows) return result;
@@ -191,10 +188,60 @@ Redundancy Find(const MechanismDescription& description) {
     if (mechanism.num_u() > kMaxWithTurns) rows.clear();
     result.released = Release(starts_regular ? first : excursion, mechanism, rows);
     if (accuracy > 0.0) {
-      result.rounding = std::max(excess, start.position_residual / mechanism.length());
+      result.rounding = std::max(excess, residual / mechanism.length());
     }
     break;
   }
+  return result;
+}
+
+/// True if the couplings relate tree joints only and are independent of each other: rows of these
+/// constants are then known (self_stress.h).
+bool AreKnown(const MechanismDescription& free) {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(std::ssize(free.couplings), std::ssize(free.joints));
+  for (Eigen::Index c = 0; c < rows.rows(); ++c) {
+    for (const auto& [joint, ratio] : free.couplings[static_cast<std::size_t>(c)].parts) {
+      if (free.joints[joint].cut) return false;
+      rows(c, joint) = ratio;
+    }
+  }
+  return Eigen::FullPivLU<Eigen::MatrixXd>(rows).rank() == rows.rows();
+}
+
+/// Redundancy of one part: bodies that joints connect.
+template <class Space>
+Redundancy Find(const MechanismDescription& description) {
+  const Mechanism<Space, double> driven(description, Coordinates::kJoint);
+  Redundancy result;
+  if (driven.num_rows() > 0) {
+    const Start<double> start = Assemble<Space>(description, driven);
+    if (start.outcome != Outcome::kInconsistentStart) {
+      Kinematics<Space, double> at_start(driven);
+      at_start.UpdatePosition(start.q);
+      MechanismDescription free = description;
+      for (JointDescription& joint : free.joints) joint.motions.clear();
+      for (int index : driven.constraints()) free.joints[index].cut = true;  // the same forest
+      const double residual = start.position_residual;
+      MechanismDescription uncoupled = free;
+      uncoupled.couplings.clear();
+      result = FindFrom(at_start, residual, uncoupled);
+      if (result.rows > 0 && !free.couplings.empty() && AreKnown(free)) {
+        Redundancy coupled = FindFrom(at_start, residual, free);
+        if (coupled.rank == result.rank + coupled.num_couplings) {
+          result.num_couplings = coupled.num_couplings;
+          result.rows += coupled.num_couplings;
+          result.rank = coupled.rank;
+          result.rank_at_start = coupled.rank_at_start;
+        } else if (!coupled.released.empty()) {
+          result = std::move(coupled);
+          for (const CouplingDescription& one : free.couplings) {
+            result.couplings.push_back(one.name);
+          }
+        }
+      }
+    }
+  }
+  result.cut = driven.constraints();
   return result;
 }
 
@@ -208,6 +255,8 @@ Redundancy FindRedundancy(const MechanismDescription& description) {
                                  ? Find<Planar>(part.description)
                                  : Find<Spatial>(part.description);
     whole.rows += found.rows;
+    whole.num_couplings += found.num_couplings;
+    std::ranges::copy(found.couplings, std::back_inserter(whole.couplings));
     whole.rank += found.rank;
     whole.rank_at_start += found.rank_at_start;
     whole.rounding = std::max(whole.rounding, found.rounding);
@@ -247,6 +296,9 @@ MechanismDescription Release(const MechanismDescription& description,
   MechanismDescription result = description;
   result.rounded = redundancy.rounding > 0.0;
   for (int joint : redundancy.cut) result.joints[joint].cut = true;
+  for (CouplingDescription& coupling : result.couplings) {
+    coupling.in_loops = std::ranges::count(redundancy.couplings, coupling.name) > 0;
+  }
   for (const Released& out : redundancy.released) {
     result.joints[out.joint].released = out.directions;
     result.joints[out.joint].moving = out.moving;

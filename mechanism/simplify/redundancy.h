@@ -5,6 +5,9 @@
 // from the number of rows. Runs keep that rank at all positions (self_stress.h); as many rows as
 // are redundant are *released*, so that every solver has independent rows. Which rows are released
 // changes no result beyond round-off.
+//
+// Couplings stay imposed. If they depend on constraints of joints, these constraints are released:
+// a crank and a rod of its length on a slide, with a gear of 2:1 between them, need no slide.
 #pragma once
 
 #include <string>
@@ -16,7 +19,8 @@ namespace loopbench {
 
 /// Common properties of several admissible positions.
 struct Redundancy {
-  int rows = 0;           ///< constrained directions of all cut joints, drives left free
+  /// Constrained directions of all cut joints, drives left free, and `num_couplings` couplings.
+  int rows = 0, num_couplings = 0;
   int rank_at_start = 0;  ///< of those
   /// The largest rank found: the rank of generic positions. If all examined positions are singular,
   /// independent constraints are assumed.
@@ -24,7 +28,8 @@ struct Redundancy {
   /// rows - rank directions, in joints of the description; fewer where joints with prescribed
   /// coordinates would have to give them.
   std::vector<Released> released;
-  std::vector<int> cut;  ///< joints that close loops: only these release
+  std::vector<int> cut;                ///< joints that close loops: only these release
+  std::vector<std::string> couplings;  ///< names; released constraints depend on them
   /// Independence of released constraints at the start [rad or lengths], if they are redundant only
   /// within the accuracy of the input: they are no constraints then. Otherwise 0.
   double rounding = 0.0;

@@ -88,7 +88,8 @@ class Analysis {
       }
     }
     const bool driven = !mechanism_.drives().empty();
-    const bool known = redundancy.rows > 0 && !driven && result_.couplings == 0;
+    const bool known =
+        redundancy.rows > 0 && !driven && redundancy.num_couplings == result_.couplings;
     if (known && redundancy.rounding > 0.0) result_.rank = redundancy.rank_at_start;
     result_.rank_nearby = known ? redundancy.rank : result_.rank;
     FindFreedomOfParts();

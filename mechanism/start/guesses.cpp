@@ -242,7 +242,7 @@ namespace {
 template <class Space>
 std::vector<MissedGuess> MissedIn(const MechanismDescription& description,
                                   const VectorX<double>& q) {
-  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  const Mechanism<Space, double> mechanism(Unreleased(description), Coordinates::kJoint);
   Kinematics<Space, double> kinematics(mechanism);
   kinematics.UpdatePosition(q);
   const AssemblyUnits<Space> units(kinematics);

@@ -106,6 +106,8 @@ using Solver = std::unique_ptr<System<Spatial, double>> (*)(const Mechanism<Spat
 struct Off {
   const char* mechanism;
   Coordinates coordinates;
+  bool is_coupled =
+      false;  ///< the first three coordinates have the sum that they have at the start
 };
 
 class ReleasedRows : public ::testing::TestWithParam<Off> {};
@@ -119,7 +121,9 @@ struct Accelerations {
 
 Accelerations Evaluate(const Off& scene, Solver make, double off) {
   MechanismDescription description = Shipped(scene.mechanism);
+  if (scene.is_coupled) description.couplings = {{"sum", {{0, 1.0}, {1, 1.0}, {2, 1.0}}}};
   const Redundancy redundancy = FindRedundancy(description);
+  EXPECT_EQ(redundancy.couplings.empty(), !scene.is_coupled);
   description = Release(description, redundancy);
   const int cut = redundancy.released[0].joint;
   const auto count = redundancy.released[0].directions.size();
@@ -176,7 +180,9 @@ INSTANTIATE_TEST_SUITE_P(
     Linkages, ReleasedRows,
     ::testing::Values(Off{"bennett", Coordinates::kJoint}, Off{"goldberg", Coordinates::kJoint},
                       Off{"bennett", Coordinates::kAbsolute},
-                      Off{"goldberg", Coordinates::kAbsolute}),
+                      Off{"goldberg", Coordinates::kAbsolute},
+                      Off{"sarrus", Coordinates::kJoint, true},
+                      Off{"sarrus", Coordinates::kAbsolute, true}),
     [](const auto& one) {
       std::string name(one.param.mechanism);
       std::erase(name, '-');

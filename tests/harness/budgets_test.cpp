@@ -37,12 +37,12 @@ struct Budget {
 constexpr Budget kBudgets[] = {
     // module                   lines, files, arrows   goal [lines]
     {"mechanism/algebra",       { 2249,  23,   0},  1900},
-    {"mechanism/description",   { 2142,  23,   1},  1750},
+    {"mechanism/description",   { 2143,  23,   1},  1750},
     {"mechanism/model",         { 3096,  19,   2},  2300},
-    {"mechanism/loops",         { 3357,  21,   2},  1900},
+    {"mechanism/loops",         { 3425,  21,   2},  1900},
     {"mechanism/start",         { 2147,  17,   4},   700},
     {"mechanism/formulation",   { 2738,  21,   4},  1500},
-    {"mechanism/simplify",      { 3345,  20,   5},  2600},
+    {"mechanism/simplify",      { 3403,  20,   5},  2600},
     {"odca",                    { 6673,  21,   5},  3900},
     {"lagrange",                {  383,   4,   4},   350},
     {"reduction",               { 1630,  12,   4},  1350},
@@ -57,7 +57,7 @@ constexpr Budget kBudgets[] = {
     {"harness/reference",       {  906,   3,   4},   800},
     {"harness/trajectory",      { 2501,   6,  12},  1750},
     {"harness/observers",       { 1146,   4,   7},  1000},
-    {"harness/run",             { 1796,   7,  14},  1700},
+    {"harness/run",             { 1809,   7,  14},  1700},
     {"harness/precision",       { 1561,  12,  10},  1400},
     {"harness/isolation",       {  823,   2,   3},   790},
     {"harness/timing",          { 1339,   7,   7},  1050},
@@ -73,7 +73,7 @@ constexpr Budget kBudgets[] = {
     {"harness/history",         { 1953,   6,   7},  1500},
     {"harness/cli",             { 7811,  24,  29},  3600},
     {"peers",                   {  733,  12,   6},   650},
-    {"",                        {91051, 413, 242}, 62000}
+    {"",                        {91191, 413, 242}, 62000}
 };
 // clang-format on
 

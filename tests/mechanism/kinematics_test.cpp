@@ -260,5 +260,34 @@ TYPED_TEST(KinematicsTest, CoordinatesMoveBetweenSetsAndBack) {
   }
 }
 
+/// A shaft in two bearings: more than half a turn between steps, in either direction.
+TEST(MeasuredAngles, CountTurnsByTheLastSpeedInSpace) {
+  MechanismDescription d;
+  d.name = "shaft";
+  d.space = SpaceKind::kSpatial;
+  d.bodies.push_back(Bar("shaft", 1.0, 1.0, 0.1));
+  JointDescription bearing;
+  bearing.name = "A";
+  bearing.type = JointType::kCylindrical;
+  bearing.to.body = 1;
+  d.joints.push_back(bearing);
+  bearing.name = "B";
+  bearing.type = JointType::kRevolute;
+  bearing.cut = true;
+  d.joints.push_back(bearing);
+  const Mechanism<Spatial, double> mechanism(d, Coordinates::kJoint);
+  for (const double speed : {40.0, -40.0}) {
+    Kinematics<Spatial, double> kinematics(mechanism);
+    for (int k = 0; k <= 20; ++k) {
+      const double t = 0.1 * k, angle = speed * t;
+      kinematics.SetTime(t);
+      kinematics.UpdatePosition(Eigen::Vector2d(angle, 0.0));
+      kinematics.UpdateVelocity(Eigen::Vector2d(speed, 0.0));
+      EXPECT_NEAR(kinematics.JointCoordinate(1), angle, 100 * kEps * (1.0 + std::abs(angle)));
+      kinematics.AcceptStep();
+    }
+  }
+}
+
 }  // namespace kinematics_test
 }  // namespace loopbench

@@ -166,6 +166,15 @@ MechanismDescription TautChain(int bars) {
   return d;
 }
 
+TEST(RedundancyTest, GuessesAreComparedWhereRowsMove) {
+  const MechanismDescription given = Shipped("../experiments/overconstrained/plate-on-cranks");
+  const MechanismDescription released = Release(given, FindRedundancy(given));
+  const Mechanism<Planar, double> mechanism(released, Coordinates::kJoint);
+  ASSERT_EQ(mechanism.num_moving_rows(), 1);
+  const Start<double> start = Assemble<Planar>(released, mechanism);
+  EXPECT_TRUE(FindMissedGuesses(released, start.q).empty());
+}
+
 TEST(RedundancyTest, EachPartHasTheChoiceItWouldHaveAlone) {
   const MechanismDescription bennett = Shipped("bennett");
   const Redundancy alone = FindRedundancy(bennett);
@@ -192,6 +201,41 @@ TEST(RedundancyTest, TwoHingesOfADoorNeedOne) {
   EXPECT_EQ(found.rows, 5);
   EXPECT_EQ(found.rank, 0);
   EXPECT_EQ(Count(found.released), 5);
+}
+
+TEST(RedundancyTest, CouplingsThatFollowFromLoopsReplaceConstraints) {
+  MechanismDescription d = Shipped("sarrus");
+  const auto find = [&](std::vector<CouplingDescription> couplings) {
+    d.couplings = std::move(couplings);
+    return FindRedundancy(d);
+  };
+  // plates of both legs turn alike; the platform does not turn
+  const CouplingDescription legs{"legs", {{0, 1.0}, {3, 1.0}}},
+      level{"level", {{0, 1.0}, {1, 1.0}, {2, 1.0}}};
+  const Redundancy both = find({legs, level});
+  EXPECT_EQ(both.num_couplings, 2);
+  EXPECT_EQ(both.rows, 7);
+  EXPECT_EQ(both.rank, 4);
+  EXPECT_EQ(Count(both.released), 3);
+  EXPECT_EQ(both.couplings, (std::vector<std::string>{"legs", "level"}));
+
+  // one that depends on another, and one of the joint that closes the loop, are not analysed
+  for (const CouplingDescription& other : {CouplingDescription{"again", {{0, 2.0}, {3, 2.0}}},
+                                           CouplingDescription{"closing", {{2, 1.0}, {5, 1.0}}}}) {
+    const Redundancy without = find({legs, other});
+    EXPECT_EQ(without.num_couplings, 0);
+    EXPECT_EQ(without.rank, 4);
+    EXPECT_EQ(Count(without.released), 1);
+    EXPECT_TRUE(without.couplings.empty());
+  }
+
+  // an independent one counts, and changes no choice
+  d = Shipped("geared-five-bar");
+  const Redundancy geared = FindRedundancy(d);
+  EXPECT_EQ(geared.num_couplings, 1);
+  EXPECT_EQ(geared.rows, 3);
+  EXPECT_EQ(geared.rank, 3);
+  EXPECT_TRUE(geared.couplings.empty());
 }
 
 TEST(RedundancyTest, AStartAtRestInItsLowestPositionMayBeSingular) {

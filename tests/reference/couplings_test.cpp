@@ -1,4 +1,5 @@
 // Couplings over whole runs: energy, turns without end, drift by level.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -155,6 +156,63 @@ TEST(Couplings, DriftAsOtherConstraintsDo) {
     EXPECT_NEAR(std::log(square) / std::log(4.0), 2.0, 0.3);
     EXPECT_NEAR(std::log(linear) / std::log(4.0), 1.0, 0.5);
     EXPECT_LE(none, 1e-14);
+  }
+}
+
+/// Crank and rod of one length, the rod's end on a slide: a gear of 2:1 between them changes no
+/// motion, but at 90 degrees the loop alone would let the rod stay at the crank's pivot. The rod's
+/// mass is at the crank's end, so that the crank moves as a pendulum; or `motion` drives it.
+MechanismFile CardanCircles(const std::string& motion) {
+  const bool is_driven = !motion.empty();
+  // 9.81 (0.25 + 0.8 * 0.5) over the moment of inertia about the pivot
+  const std::string solution = fmt::format(
+      R"("closed_form": {{"type": "pendulum", "body": "crank", "down_angle": {:.17g},
+                        "frequency_squared": {:.17g}}},)",
+      -std::numbers::pi / 2, 9.81 * 0.65 / (0.05 + 0.0625 + 0.8 * 0.25 + 0.04));
+  return ParseMechanism(fmt::format(R"({{
+    "name": "cardan-circles", "space": "planar", "gravity": [0, -9.81],
+    "bodies": [{{"name": "crank", "mass": 1, "inertia": 0.05, "com": [0.25, 0],
+                "points": {{"A": [0.5, 0]}}}},
+               {{"name": "rod", "mass": 0.8, "inertia": 0.04, "points": {{"B": [0.5, 0]}}}}],
+    "joints": [
+      {{"name": "O", "type": "revolute", "from": {{"body": "ground"}}, "to": {{"body": "crank"}}{}}},
+      {{"name": "A", "type": "revolute", "from": {{"body": "crank", "at": "A"}},
+       "to": {{"body": "rod"}}}},
+      {{"name": "S", "type": "pin-in-slot", "from": {{"body": "ground"}},
+       "to": {{"body": "rod", "at": "B"}}}}],
+    "couplings": [{{"name": "gear", "coefficients": {{"O": 2, "A": 1}}}}],
+    "initial": {{{} "coordinates": {{{} "A": -0.8}}}},
+    "known_solution": {{{} "branch": [{{"crank": 1, "rod": 1}}], "length": 0.5}}}})",
+                                    motion, is_driven ? "" : R"("speeds": {"O": 9},)",
+                                    is_driven ? "" : R"("O": 0.4,)", is_driven ? "" : solution),
+                        "cardan-circles.json");
+}
+
+TEST(Couplings, ThatFollowFromLoopsDecideWhereTheseAreSingular) {
+  constexpr double kTolerance = 1e-9;
+  const MechanismFile driven = CardanCircles(
+                          R"(, "motion": {"type": "polynomial", "coefficients": [0.4, 9]})"),
+                      free = CardanCircles("");
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Enforcement level :
+         {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
+      for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+        const Method method{.formulation = formulation,
+                            .enforcement = level,
+                            .coordinates = set,
+                            .solver = SolverKind::kRankRevealing};
+        for (const MechanismFile* file : {&free, &driven}) {
+          const Record record = RunFile(*file, method, kTolerance, 2.0);
+          ASSERT_EQ(record.Text("outcome"), "finished") << ToString(method);
+          EXPECT_EQ(record.Number("regularized_evaluations"), 0.0) << ToString(method);
+          EXPECT_LT(record.Number("branch_error_max"), 1e3 * kTolerance) << ToString(method);
+          // some 200 steps; a pendulum above its pivot multiplies errors by e in 0.24 s
+          if (file == &free) {
+            EXPECT_LT(record.Number("closed_form_error_max"), 1e3 * kTolerance) << ToString(method);
+          }
+        }
+      }
+    }
   }
 }
 

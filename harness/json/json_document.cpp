@@ -285,7 +285,8 @@ std::string EncodingFault(std::string_view text) {
     return fmt::format("1:1: found {} text, {}", wide, kExpected);
   }
   for (std::size_t i = 0, length = 0; i < text.size(); i += length) {
-    length = text[i] == '\0' ? 0 : CharacterLength(text.substr(i));
+    const auto ascii = static_cast<signed char>(text[i]) > 0;  // most of any file
+    length = ascii ? 1 : text[i] == '\0' ? 0 : CharacterLength(text.substr(i));
     if (length > 0) continue;
     const auto byte = static_cast<unsigned char>(text[i]);
     const auto [line, column] = PlaceOf(text, i);

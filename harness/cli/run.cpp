@@ -33,7 +33,7 @@ struct RunCommand {
          "Folder for results.jsonl, drift.csv and timing.csv (default: results/runs/NAME)", &out},
         {"-j,--jobs", "Accuracy cases to run in parallel; timings run alone", &suite.jobs,
          From(1, 1024)},
-        {"--threads", "Threads per right-hand side (O-DCA on long chains); same results", &threads,
+        {"--threads", "Threads per right-hand side (O-DCA, large mechanisms); same results", &threads,
          From(1, kMaxThreads)},
         FilterOption(&suite.filter),
         {"--set", "Change a field of the file: /json/pointer=value", &settings},

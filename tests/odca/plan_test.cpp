@@ -306,12 +306,13 @@ TEST(PlanTest, PiecesShareNoSubtree) {
   EXPECT_EQ(std::ranges::count(piece, -1), 0);
   for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
     for (const int child : plan.nodes()[n - plan.num_leaves()].children) {
-      if (child >= 0 && piece[n] < last) EXPECT_EQ(piece[child], piece[n]);
+      if (child < 0 || piece[n] == last) continue;
+      EXPECT_EQ(piece[child], piece[n]);
     }
   }
   for (int n = 0; n < plan.num_leaves(); ++n) {
     const Leaf& leaf = plan.leaves()[n];
-    if (leaf.end >= 0) EXPECT_EQ(piece[n], piece[leaf.end]);
+    EXPECT_EQ(piece[n], piece[leaf.end < 0 ? n : leaf.end]);
   }
 }
 

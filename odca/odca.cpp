@@ -40,7 +40,7 @@ Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOpti
                      const PlanOptions& plan)
     : mechanism_(mechanism),
       plan_(MakePlan(mechanism, plan)),
-      sweep_(mechanism, plan_, options.solver),
+      sweep_(mechanism, plan_, options.solver, options.threads),
       equations_(mechanism),
       change_(VectorX<S>::Zero(mechanism.num_u())) {
   if (options.solver == SolverKind::kRankRevealing && !options.general) MakeShortCut(options);

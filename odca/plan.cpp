@@ -328,6 +328,9 @@ std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const Pl
 /// Up to so many bodies all fronts are tried: a chain of them is not cut in two, and is deep.
 constexpr int kFewBodies = 16;
 
+/// More would lengthen the nodes above them, fewer would balance the work of threads less well.
+constexpr int kMostPieces = 64;
+
 }  // namespace
 
 PlanOptions PlanOptionsOf(SolverKind solver) {
@@ -359,6 +362,7 @@ Plan::Plan(int num_bodies, std::span<const PlanJoint> joints, const PlanOptions&
   AddLeaves(others, is_body, options.dim);
   AddNodes(others, drafts, options.dim);
   CountOperations(others, drafts, is_body, options.dim);
+  AddPieces(options.piece);
 }
 
 /// A body with one joint to Ground is the first one of a tree. The other joints of a held body hold
@@ -576,15 +580,62 @@ int Plan::loop_joins() const {
 
 void Plan::CountOperations(std::span<const PlanJoint> joints, std::span<const Draft> drafts,
                            const std::vector<bool>& is_body, int dim) {
-  for (const Leaf& leaf : leaves_) {
+  for (Leaf& leaf : leaves_) {
     long rows = 0, paths = 0;
     for (const PlanSide& side : leaf.sides) {
       rows += side.rows;
       paths += side.rows * leaves_[side.leaf].path;
     }
-    operations_ += LeafWork(leaf, rows, paths, leaf.is_body, dim);
+    leaf.operations = LeafWork(leaf, rows, paths, leaf.is_body, dim);
+    operations_ += leaf.operations;
   }
-  for (const Draft& draft : drafts) operations_ += DraftWork(draft, joints, is_body, dim);
+  for (std::size_t n = 0; n < drafts.size(); ++n) {
+    nodes_[n].operations = DraftWork(drafts[n], joints, is_body, dim);
+    operations_ += nodes_[n].operations;
+  }
+}
+
+/// A piece takes neighbouring subtrees of up to `share` operations each, until it has half of that.
+/// The number of pieces does not depend on that of threads.
+void Plan::AddPieces(long least) {
+  const long share = std::max(least, operations_ / kMostPieces);
+  const bool divides = operations_ >= 2 * share;
+  std::vector<long> sum(num_nodes(), 0);  // of subtrees
+  std::vector<int> parent(num_nodes(), -1), piece(num_nodes(), -1);
+  const auto last = [&](int leaf) { return leaves_[leaf].end < 0 ? leaf : leaves_[leaf].end; };
+  for (const int leaf : leaf_order_) sum[last(leaf)] += leaves_[leaf].operations;
+  for (int n = num_leaves_; n < num_nodes(); ++n) {
+    sum[n] = nodes_[n - num_leaves_].operations;
+    for (const int child : nodes_[n - num_leaves_].children) {
+      if (child < 0) continue;
+      sum[n] += sum[child];
+      parent[child] = n;
+    }
+  }
+  const auto is_whole = [&](int n) { return divides && sum[n] <= share; };
+  long filled = share;
+  const auto place = [&](int n) {
+    if (!is_whole(n)) return;
+    if (2 * filled >= share) {
+      pieces_.emplace_back();
+      filled = 0;
+    }
+    piece[n] = static_cast<int>(pieces_.size()) - 1;
+    if (parent[n] < 0 || !is_whole(parent[n])) filled += sum[n];
+  };
+  for (int n = num_leaves_; n < num_nodes(); ++n) place(n);
+  for (const int leaf : leaf_order_) {
+    if (leaf == last(leaf) && parent[leaf] < 0) place(leaf);
+  }
+  pieces_.emplace_back();
+  const auto of = [&](int n) -> PlanPiece& {
+    return piece[n] < 0 ? pieces_.back() : pieces_[piece[n]];
+  };
+  for (int n = num_leaves_; n < num_nodes(); ++n) of(n).nodes.push_back(n);
+  for (const int leaf : leaf_order_) {
+    const int end = last(leaf);
+    of(parent[end] < 0 ? end : parent[end]).leaves.push_back(leaf);
+  }
 }
 
 }  // namespace loopbench::odca

@@ -55,6 +55,7 @@ struct PlanOptions {
   BoundaryBasis basis = BoundaryBasis::kBodies;
   int dim = 6;            ///< directions of a body: 3 in the plane, 6 in space
   bool branches = false;  ///< several joints of a held body may hold further bodies
+  long piece = 1 << 17;   ///< multiply-adds that are enough for a piece
 };
 
 /// As published, joints to Ground close at the root (the paper's section 3.1) and boundaries are
@@ -106,6 +107,7 @@ struct Leaf {
   bool is_body = true;
   int width = 0;
   int slot = 0;
+  long operations = 0;
 };
 
 /// A join. Nodes 0 .. bodies-2 of a plan are leaves (body i+1 is node i) and have no PlanNode.
@@ -117,9 +119,16 @@ struct PlanNode {
   int numbers = 0;       ///< of the children's boundaries
   int kept_numbers = 0;  ///< of the boundary afterwards
   int width = 0;  ///< of every handle, if all are bodies or all have as many rows, fewer; else 0
+  long operations = 0;
   std::span<const Handle> handles;    ///< boundary of the children before the join, child 0 first
   std::span<const int> kept;          ///< indices into handles: the boundary afterwards, in order
   std::span<const NodeJoint> joints;  ///< closed here
+};
+
+/// Subtrees that no other piece shares: a task for one thread.
+struct PlanPiece {
+  std::vector<int> nodes;   ///< in order of execution
+  std::vector<int> leaves;  ///< holders before the leaves that they hold
 };
 
 struct Draft;
@@ -138,6 +147,9 @@ class Plan {
   const std::vector<Leaf>& leaves() const { return leaves_; }
   /// All leaves, holders before the leaves that they hold.
   const std::vector<int>& leaf_order() const { return leaf_order_; }
+  /// All nodes and leaves. The last piece has the nodes above all others; small plans have no
+  /// other.
+  const std::vector<PlanPiece>& pieces() const { return pieces_; }
   int num_rows() const { return num_rows_; }    ///< of all nodes
   int num_slots() const { return num_slots_; }  ///< numbers of all leaves' handles
 
@@ -158,6 +170,7 @@ class Plan {
   void AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> drafts, int dim);
   void CountOperations(std::span<const PlanJoint> joints, std::span<const Draft> drafts,
                        const std::vector<bool>& is_body, int dim);
+  void AddPieces(long least);
 
   int num_leaves_;
   int num_rows_ = 0, num_slots_ = 0;
@@ -165,6 +178,7 @@ class Plan {
   std::vector<PlanNode> nodes_;
   std::vector<Leaf> leaves_;
   std::vector<int> leaf_order_;
+  std::vector<PlanPiece> pieces_;
   // the lists of all nodes, end to end in order of execution: a sweep streams them
   std::vector<Handle> handles_;
   std::vector<int> kept_;

@@ -33,7 +33,8 @@ template <class S, class Rows, class Others, class Dot>
 }  // namespace
 
 template <class Space, class S>
-Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver)
+Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver,
+                       int threads)
     : mechanism_(mechanism),
       plan_(plan),
       solver_(solver),
@@ -45,14 +46,30 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       along_(plan.num_leaves()),
       phi_(mechanism.joints().size(), Components<Space, S>::Zero()),
       residual_(phi_),
-      s_(plan.num_rows(), S(0)) {
-  for (const int n : plan.leaf_order()) {
-    const Leaf& leaf = plan.leaves()[n];
-    if (leaf.sides.empty()) lone_leaves_.push_back(n);
-    if (leaf.end >= 0 && leaf.end != n) ++places_[leaf.end].bodies;
+      s_(plan.num_rows(), S(0)),
+      pool_(std::is_same_v<S, double>
+                ? std::min(threads, static_cast<int>(plan.pieces().size()) - 1)
+                : 1) {
+  std::vector<std::shared_ptr<LoopScratch<S>>> scratch(plan.num_nodes());
+  for (const PlanPiece& part : plan.pieces()) {
+    Piece& piece = pieces_.emplace_back();
+    piece.nodes = part.nodes;
+    piece.leaves = part.leaves;
+    for (const int n : part.leaves) {
+      const Leaf& leaf = plan.leaves()[n];
+      if (leaf.sides.empty()) piece.lone_leaves.push_back(n);
+      if (leaf.end >= 0 && leaf.end != n) ++places_[leaf.end].bodies;
+    }
+    int rows = 0, widest = Space::kDim;
+    for (const int n : part.nodes) {
+      rows = std::max(rows, Node(n).rows);
+      for (const Handle& handle : Node(n).handles) widest = std::max(widest, handle.width);
+    }
+    piece.columns.setZero(rows, widest);
+    const auto shared = std::make_shared<LoopScratch<S>>(rows);
+    for (const int n : part.nodes) scratch[n] = shared;
   }
-  const auto scratch = std::make_shared<LoopScratch<S>>(plan.largest_join());
-  int z = 0, y = 0, x = 0, c = 0, tree = 0, widest = Space::kDim;
+  int z = 0, y = 0, x = 0, c = 0, tree = 0;
   c_offset_.assign(mechanism.joints().size(), 0);
   loops_.reserve(plan.loop_joins());
   for (int n = 0; n < plan.num_nodes(); ++n) {
@@ -70,7 +87,7 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
         c += 2 * leaf.hold.rows;
       }
     } else {
-      const PlanNode& node = plan.nodes()[n - plan.num_leaves()];
+      const PlanNode& node = Node(n);
       place.bodies = 0;
       for (int child : node.children) place.bodies += child >= 0 ? places_[child].bodies : 0;
       place.size = node.kept_numbers;
@@ -85,9 +102,9 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       }
       if (node.closes_loop) {
         place.loop = static_cast<int>(loops_.size());
-        loops_.emplace_back(rows, scratch);
+        loops_.emplace_back(rows, scratch[n]);
+        loop_nodes_.push_back(n);
       }
-      for (const Handle& handle : node.handles) widest = std::max(widest, handle.width);
     }
     z += place.size * place.size;
     largest_matrix_ = std::max(largest_matrix_, place.size * place.size);
@@ -110,7 +127,6 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
     }
   }
   trees_.assign(tree, S(0));
-  columns_.setZero(plan.largest_join(), widest);
 }
 
 template <class Space, class S>
@@ -173,38 +189,70 @@ Outcome Sweep<Space, S>::Assemble(const Kinematics<Space, S>& kinematics) {
   // a loop looks degenerate: geometry gives the directions, then the physics is solved
   regularized_ = true;
   regularization_ = kinematics.regularization();
-  AssembleAll(kinematics, Pass::kGeometric);
-  if (AssembleAll(kinematics, Pass::kRegularized)) return Outcome::kFinished;
+  if (AssembleAll(kinematics, Pass::kGeometric) && AssembleAll(kinematics, Pass::kRegularized)) {
+    return Outcome::kFinished;
+  }
   return std::isfinite(static_cast<double>(rcond_)) ? Outcome::kSingular : Outcome::kNonFinite;
 }
 
 template <class Space, class S>
 bool Sweep<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass) {
-  const Masses masses = pass == Pass::kGeometric ? Masses::kGeometric : Masses::kPhysical;
+  std::atomic<int> failed = plan_.num_nodes();
+  ForPieces([&](Piece& piece) { AssemblePiece(kinematics, pass, piece, failed); });
+  AssemblePiece(kinematics, pass, pieces_.back(), failed);
+  // now as one loop over all nodes would find it
+  const int end = failed;
+  AddOperations(end);
   if (pass != Pass::kRegularized) {
     dependent_rows_ = 0;
     worst_joint_ = -1;
     rcond_ = smallest_weight_ = S(1);
+    for (const int n : loop_nodes_) {
+      if (n <= end) NoteDiagnostics(Node(n), loops_[places_[n].loop]);
+    }
   }
-  for (int leaf : lone_leaves_) FillLeaf(kinematics, masses, leaf);
-  for (int n = plan_.num_leaves(); n < plan_.num_nodes(); ++n) {
-    const PlanNode& node = plan_.nodes()[n - plan_.num_leaves()];
+  if (end == plan_.num_nodes()) return true;
+  if (!Node(end).closes_loop) rcond_ = X_[places_[end].x];
+  return false;
+}
+
+template <class Space, class S>
+void Sweep<Space, S>::AddOperations(int end) {
+  for (Piece& piece : pieces_) {
+    if (piece.nodes.empty() || piece.nodes.front() <= end) operations_ += piece.operations;
+    piece.operations = 0;
+  }
+}
+
+template <class Space, class S>
+[[gnu::noinline]] void Sweep<Space, S>::AssemblePiece(const Kinematics<Space, S>& kinematics,
+                                                      Pass pass, Piece& piece,
+                                                      std::atomic<int>& failed) {
+  const Masses masses = pass == Pass::kGeometric ? Masses::kGeometric : Masses::kPhysical;
+  for (const int leaf : piece.lone_leaves) FillLeaf(kinematics, masses, piece, leaf);
+  for (const int n : piece.nodes) {
+    int first = failed.load(std::memory_order_relaxed);
+    if (n > first) return;
+    const PlanNode& node = Node(n);
     const Place& place = places_[n];
     for (int child : node.children) {
-      if (child >= 0 && child < plan_.num_leaves()) FillLeaf(kinematics, masses, child);
+      if (child >= 0 && IsLeaf(child)) FillLeaf(kinematics, masses, piece, child);
     }
     const bool ok = WithSizes<Space, S>(node, [&](auto rows, auto width) {
-      FormResponse(node, place, rows, width);
-      if (!(node.closes_loop ? FactorLoop(node, place, pass) : FactorFloating(place, rows))) {
+      FormResponse(node, place, piece, rows, width);
+      if (!(node.closes_loop ? FactorLoop(node, place, piece, pass)
+                             : FactorFloating(place, piece, rows))) {
         return false;
       }
-      ApplyToKept(node, place, rows, width);
-      Eliminate(node, place, rows, width);
+      ApplyToKept(node, place, piece, rows, width);
+      Eliminate(node, place, piece, rows, width);
       return true;
     });
-    if (!ok) return false;
+    if (ok) continue;
+    while (n < first && !failed.compare_exchange_weak(first, n)) {
+    }
+    return;
   }
-  return true;
 }
 
 /// Rows of C on one body. D at Mo becomes c at the centre of mass, so that c^T A is the D^T A of
@@ -229,7 +277,8 @@ void Sweep<Space, S>::FillRows(const Kinematics<Space, S>& kinematics, Masses ma
 /// with other rows, so c0 needs no solution of equations. The columns of D are orthonormal, except
 /// for exact tilts (JointKind::exact_basis).
 template <class Space, class S>
-void Sweep<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n) {
+void Sweep<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses masses, Piece& piece,
+                               int n) {
   const Leaf& leaf = plan_.leaves()[n];
   const PlanSide& hold = leaf.hold;
   const JointState<Space, S>& state = kinematics.joints()[hold.joint];
@@ -270,22 +319,23 @@ void Sweep<Space, S>::FillHold(const Kinematics<Space, S>& kinematics, Masses ma
       N[free[l].column + all * free[k].column] += free[k].Mh.dot(free[l].h);
   }
   if (leaf.end == n) FactorLower(N, all);
-  operations_ += size * kApply<Space> + Space::kDim * (size * (size + 1) / 2 + before) +
-                 (leaf.sides.empty() ? 0 : all * all * all / 6 + all);
+  piece.operations += size * kApply<Space> + Space::kDim * (size * (size + 1) / 2 + before) +
+                      (leaf.sides.empty() ? 0 : all * all * all / 6 + all);
 }
 
 /// Z of body n + 1, or C Z C^T. Z is M^-1 in ground axes, or the response of the held body. The
 /// paper's zeta_ij of the handles at r_i and r_j are S(r_i) M^-1 S(r_j)^T, for bodies k and k+1
 /// (1-4) and body 2 (45-46).
 template <class Space, class S>
-void Sweep<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n) {
+void Sweep<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, Piece& piece,
+                               int n) {
   const Leaf& leaf = plan_.leaves()[n];
   const Inertia<Space, S>& inertia = mechanism_.bodies(masses)[n + 1];
   Body& body = bodies_[n];
   body.rotational_inverse = kinematics.RotationalInverse(inertia, n + 1);
   body.per_mass = S(1) / inertia.mass;
   const bool is_held = leaf.end >= 0;
-  if (is_held) FillHold(kinematics, masses, n);
+  if (is_held) FillHold(kinematics, masses, piece, n);
   const FreeDirection* free = free_.data() + places_[n].hold;
   const int terms = is_held ? leaf.free : Space::kDim;
   S* Z = Z_.data() + places_[n].z;
@@ -296,10 +346,10 @@ void Sweep<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
     Acceleration<Space, S>* Zc = Mc_.data() + offset;
     WithSize<S, Space::kDim - 1>(side.rows, [&](auto rows) LOOPBENCH_INLINED {
       FillRows(kinematics, masses, side, rows);
-      operations_ +=
+      piece.operations +=
           rows * (is_held ? plan_.leaves()[side.leaf].path * Space::kDim : kApply<Space>);
       if (leaf.is_body) {
-        if (is_held) operations_ += rows * terms * Space::kDim;
+        if (is_held) piece.operations += rows * terms * Space::kDim;
         return;
       }
       Repeat(rows, [&](int i) LOOPBENCH_INLINED {
@@ -332,7 +382,7 @@ void Sweep<Space, S>::FillLeaf(const Kinematics<Space, S>& kinematics, Masses ma
         } else {
           fill(other.rows);
         }
-        operations_ += terms * (first == before ? rows * (rows + 1) / 2 : rows * other.rows);
+        piece.operations += terms * (first == before ? rows * (rows + 1) / 2 : rows * other.rows);
         before += other.rows;
       }
       first += rows;
@@ -395,8 +445,8 @@ template <class Rows, class Width, class Numbers>
 /// has the block rows (61) and (63); the paper writes X for its inverse (66).
 template <class Space, class S>
 template <class Rows, class Width>
-void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place, Rows rows,
-                                   Width known) {
+void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place, Piece& piece,
+                                   Rows rows, Width known) {
   const int n = rows;
   S* X = X_.data() + place.x;
   int first = 0;
@@ -433,8 +483,8 @@ void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place, Row
       });
       if (!IsBody<Space>(side, known)) return;
       const int child = node.children[side.child];
-      operations_ += count * Space::kDim * (IsLeaf(child) ? 0 : places_[child].size) +
-                     Space::kDim * (count * first + count * (count + 1) / 2);
+      piece.operations += count * Space::kDim * (IsLeaf(child) ? 0 : places_[child].size) +
+                          Space::kDim * (count * first + count * (count + 1) / 2);
     });
     first += count;
   }
@@ -448,11 +498,11 @@ void Sweep<Space, S>::FormResponse(const PlanNode& node, const Place& place, Row
 /// because one side floats.
 template <class Space, class S>
 template <class Rows>
-bool Sweep<Space, S>::FactorFloating(const Place& place, Rows rows) {
-  operations_ += static_cast<long>(rows) * rows * rows / 6 + rows;
+bool Sweep<Space, S>::FactorFloating(const Place& place, Piece& piece, Rows rows) {
+  piece.operations += static_cast<long>(rows) * rows * rows / 6 + rows;
   const S least = FactorLower(&X_[place.x], rows);
   if (least > S(0)) return true;
-  rcond_ = least;
+  X_[place.x] = least;  // for AssembleAll()
   return false;
 }
 
@@ -477,10 +527,11 @@ JointMatrix<S> Sweep<Space, S>::FreeResponseAt(const PlanNode& node, const NodeJ
 /// T of a node that closes loops, with T^T T = chi^-1 of (42) or the paper's X of (66). The matrix
 /// is only semidefinite here, and loop_solver.h decides its rank.
 template <class Space, class S>
-bool Sweep<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass pass) {
+bool Sweep<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Piece& piece,
+                                 Pass pass) {
   LoopSolver<S>& loop = loops_[place.loop];
   const Eigen::Map<const MatrixX<S>> X(&X_[place.x], node.rows, node.rows);
-  operations_ += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
+  piece.operations += static_cast<long>(node.rows) * node.rows * node.rows / 6 + node.rows;
   if (solver_ == SolverKind::kAsPublished) {
     // A pivot that is all round-off is not a pivot. The sums behind X are about as long as there
     // are bodies, and their terms as large as the responses of the bodies alone: 2800 random planar
@@ -491,9 +542,7 @@ bool Sweep<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
       scale = std::max(scale, free.diagonal().maxCoeff());
     }
     const S eps = std::numeric_limits<S>::epsilon();
-    const bool ok = loop.FactorPlain(X, scale, S(64) * eps * S(mechanism_.num_bodies()));
-    NoteDiagnostics(node, loop);
-    return ok;
+    return loop.FactorPlain(X, scale, S(64) * eps * S(mechanism_.num_bodies()));
   }
   if (pass != Pass::kRegularized) {
     for (int j = 0; j < static_cast<int>(node.joints.size()); ++j) {
@@ -502,14 +551,10 @@ bool Sweep<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
   }
   if (pass == Pass::kPhysical) {
     const S limit = S(LoopSolver<S>::kSuspicious * ShareOfLimit(place.bodies));
-    const bool ok = loop.FactorScaled(X) || loop.rcond() >= limit;
-    NoteDiagnostics(node, loop);
-    return ok;
+    return loop.FactorScaled(X) || loop.rcond() >= limit;
   }
   if (pass == Pass::kGeometric) {
     loop.FactorGeometric(X, regularization_);
-    dependent_rows_ += loop.size() - loop.rank();
-    NoteDiagnostics(node, loop);
     return true;
   }
   return loop.FactorRegularized(X);
@@ -517,6 +562,7 @@ bool Sweep<Space, S>::FactorLoop(const PlanNode& node, const Place& place, Pass 
 
 template <class Space, class S>
 void Sweep<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop) {
+  dependent_rows_ += loop.size() - loop.rank();
   if (!(loop.rcond() >= rcond_)) {
     rcond_ = loop.rcond();
     worst_joint_ = node.joints.back().index;
@@ -527,7 +573,7 @@ void Sweep<Space, S>::NoteDiagnostics(const PlanNode& node, const LoopSolver<S>&
 /// V = T Y in Y's place, for the handles that stay: the X Y of (64) is -T^T V.
 template <class Space, class S>
 template <class Rows, class Width>
-void Sweep<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows rows,
+void Sweep<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Piece& piece, Rows rows,
                                   Width known) {
   const int n = rows;
   for (int e : node.kept) {
@@ -536,7 +582,7 @@ void Sweep<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
     if (node.closes_loop) {
       using RowByRow = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       Eigen::Map<RowByRow> block(Y, n, handle.width);
-      auto columns = columns_.topLeftCorner(n, handle.width);
+      auto columns = piece.columns.topLeftCorner(n, handle.width);
       columns = block;
       loops_[place.loop].Apply(columns);
       block = columns;
@@ -553,7 +599,7 @@ void Sweep<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
         });
       });
     }
-    operations_ += static_cast<long>(n) * (n + 1) / 2 * handle.width;
+    piece.operations += static_cast<long>(n) * (n + 1) / 2 * handle.width;
   }
 }
 
@@ -562,7 +608,8 @@ void Sweep<Space, S>::ApplyToKept(const PlanNode& node, const Place& place, Rows
 /// Upsilon_12 (28); where body 2 alone stays of a coupled loop, the block is zeta^asm (71).
 template <class Space, class S>
 template <class Rows, class Width>
-void Sweep<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows rows, Width known) {
+void Sweep<Space, S>::Eliminate(const PlanNode& node, const Place& place, Piece& piece, Rows rows,
+                                Width known) {
   const int n = rows, size = place.size;
   const S* Y = Y_.data() + place.y;
   S* to = Z_.data() + place.z;
@@ -609,7 +656,7 @@ void Sweep<Space, S>::Eliminate(const PlanNode& node, const Place& place, Rows r
       column += width_f;
     });
   }
-  operations_ += static_cast<long>(n) * (size * (size + 1) / 2);
+  piece.operations += static_cast<long>(n) * (size * (size + 1) / 2);
 }
 
 template <class Space, class S>
@@ -618,14 +665,17 @@ void Sweep<Space, S>::Solve(const Loads& loads, std::span<Acceleration<Space, S>
   for (Components<Space, S>& phi : phi_) phi.setZero();
   Correct(loads, A);
   if (!regularized_) return;
-  Residual(loads.c0, A);
+  pool_.ForEach(static_cast<int>(pieces_.size()),
+                [&](int i) { Residual(pieces_[i], loads.c0, A); });
   Correct({.b = {}, .wrenches = {}, .c0 = residual_, .known = {}}, A);
 }
 
 /// The last leaf of a tree has the handles of all its bodies.
 template <class Space, class S>
-[[gnu::always_inline]] inline void Sweep<Space, S>::UpLeaf(int n, const Loads& loads) {
+[[gnu::always_inline]] inline void Sweep<Space, S>::UpLeaf(int n, Piece& piece,
+                                                           const Loads& loads) {
   const Leaf& leaf = plan_.leaves()[n];
+  std::fill_n(F_.data() + plan_.num_rows() + Space::kDim * n, Space::kDim, S(0));
   const bool is_held = leaf.end >= 0;
   Components<Space, S>& along = along_[is_held ? leaf.end : n];
   if (is_held) {
@@ -633,7 +683,7 @@ template <class Space, class S>
     if (leaf.holder < 0) along.setZero();
     start_[n] = Hang(n, leaf.holder < 0 ? nullptr : &start_[leaf.holder], loads.WrenchOn(n),
                      loads.c0[joint], loads.known.empty() ? nullptr : &loads.known[joint], along);
-    operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
+    piece.operations += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
     if (leaf.sides.empty()) return;
     ApplyTree(n, along);
   } else {
@@ -665,21 +715,22 @@ template <class Space, class S>
       }
       slot += rows;
     });
-    operations_ += (Space::kDim + leaf.free) * side.rows;
+    piece.operations += (Space::kDim + leaf.free) * side.rows;
   }
 }
 
 /// A = Z F + b (1-4, 45-46) with all forces known, including the joints' own. The last leaf of a
 /// tree solves for all its bodies.
 template <class Space, class S>
-[[gnu::always_inline]] inline void Sweep<Space, S>::DownLeaf(int n, const Loads& loads,
+[[gnu::always_inline]] inline void Sweep<Space, S>::DownLeaf(int n, Piece& piece,
+                                                             const Loads& loads,
                                                              std::span<Acceleration<Space, S>> A) {
   const Leaf& leaf = plan_.leaves()[n];
   const auto force_on = [&](int other) { return &F_[plan_.num_rows() + Space::kDim * other]; };
   Wrench<Space, S> F;
   LOOPBENCH_UNROLL
   for (int d = 0; d < Space::kDim; ++d) F[d] = force_on(n)[d];
-  operations_ += Space::kDim * Space::kDim / 3;
+  piece.operations += Space::kDim * Space::kDim / 3;
   if (leaf.end < 0) {
     A[n + 1] += start_[n] + Response(n, F);
     return;
@@ -703,7 +754,7 @@ template <class Space, class S>
   const Wrench<Space, S> holding = HoldingWrench(n, all, F + loads.WrenchOn(n));
   const Components<Space, S> phi = HoldingForce(n, holding);
   for (int i = 0; i < leaf.hold.rows; ++i) phi_[leaf.hold.joint][i] += phi[i];
-  operations_ += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
+  piece.operations += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
   if (leaf.holder < 0) return;
   const Wrench<Space, S> reaction = OnHolder(n, holding);
   LOOPBENCH_UNROLL
@@ -712,26 +763,40 @@ template <class Space, class S>
 
 template <class Space, class S>
 void Sweep<Space, S>::Correct(const Loads& loads, std::span<Acceleration<Space, S>> A) {
-  const int leaves = plan_.num_leaves();
-  std::ranges::fill(F_, S(0));
-  for (const int n : plan_.leaf_order()) UpLeaf(n, loads);
-  for (int n = leaves; n < plan_.num_nodes(); ++n) {
-    const PlanNode& node = plan_.nodes()[n - leaves];
-    WithSizes<Space, S>(node, [&](auto rows, auto width) { Up(node, n, rows, width, loads.c0); });
+  ForPieces([&](Piece& piece) { UpPiece(piece, loads); });
+  UpPiece(pieces_.back(), loads);
+  DownPiece(pieces_.back(), loads, A);
+  ForPieces([&](Piece& piece) { DownPiece(piece, loads, A); });
+  AddOperations(plan_.num_nodes());
+}
+
+template <class Space, class S>
+[[gnu::noinline]] void Sweep<Space, S>::UpPiece(Piece& piece, const Loads& loads) {
+  for (const int n : piece.leaves) UpLeaf(n, piece, loads);
+  for (const int n : piece.nodes) {
+    WithSizes<Space, S>(
+        Node(n), [&](auto rows, auto width) { Up(Node(n), n, piece, rows, width, loads.c0); });
   }
-  for (int n = plan_.num_nodes() - 1; n >= leaves; --n) {
-    const PlanNode& node = plan_.nodes()[n - leaves];
-    WithSizes<Space, S>(node, [&](auto rows, auto width) { Down(node, n, rows, width); });
+}
+
+template <class Space, class S>
+[[gnu::noinline]] void Sweep<Space, S>::DownPiece(Piece& piece, const Loads& loads,
+                                                  std::span<Acceleration<Space, S>> A) {
+  for (auto n = piece.nodes.rbegin(); n != piece.nodes.rend(); ++n) {
+    WithSizes<Space, S>(Node(*n),
+                        [&](auto rows, auto width) { Down(Node(*n), *n, piece, rows, width); });
   }
-  const std::vector<int>& order = plan_.leaf_order();
-  for (auto n = order.rbegin(); n != order.rend(); ++n) DownLeaf(*n, loads, A);
+  for (auto n = piece.leaves.rbegin(); n != piece.leaves.rend(); ++n) {
+    DownLeaf(*n, piece, loads, A);
+  }
 }
 
 /// r = C A + c0 of every joint: D^T times the difference of the two sides of (7), without udot.
 template <class Space, class S>
-void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
+void Sweep<Space, S>::Residual(Piece& piece, std::span<const Components<Space, S>> c0,
                                std::span<const Acceleration<Space, S>> A) {
-  for (const PlanNode& node : plan_.nodes()) {
+  for (const int n : piece.nodes) {
+    const PlanNode& node = Node(n);
     const auto body = [&](int handle) { return node.handles[handle].body; };
     for (const NodeJoint& joint : node.joints) {
       Components<Space, S>& r = residual_[joint.index];
@@ -740,7 +805,7 @@ void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
         if (joint.from >= 0) r[i] += c_P(joint)[i].dot(A[body(joint.from)]);
         if (joint.to >= 0) r[i] += c_Q(joint)[i].dot(A[body(joint.to)]);
       }
-      operations_ += 2 * Space::kDim * joint.rows;
+      piece.operations += 2 * Space::kDim * joint.rows;
     }
   }
 }
@@ -751,7 +816,7 @@ void Sweep<Space, S>::Residual(std::span<const Components<Space, S>> c0,
 /// (37-38) at joints to Ground and (57-58) in a coupled loop.
 template <class Space, class S>
 template <class Rows, class Width>
-void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
+void Sweep<Space, S>::Up(const PlanNode& node, int n, Piece& piece, Rows rows, Width known,
                          std::span<const Components<Space, S>> c0) {
   S* s = s_.data() + node.joints.front().row;
   int row = 0;
@@ -773,7 +838,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
         for (int d = 0; d < Space::kDim; ++d) sum += c[i][d] * b[d];
         s[row + i] = sum;
       }
-      operations_ += Space::kDim * count;
+      piece.operations += Space::kDim * count;
     }
     row += count;
   }
@@ -788,7 +853,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
       }
     });
   }
-  operations_ += rows * (node.kept_numbers + rows / 2);
+  piece.operations += rows * (node.kept_numbers + rows / 2);
 }
 
 /// phi = -T^T (s + V F) are the measure numbers of a series join (17), of the base and terminal
@@ -797,7 +862,7 @@ void Sweep<Space, S>::Up(const PlanNode& node, int n, Rows rows, Width known,
 /// of mass.
 template <class Space, class S>
 template <class Rows, class Width>
-void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows, Width known) {
+void Sweep<Space, S>::Down(const PlanNode& node, int n, Piece& piece, Rows rows, Width known) {
   const int first = node.joints.front().row;
   S* phi = F_.data() + first;
   for (int i = 0; i < rows; ++i) phi[i] = -s_[first + i];
@@ -826,11 +891,11 @@ void Sweep<Space, S>::Down(const PlanNode& node, int n, Rows rows, Width known) 
       S* F = F_.data() + plan_.num_rows() + Space::kDim * (node.handles[h].body - 1);
       LOOPBENCH_UNROLL
       for (int d = 0; d < Space::kDim; ++d) F[d] += sum[d];
-      operations_ += Space::kDim * count;
+      piece.operations += Space::kDim * count;
     }
     phi += count;
   }
-  operations_ += rows * (node.kept_numbers + rows / 2);
+  piece.operations += rows * (node.kept_numbers + rows / 2);
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Sweep<Space, S>;

@@ -52,11 +52,13 @@
 // Construction allocates all memory; no matrix is larger than the largest join of the plan.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <vector>
 
 #include "mechanism/algebra/known_size.h"
 #include "mechanism/algebra/lower_triangle.h"
+#include "mechanism/algebra/worker_pool.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/loops/loop_solver.h"
@@ -120,8 +122,9 @@ auto Product(Rows rows, Columns columns) {
 template <class Space, class S>
 class Sweep {
  public:
-  /// `mechanism` and `plan` must outlive this. Plan joints index the mechanism's joints.
-  Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver);
+  /// `mechanism` and `plan` must outlive this. Plan joints index the mechanism's joints. Up to
+  /// `threads` threads share the pieces of the plan. Results are bitwise equal for any number.
+  Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, SolverKind solver, int threads = 1);
 
   /// Assembles from the leaves up, at the current positions.
   Outcome Assemble(const Kinematics<Space, S>& kinematics);
@@ -226,7 +229,8 @@ class Sweep {
   S smallest_weight() const { return smallest_weight_; }
   int worst_joint() const { return worst_joint_; }
   /// Multiply-adds since the last Assemble() began, counted as they were done (an
-  /// eigen-decomposition as if it were a Cholesky factorisation).
+  /// eigen-decomposition as if it were a Cholesky factorisation). After a failure in a piece, later
+  /// pieces do not count.
   long operations() const { return operations_; }
   /// Returns the entries of the largest matrix stored for one join: X or one Z.
   int largest_matrix() const { return largest_matrix_; }
@@ -258,12 +262,29 @@ class Sweep {
     Acceleration<Space, S> h;
     Wrench<Space, S> Mh;
   };
+  /// One of the plan's, with memory that only its own nodes use.
+  struct alignas(64) Piece {
+    std::span<const int> nodes, leaves;
+    std::vector<int> lone_leaves;  ///< leaves without sides: inside trees, or without joints
+    MatrixX<S> columns;
+    long operations = 0;  ///< until AddOperations()
+  };
   bool IsLeaf(int n) const { return n < plan_.num_leaves(); }
+  const PlanNode& Node(int n) const { return plan_.nodes()[n - plan_.num_leaves()]; }
   enum class Pass { kPhysical, kGeometric, kRegularized };
 
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
-  void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, int n);
-  void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, int n);
+  /// Ends at a node that fails, and after `failed`, the first one of all that failed so far.
+  void AssemblePiece(const Kinematics<Space, S>& kinematics, Pass pass, Piece& piece,
+                     std::atomic<int>& failed);
+  /// Calls `call` with all pieces but the last one; threads share these.
+  void ForPieces(const auto& call) {
+    pool_.ForEach(static_cast<int>(pieces_.size()) - 1, [&](int i) { call(pieces_[i]); });
+  }
+  /// Of pieces that begin before node `end`.
+  void AddOperations(int end);
+  void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, Piece& piece, int n);
+  void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, Piece& piece, int n);
   template <class Rows>
   void FillRows(const Kinematics<Space, S>& kinematics, Masses masses, const PlanSide& side,
                 Rows rows);
@@ -286,34 +307,36 @@ class Sweep {
                                 [&](auto size) LOOPBENCH_INLINED { return call(size, N); });
   }
   template <class Rows, class Width>
-  void FormResponse(const PlanNode& node, const Place& place, Rows rows, Width width);
+  void FormResponse(const PlanNode& node, const Place& place, Piece& piece, Rows rows, Width width);
   template <class Rows>
-  bool FactorFloating(const Place& place, Rows rows);
+  bool FactorFloating(const Place& place, Piece& piece, Rows rows);
   JointMatrix<S> FreeResponseAt(const PlanNode& node, const NodeJoint& joint) const;
-  bool FactorLoop(const PlanNode& node, const Place& place, Pass pass);
+  bool FactorLoop(const PlanNode& node, const Place& place, Piece& piece, Pass pass);
   template <class Rows, class Width>
-  void ApplyToKept(const PlanNode& node, const Place& place, Rows rows, Width width);
+  void ApplyToKept(const PlanNode& node, const Place& place, Piece& piece, Rows rows, Width width);
   template <class Rows, class Width, class Numbers>
   void RespondAt(const PlanNode& node, const Handle& side, const Handle& handle,
                  const Wrench<Space, S>* c, Rows count, Width known, Numbers width, bool adds,
                  S* Y) const;
   template <class Rows, class Width>
-  void Eliminate(const PlanNode& node, const Place& place, Rows rows, Width width);
+  void Eliminate(const PlanNode& node, const Place& place, Piece& piece, Rows rows, Width width);
   void NoteDiagnostics(const PlanNode& node, const LoopSolver<S>& loop);
 
   /// Passes one node upwards, and downwards.
   template <class Rows, class Width>
-  void Up(const PlanNode& node, int n, Rows rows, Width width,
+  void Up(const PlanNode& node, int n, Piece& piece, Rows rows, Width width,
           std::span<const Components<Space, S>> c0);
   template <class Rows, class Width>
-  void Down(const PlanNode& node, int n, Rows rows, Width width);
+  void Down(const PlanNode& node, int n, Piece& piece, Rows rows, Width width);
   /// UpLeaf() sets b at the handles of a leaf. DownLeaf() adds its acceleration to A.
-  void UpLeaf(int n, const Loads& loads);
-  void DownLeaf(int n, const Loads& loads, std::span<Acceleration<Space, S>> A);
+  void UpLeaf(int n, Piece& piece, const Loads& loads);
+  void DownLeaf(int n, Piece& piece, const Loads& loads, std::span<Acceleration<Space, S>> A);
+  void UpPiece(Piece& piece, const Loads& loads);
+  void DownPiece(Piece& piece, const Loads& loads, std::span<Acceleration<Space, S>> A);
   /// Runs up and down; adds to A and phi_. Without b the bodies' free accelerations are zero.
   void Correct(const Loads& loads, std::span<Acceleration<Space, S>> A);
-  /// r = C A + c0 of every joint, in residual_.
-  void Residual(std::span<const Components<Space, S>> c0,
+  /// r = C A + c0 of every joint of a piece, in residual_.
+  void Residual(Piece& piece, std::span<const Components<Space, S>> c0,
                 std::span<const Acceleration<Space, S>> A);
 
   const Mechanism<Space, S>& mechanism_;
@@ -330,8 +353,8 @@ class Sweep {
   std::vector<int> c_offset_;               ///< of each mechanism joint in c_
   std::vector<S> X_;
   std::vector<LoopSolver<S>> loops_;
-  MatrixX<S> columns_;
-  std::vector<int> lone_leaves_;  ///< leaves without sides: inside trees, or without joints
+  std::vector<int> loop_nodes_;  ///< their nodes
+  std::vector<Piece> pieces_;
   int largest_matrix_ = 0;
   bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;
@@ -347,6 +370,7 @@ class Sweep {
   std::vector<Components<Space, S>> phi_, residual_;
   std::vector<S> s_;  ///< by row
   long operations_ = 0;
+  WorkerPool pool_;
 };
 
 }  // namespace loopbench::odca

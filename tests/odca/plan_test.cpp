@@ -285,6 +285,37 @@ TEST(PlanTest, OperationsAreThoseOfTheSweep) {
   }
 }
 
+TEST(PlanTest, PiecesShareNoSubtree) {
+  const MechanismDescription grid = Grid(8, 8, -1.0, 0.5);
+  const Mechanism<Planar, double> mechanism(grid, Coordinates::kJoint);
+  PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
+  EXPECT_EQ(MakePlan(mechanism, options).pieces().size(), 1u) << "too small";
+  options.piece = 1000;
+  const Plan plan = MakePlan(mechanism, options);
+  const int last = static_cast<int>(plan.pieces().size()) - 1;
+  EXPECT_GE(last, 8);
+  std::vector<int> piece(plan.num_nodes(), -1);
+  for (int i = 0; i <= last; ++i) {
+    for (const auto& list : {plan.pieces()[i].nodes, plan.pieces()[i].leaves}) {
+      for (const int n : list) {
+        EXPECT_EQ(piece[n], -1);
+        piece[n] = i;
+      }
+    }
+  }
+  EXPECT_EQ(std::ranges::count(piece, -1), 0);
+  for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
+    for (const int child : plan.nodes()[n - plan.num_leaves()].children) {
+      if (child < 0 || piece[n] == last) continue;
+      EXPECT_EQ(piece[child], piece[n]);
+    }
+  }
+  for (int n = 0; n < plan.num_leaves(); ++n) {
+    const Leaf& leaf = plan.leaves()[n];
+    EXPECT_EQ(piece[n], piece[leaf.end < 0 ? n : leaf.end]);
+  }
+}
+
 std::vector<PlanJoint> ChainOf(int bodies, int rows = 2) {
   std::vector<PlanJoint> joints;
   for (int j = 0; j <= bodies; ++j) joints.push_back({j, j, j < bodies ? j + 1 : 0, rows});

@@ -6,7 +6,9 @@
 #include <limits>
 
 #include "mechanism/description/library.h"
+#include "mechanism/simplify/redundancy.h"
 #include "odca/odca.h"
+#include "tests/contract/allocations.h"
 #include "tests/contract/builder.h"
 #include "tests/contract/comparison.h"
 #include "tests/contract/system_with.h"
@@ -49,6 +51,72 @@ TEST(SweepTest, NoMatrixIsLargerThanThePlansLargestJoin) {
   const Mechanism<Planar, double> chain(Chain(1000), Coordinates::kJoint);
   EXPECT_LE((Odca<Planar, double>(chain, {}).sweep().largest_matrix()), 16)
       << "two handles of two rows";
+}
+
+/// Evaluates with small pieces and 1, 2, 3 and 8 threads, and with one piece: the same bits.
+/// The sweep allocates nothing.
+template <class Space>
+void ExpectTheSameBits(const MechanismDescription& description, bool regularizes = false) {
+  SCOPED_TRACE(description.name);
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  const VectorX<double> q = testing::DescribedCoordinates(description, mechanism);
+  const VectorX<double> u = VectorX<double>::LinSpaced(mechanism.num_u(), -1.0, 1.0);
+  const auto found = [&](const FormulationOptions& options, long piece) {
+    PlanOptions plan = PlanOptionsOf(options.solver);
+    plan.piece = piece;
+    testing::SystemWith<Odca, Space, double> odca(mechanism, options, plan);
+    const Sweep<Space, double>& sweep = odca.solver().sweep();
+    const std::size_t pieces = odca.solver().plan().pieces().size();
+    EXPECT_EQ(pieces == 1, piece > 2000) << pieces;
+    std::vector<double> y(odca->state_size()), all(y.size());
+    odca->ToState(q, u, y);
+    const Outcome outcome = odca->Examine(0.0, y, all);
+    const long before = testing::CountAllocations();
+    for (int round = 0; round < 3; ++round) {
+      std::ranges::fill(all, 0.0);
+      EXPECT_EQ(odca->Examine(0.0, y, all), outcome);
+    }
+    if (!mechanism.is_redundant()) {  // else SelfStress allocates
+      EXPECT_EQ(testing::CountAllocations(), before);
+    }
+    if (options.solver == SolverKind::kRankRevealing) {
+      EXPECT_EQ(outcome, Outcome::kFinished);
+      EXPECT_EQ(sweep.regularized(), regularizes);
+    }
+    for (const Components<Space, double>& phi : sweep.multipliers()) {
+      for (int i = 0; i < Space::kDim; ++i) all.push_back(phi[i]);
+    }
+    all.insert(all.end(), {sweep.rcond(), sweep.smallest_weight(), double(sweep.worst_joint()),
+                           double(sweep.dependent_rows()), double(outcome)});
+    return std::pair(all, sweep.operations());
+  };
+  for (const SolverKind solver : {SolverKind::kAsPublished, SolverKind::kRankRevealing}) {
+    for (const auto level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
+      FormulationOptions options = {.enforcement = level, .solver = solver};
+      const auto alone = found(options, 2000);
+      EXPECT_TRUE(found(options, 1L << 40).first == alone.first);
+      for (const int threads : {2, 3, 8}) {
+        options.threads = threads;
+        EXPECT_TRUE(found(options, 2000) == alone) << threads << " threads";
+      }
+    }
+  }
+}
+
+TEST(SweepTest, HasTheSameBitsForAnyNumberOfThreads) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    ExpectTheSameBits<Spatial>(testing::RandomTree(60, SpaceKind::kSpatial, seed));
+    ExpectTheSameBits<Spatial>(testing::RandomGraph(8, SpaceKind::kSpatial, seed));
+    ExpectTheSameBits<Spatial>(testing::RedundantGraph(40, 12, SpaceKind::kSpatial, seed), true);
+    ExpectTheSameBits<Planar>(testing::MixedGraph(20, SpaceKind::kPlanar, seed, 3));
+    ExpectTheSameBits<Spatial>(testing::MixedGraph(8, SpaceKind::kSpatial, seed, 3));
+  }
+  ExpectTheSameBits<Planar>(Grid(8, 8, -1.0, 0.5));
+  ExpectTheSameBits<Planar>(Ladder(60, 0.0, 0.5), true);
+  MechanismDescription ladder = Ladder(30, -1.0, 0.5);
+  ladder.space = SpaceKind::kSpatial;
+  ExpectTheSameBits<Spatial>(ladder, true);
+  ExpectTheSameBits<Spatial>(Release(ladder, FindRedundancy(ladder)));
 }
 
 #ifdef LOOPBENCH_PRECISIONS

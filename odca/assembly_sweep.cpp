@@ -11,10 +11,14 @@
 // body has as many handles as pins, and Y (67) is a row of blocks of zeta. A tree pin on Ground is
 // a property of its body, not a joint of an assembly, as in two_handle.h.
 //
+// Threads share the pieces of the plan. One thread goes along the spanning tree and through the
+// last piece. A rejection depends on the positions alone.
+//
 // A join factors X = L D L^T, two rows of one pin at a time. It keeps L and W = D^-1 L^-1 Y. The
 // rank of a pin that closes a loop is uncertain under the condition for paths: then the general
 // sweep decides.
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "mechanism/algebra/known_size.h"
@@ -66,11 +70,11 @@ LOOPBENCH_INLINE auto WithRows(int pins, const Call& call) {
 class AssemblySweep final : public ShortCut<Planar> {
  public:
   static std::unique_ptr<AssemblySweep> Make(const Mechanism<Planar, double>& mechanism,
-                                             const Plan& plan);
+                                             const Plan& plan, int threads);
 
   bool IsUsable(const Kinematics<Planar, double>& kinematics) override {
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      angle_[i] = kinematics.poses()[i + 1].angle;
+      angle_[i] = kinematics.poses()[bodies_[i].index].angle;
       speed_[i] = 0.0;
     }
     return Turn<true>() && Assemble();
@@ -81,6 +85,7 @@ class AssemblySweep final : public ShortCut<Planar> {
   using Matrix = Matrix2<double>;
 
   struct Body {
+    int index = 0;      ///< of the mechanism's bodies
     Link<double> link;  ///< arms belong to handles
     int first_handle = 0, handles = 0;
     int first_block = 0;  ///< of zeta
@@ -124,6 +129,13 @@ class AssemblySweep final : public ShortCut<Planar> {
     int first_block = 0;           ///< of its own zeta
     int matrix = 0;                ///< first number of W_
   };
+  /// One of the plan's, with memory that only its own nodes use.
+  struct alignas(64) Piece {
+    int first_body = 0, last_body = 0;
+    int first_node = 0, last_node = 0;
+    std::vector<double> U;  ///< L^-1 Y of one join, with the columns of W_
+  };
+  static constexpr int kPartOfTurn = 512;  ///< bodies
 
   struct Layout;
 
@@ -163,25 +175,36 @@ class AssemblySweep final : public ShortCut<Planar> {
       const double s = sine_[i], c = cosine_[i];
       const Vector r = {body.centre.x * c - body.centre.y * s,
                         body.centre.x * s + body.centre.y * c};
-      const Vector F = {wrenches_[i + 1].linear[0], wrenches_[i + 1].linear[1]};
+      const Vector F = {wrenches_[body.index].linear[0], wrenches_[body.index].linear[1]};
       applied_[i] = {Scaled(body.link.mobility, F),
-                     (wrenches_[i + 1].angular[0] + Moment(r, F)) / body.link.radius};
+                     (wrenches_[body.index].angular[0] + Moment(r, F)) / body.link.radius};
     }
+  }
+
+  /// Calls `call` with all pieces but the last one; threads share these.
+  void ForPieces(const auto& call) {
+    pool_->ForEach(static_cast<int>(pieces_.size()) - 1, [&](int i) { call(pieces_[i]); });
   }
 
   /// Bodies at moved angles. False for angles beyond kLargestAngle.
   template <bool kOfSpeeds>
   bool Turn() {
-    const int places = static_cast<int>(angle_.size());
-    if (!SinesAndCosines(angle_.data(), places, sine_.data(), cosine_.data())) return false;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      const Body& body = bodies_[i];
-      const double s = sine_[i], c = cosine_[i];
-      for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
-        const Vector& arm = handles_[h];
-        arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
+    std::atomic<bool> good = true;
+    ForParts<kPartOfTurn>(angle_.size(), [&](std::size_t first, std::size_t last) {
+      if (!SinesAndCosines(&angle_[first], static_cast<int>(last - first), &sine_[first],
+                           &cosine_[first])) {
+        good = false;
       }
-    }
+      for (std::size_t i = first; i < std::min(last, bodies_.size()); ++i) {
+        const Body& body = bodies_[i];
+        const double s = sine_[i], c = cosine_[i];
+        for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
+          const Vector& arm = handles_[h];
+          arm_[h] = {arm.x * c - arm.y * s, arm.x * s + arm.y * c};
+        }
+      }
+    });
+    if (!good) return false;
     if (!cuts_.empty()) Close<kOfSpeeds>();
     return true;
   }
@@ -212,7 +235,15 @@ class AssemblySweep final : public ShortCut<Planar> {
 
   bool Assemble() {
     operations_ += of_matrices_;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    std::atomic<bool> good = true;
+    ForPieces([&](Piece& piece) { JoinPiece(piece, good); });
+    JoinPiece(pieces_.back(), good);
+    return good;
+  }
+
+  /// Ends where `good` is false, and sets it to false at a node that may be degenerate.
+  [[gnu::noinline]] void JoinPiece(Piece& piece, std::atomic<bool>& good) {
+    for (int i = piece.first_body; i < piece.last_body; ++i) {
       const Body& body = bodies_[i];
       const Vector* arm = arm_.data() + body.first_handle;
       Matrix* zeta = zeta_.data() + body.first_block;
@@ -223,10 +254,11 @@ class AssemblySweep final : public ShortCut<Planar> {
         }
       }
     }
-    for (const Node& node : nodes_) {
-      if (!WithRows(node.pins, [&](auto rows) { return Join(node, rows); })) return false;
+    const Node *node = nodes_.data() + piece.first_node, *end = nodes_.data() + piece.last_node;
+    double* U = piece.U.data();
+    for (; node != end && good; ++node) {
+      if (!WithRows(node->pins, [&](auto rows) { return Join(*node, U, rows); })) good = false;
     }
-    return true;
   }
 
   /// Y = C zeta of a pin at a handle of a child (67).
@@ -257,12 +289,12 @@ class AssemblySweep final : public ShortCut<Planar> {
 
   /// X = Y C^T (16, 66) is factored pin by pin. Rows of L are columns of W of the pins.
   template <class Rows>
-  bool Join(const Node& node, Rows rows) {
+  bool Join(const Node& node, double* U, Rows rows) {
     const int n = rows;
     const Pin* pins = pins_.data() + node.first_pin;
     const Side* kept = kept_.data() + node.first_kept;
     Factored2<double>* factors = factors_.data() + node.first_pin;
-    double *U = U_.data(), *W = W_.data() + node.matrix;
+    double* W = W_.data() + node.matrix;
     const double* L = W + 2 * n * node.kept;
     // two columns of U and W in the rows of the first pins, from columns of X or Y
     const auto reduce = [&](int place, int num_pins, const auto& block) LOOPBENCH_INLINED {
@@ -302,17 +334,17 @@ class AssemblySweep final : public ShortCut<Planar> {
       reduce(e, n / 2,
              [&](const Pin& row) LOOPBENCH_INLINED { return ResponseAt(node, row, kept[e]); });
     }
-    Eliminate(node, rows);
+    Eliminate(node, U, rows);
     return true;
   }
 
   /// Computes zeta of the remaining handles (26-28, 71).
   template <class Rows>
-  LOOPBENCH_INLINE void Eliminate(const Node& node, Rows rows) {
+  LOOPBENCH_INLINE void Eliminate(const Node& node, const double* U, Rows rows) {
     const int n = rows;
     const Side* kept = kept_.data() + node.first_kept;
     Matrix* zeta = zeta_.data() + node.first_block;
-    const double *U = U_.data(), *W = W_.data() + node.matrix;
+    const double* W = W_.data() + node.matrix;
     for (int f = 0; f < node.kept; ++f) {
       const double *wx = W + 2 * n * f, *wy = wx + n;
       for (int e = f; e < node.kept; ++e) {
@@ -389,7 +421,15 @@ class AssemblySweep final : public ShortCut<Planar> {
   template <Sought kSought>
   void Solve() {
     operations_ += of_vectors_;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    ForPieces([&](const Piece& piece) { UpPiece<kSought>(piece); });
+    UpPiece<kSought>(pieces_.back());
+    DownPiece(pieces_.back());
+    ForPieces([&](const Piece& piece) { DownPiece(piece); });
+  }
+
+  template <Sought kSought>
+  [[gnu::noinline]] void UpPiece(const Piece& piece) {
+    for (int i = piece.first_body; i < piece.last_body; ++i) {
       const Body& body = bodies_[i];
       const Applied applied = applied_.empty() ? Applied{} : applied_[i];
       const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i] + applied.alpha;
@@ -403,13 +443,18 @@ class AssemblySweep final : public ShortCut<Planar> {
                     : Vector{gx - a * r.y - w2 * r.x, gy + a * r.x - w2 * r.y};
       }
     }
-    for (const Node& node : nodes_) {
+    for (int n = piece.first_node; n < piece.last_node; ++n) {
+      const Node& node = nodes_[n];
       WithRows(node.pins, [&](auto rows) { Up<kSought>(node, rows); });
     }
-    for (std::size_t n = nodes_.size(); n-- > 0;) {
-      WithRows(nodes_[n].pins, [&](auto rows) { Down(nodes_[n], rows); });
+  }
+
+  [[gnu::noinline]] void DownPiece(const Piece& piece) {
+    for (int n = piece.last_node; n-- > piece.first_node;) {
+      const Node& node = nodes_[n];
+      WithRows(node.pins, [&](auto rows) { Down(node, rows); });
     }
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    for (int i = piece.first_body; i < piece.last_body; ++i) {
       const Body& body = bodies_[i];
       double alpha = alpha_[i];
       for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
@@ -419,11 +464,12 @@ class AssemblySweep final : public ShortCut<Planar> {
     }
   }
 
-  std::vector<Body> bodies_;
+  std::vector<Body> bodies_;     ///< piece after piece, as nodes
   std::vector<Vector> handles_;  ///< arms by radius in axes of the body, body after body
   std::vector<Step> steps_;
   std::vector<CutJoint> cuts_;
   std::vector<Node> nodes_;
+  std::vector<Piece> pieces_;
   std::vector<Pin> pins_;
   std::vector<Side> kept_;
 
@@ -435,8 +481,8 @@ class AssemblySweep final : public ShortCut<Planar> {
   std::vector<Point<double>> reference_;  ///< of bodies
   std::vector<Matrix> zeta_;
   /// Two columns for each handle that stays, then of L^T for each pin if there are several. A
-  /// column has two numbers for each pin. U_ = L^-1 Y of one join has the same columns.
-  std::vector<double> W_, U_;
+  /// column has two numbers for each pin.
+  std::vector<double> W_;
   std::vector<Factored2<double>> factors_;  ///< D, by pin
   std::vector<Vector> b_, F_;               ///< by handle: a join changes those that stay
   std::vector<double> s_;                   ///< two for each pin; in the downward pass phi
@@ -458,6 +504,8 @@ struct AssemblySweep::Layout {
   std::vector<int> handle_of = std::vector<int>(2 * mechanism.joints().size(), -1);  ///< as pins
   std::vector<int> cut_of = std::vector<int>(mechanism.joints().size(), -1);
   std::vector<Assembly> assemblies = std::vector<Assembly>(plan.num_nodes());
+  /// In bodies_, Ground last.
+  std::vector<int> place_of = std::vector<int>(mechanism.num_bodies(), mechanism.num_bodies() - 1);
   double most_work = static_cast<double>(plan.operations());
   int handles = 0;
   double blocks = 0.0, W = 0.0, most_U = 0.0, work = 0.0, vectors = 0.0;
@@ -471,8 +519,14 @@ struct AssemblySweep::Layout {
       joints_of_body[joint.from].push_back(2 * j);
       joints_of_body[joint.to].push_back(2 * j + 1);
     }
-    for (int body = 1; body < mechanism.num_bodies(); ++body) {
-      if (!AddBody(body, joints_of_body[body])) return false;
+    for (const PlanPiece& part : plan.pieces()) {
+      Piece& piece = sweep.pieces_.emplace_back();
+      piece.first_body = static_cast<int>(sweep.bodies_.size());
+      for (const int leaf : part.leaves) {
+        place_of[leaf + 1] = static_cast<int>(sweep.bodies_.size());
+        if (!AddBody(leaf + 1, joints_of_body[leaf + 1])) return false;
+      }
+      piece.last_body = static_cast<int>(sweep.bodies_.size());
     }
     return true;
   }
@@ -482,6 +536,7 @@ struct AssemblySweep::Layout {
       return mechanism.joints()[side / 2];
     };
     Body body;
+    body.index = index;
     Assembly& assembly = assemblies[index - 1];
     Vector origin = {0.0, 0.0};
     const auto held =
@@ -514,8 +569,8 @@ struct AssemblySweep::Layout {
     for (const TreeStep& step : mechanism.tree()) {
       if (step.parent == kGround) continue;
       const int parent_side = mechanism.joints()[step.joint].from == step.parent ? 0 : 1;
-      sweep.steps_.push_back({.parent = step.parent - 1,
-                              .child = step.child - 1,
+      sweep.steps_.push_back({.parent = place_of[step.parent],
+                              .child = place_of[step.child],
                               .parent_handle = handle_of[2 * step.joint + parent_side],
                               .child_handle = handle_of[2 * step.joint + 1 - parent_side]});
     }
@@ -524,8 +579,8 @@ struct AssemblySweep::Layout {
       cut_of[j] = static_cast<int>(sweep.cuts_.size());
       sweep.cuts_.push_back({.P = handle_of[2 * j],
                              .Q = handle_of[2 * j + 1],
-                             .body_P = joint.from - 1,
-                             .body_Q = joint.to - 1,
+                             .body_P = joint.from == kGround ? -1 : place_of[joint.from],
+                             .body_Q = joint.to == kGround ? -1 : place_of[joint.to],
                              .ground = ArmOf(joint, kGround)});
     }
   }
@@ -620,8 +675,10 @@ struct AssemblySweep::Layout {
     return Fits();
   }
 
-  bool AddNodes() {
-    for (int n = 0; n < plan.num_leaves(); ++n) {
+  bool AddNodes(const PlanPiece& part, Piece& piece) {
+    piece.first_node = static_cast<int>(sweep.nodes_.size());
+    most_U = 0.0;
+    for (const int n : part.leaves) {
       const PlanSide& hold = plan.leaves()[n].hold;
       if (hold.joint < 0 || HoldsBody(mechanism.joints()[hold.joint])) continue;
       const Handle leaf{.body = n + 1};
@@ -635,13 +692,15 @@ struct AssemblySweep::Layout {
       if (!AddNode(node, all)) return false;
       assemblies[n] = std::move(all);
     }
-    for (int n = plan.num_leaves(); n < plan.num_nodes(); ++n) {
+    for (const int n : part.nodes) {
       if (!AddNode(plan.nodes()[n - plan.num_leaves()], assemblies[n])) return false;
     }
+    piece.last_node = static_cast<int>(sweep.nodes_.size());
+    piece.U.resize(static_cast<std::size_t>(most_U));
     return true;
   }
 
-  void Resize() {
+  void Resize(int threads) {
     const auto places = static_cast<std::size_t>(mechanism.num_bodies() + kLanes - 1) / kLanes;
     sweep.angle_.assign(places * kLanes, 0.0);
     sweep.speed_ = sweep.alpha_ = sweep.sine_ = sweep.cosine_ = sweep.angle_;
@@ -651,10 +710,10 @@ struct AssemblySweep::Layout {
       sweep.applied_.resize(sweep.bodies_.size());
       sweep.wrenches_.resize(mechanism.num_bodies());
     }
-    sweep.SetSize(mechanism.num_u(), mechanism.length(), 1);
+    sweep.SetSize(mechanism.num_u(), mechanism.length(),
+                  std::min(threads, static_cast<int>(sweep.pieces_.size()) - 1));
     sweep.zeta_.resize(static_cast<std::size_t>(blocks));
     sweep.W_.resize(static_cast<std::size_t>(W));
-    sweep.U_.resize(static_cast<std::size_t>(most_U));
     sweep.factors_.resize(sweep.pins_.size());
     sweep.s_.assign(2 * sweep.pins_.size(), 0.0);
     sweep.b_.assign(sweep.handles_.size(), {0.0, 0.0});
@@ -666,24 +725,24 @@ struct AssemblySweep::Layout {
 };
 
 std::unique_ptr<AssemblySweep> AssemblySweep::Make(const Mechanism<Planar, double>& mechanism,
-                                                   const Plan& plan) {
+                                                   const Plan& plan, int threads) {
   if (!HasOnlyPins(mechanism)) return nullptr;
   std::unique_ptr<AssemblySweep> sweep(new AssemblySweep);
   Layout layout{*sweep, mechanism, plan};
   if (!layout.AddBodies()) return nullptr;
   layout.AddSteps();
-  if (!layout.AddNodes()) return nullptr;
-  layout.Resize();
-  std::vector<int> place_of(mechanism.num_bodies(), mechanism.num_bodies() - 1);
-  for (int body = 1; body < mechanism.num_bodies(); ++body) place_of[body] = body - 1;
-  sweep->tree_ =
-      TreeAngles<double>(mechanism, place_of, std::vector<double>(mechanism.num_bodies(), 0.0));
+  for (std::size_t i = 0; i < sweep->pieces_.size(); ++i) {
+    if (!layout.AddNodes(plan.pieces()[i], sweep->pieces_[i])) return nullptr;
+  }
+  layout.Resize(threads);
+  sweep->tree_ = TreeAngles<double>(mechanism, layout.place_of,
+                                    std::vector<double>(mechanism.num_bodies(), 0.0));
   return sweep;
 }
 
 std::unique_ptr<ShortCut<Planar>> MakeAssemblySweep(const Mechanism<Planar, double>& mechanism,
-                                                    const Plan& plan) {
-  return AssemblySweep::Make(mechanism, plan);
+                                                    const Plan& plan, int threads) {
+  return AssemblySweep::Make(mechanism, plan, threads);
 }
 
 }  // namespace loopbench::odca::pins

@@ -56,7 +56,7 @@ void Odca<Space, S>::MakeShortCut(const FormulationOptions& options) {
     if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
     short_cut_ = std::move(path);
   } else {
-    short_cut_ = pins::MakeAssemblySweep(mechanism_, plan_);
+    short_cut_ = pins::MakeAssemblySweep(mechanism_, plan_, options.threads);
   }
 }
 

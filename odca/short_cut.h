@@ -192,9 +192,9 @@ class PathLane {
 
 /// Returns a sweep along `plan`; neither plan nor mechanism need outlive it. Null for other
 /// mechanisms than pins, and if the general sweep has fewer multiplications, as with many pins on
-/// one body.
+/// one body. Up to `threads` threads share the pieces of the plan.
 std::unique_ptr<ShortCut<Planar>> MakeAssemblySweep(const Mechanism<Planar, double>& mechanism,
-                                                    const Plan& plan);
+                                                    const Plan& plan, int threads = 1);
 
 }  // namespace pins
 

@@ -2,6 +2,7 @@
 // oracle. What every short cut must do is in short_cut_test.cpp.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -160,6 +161,71 @@ TEST(AssemblySweep, ServesRunsWhoseWorkIsCounted) {
   }
   EXPECT_GT(with_power, 20);
   EXPECT_GT(served, 30) << "but where bodies are held more than once";
+}
+
+/// Evaluates and projects with small pieces and 1, 2, 3 and 8 threads, and with one piece: the same
+/// bits, the same rejections. Evaluations allocate nothing. Returns true if none was rejected.
+bool ExpectTheSameBits(const Model& mechanism, long piece, const Numbers& q, const Numbers& u) {
+  const auto found = [&](long enough, int threads) {
+    PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
+    options.piece = enough;
+    const Plan plan = MakePlan(mechanism, options);
+    const int pieces = static_cast<int>(plan.pieces().size());
+    EXPECT_EQ(pieces > 4, enough == piece) << pieces;
+    const auto sweep = MakeAssemblySweep(mechanism, plan, threads);
+    EXPECT_EQ(sweep->threads(), std::clamp(threads, 1, std::max(1, pieces - 1)));
+    Kinematics<Planar, double> kinematics(mechanism);
+    std::vector<Numbers> all;
+    Numbers accepted = Numbers::Zero(3), qdot = Numbers::Zero(u.size()), udot = qdot;
+    for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
+      double& each = accepted[speeds == SpeedsUsed::kGiven ? 0 : 1];
+      const long before = testing::CountAllocations();
+      for (int round = 0; round < 3; ++round) {
+        each = sweep->Evaluate(speeds, &kinematics, In(q), In(u), In(qdot), In(udot));
+      }
+      EXPECT_EQ(testing::CountAllocations(), before);
+      all.insert(all.end(), {qdot, udot});
+    }
+    Numbers moved = q, changed = u;
+    accepted[2] = sweep->Project(In(moved), In(changed), 1e-12).has_value();
+    all.insert(all.end(), {moved, changed, accepted});
+    return all;
+  };
+  const auto alone = found(piece, 1);
+  EXPECT_TRUE(found(1L << 40, 1) == alone) << mechanism.name();
+  for (const int threads : {2, 3, 8}) {
+    EXPECT_TRUE(found(piece, threads) == alone) << mechanism.name() << ' ' << threads << " threads";
+  }
+  return alone.back().isOnes(0.0);
+}
+
+TEST(AssemblySweep, HasTheSameBitsForAnyNumberOfThreads) {
+  const auto expect = [](const MechanismDescription& description, long piece, double size,
+                         bool accepted) {
+    const Model mechanism(description, Coordinates::kJoint);
+    Random random(1);
+    const auto [q, u] = StateNear(description, mechanism, size, random);
+    EXPECT_EQ(ExpectTheSameBits(mechanism, piece, q, u), accepted) << description.name;
+  };
+  for (const double drift : {1e-4, 0.02}) {
+    expect(Tree(1000, 1.0), 2000, drift, true);
+    expect(Ladder(300, -1.0, 0.5), 2000, drift, true);
+    expect(Grid(8, 8, 1.1, -0.7), 2000, drift, true);
+  }
+  expect(Tree(10000, 1.0), PlanOptions().piece, 0.3, true);
+  expect(Grid(18, 18, 1.1, -0.7), PlanOptions().piece, 1e-4, true);
+  expect(Ladder(300, 0.0, 0.5), 2000, 0.0, false);
+  expect(Grid(8, 8, 1e-6, 0.5), 2000, 0.0, false);
+  int accepted = 0, rejected = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const Model mechanism(RandomBranches(60, seed, 20), Coordinates::kJoint);
+    Random random(seed);
+    const Numbers q = RandomNumbers(random, mechanism.num_q(), 4.0);
+    const Numbers u = RandomNumbers(random, mechanism.num_u(), 2.0);
+    ++(ExpectTheSameBits(mechanism, 500, q, u) ? accepted : rejected);
+  }
+  EXPECT_GT(accepted, 5);
+  EXPECT_GT(rejected, 5);
 }
 
 TEST(AssemblySweep, LeavesManyPinsOnABodyToTheGeneralSweep) {

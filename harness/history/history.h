@@ -262,8 +262,8 @@ struct HistoryValue {
   /// False for times measured while the machine was slower or faster than usual at that time; true
   /// if its speed is unknown. Unsteady values are not used for levels.
   bool is_steady = true;
-  /// For times: common slowdown of all cases of the entry; 1 if there are few cases or none with a
-  /// measurable time.
+  /// For times: variation of the entry common to all cases, without changes of level; 1 if there
+  /// are few cases or none with a measurable time.
   double common = 1.0;
 };
 
@@ -274,7 +274,7 @@ struct HistorySeries {
   Rule rule = Rule::kNone;
   std::vector<HistoryValue> values;
   /// at: index into `values`; levels: medians of the values. For times found after removing the
-  /// common slowdown, the levels are without it too.
+  /// common variation, the levels are without it too.
   std::vector<LevelChange> changes;
 
   std::size_t Unsteady() const;  ///< number of values at another speed of the machine
@@ -300,8 +300,8 @@ struct HistoryFindings {
 };
 
 /// Finds all series with their changes. Times use steady values only; those of five and more cases
-/// are also pooled. A change common to these cases appears only in the pooled series: a machine
-/// that is slow for a week is one step. Throws std::runtime_error if a results file cannot be read.
+/// are also pooled. A change of the pooled series needs half of its size as median of the cases'
+/// own changes. Throws std::runtime_error if a results file cannot be read.
 HistoryFindings FindingsOf(const History& history);
 
 // Steps of a history as table rows.

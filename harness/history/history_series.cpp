@@ -38,7 +38,7 @@ Resolution ResolutionOf(Rule rule, double most, double places) {
   }
 }
 
-/// The common slowdown is removed from a series if this reduces its noise to less than this share.
+/// The common variation is removed from a series if this reduces its noise to less than this share.
 constexpr double kQuieter = 0.7;
 
 /// Errors below are round-off and equal (CompareOptions::error_floor).
@@ -148,6 +148,33 @@ double FloorOf(const HistorySeries& series) {
   return smallest;
 }
 
+/// Sets the levels before and after each change of `values`, as medians.
+void SetLevels(std::span<const double> values, std::vector<LevelChange>* changes) {
+  std::size_t begin = 0;
+  for (std::size_t k = 0; k < changes->size(); ++k) {
+    LevelChange& change = (*changes)[k];
+    const std::size_t end = k + 1 < changes->size() ? (*changes)[k + 1].at : values.size();
+    change.before = Median(values.subspan(begin, change.at - begin));
+    change.after = Median(values.subspan(change.at, end - change.at));
+    begin = change.at;
+  }
+}
+
+/// Returns the logarithms of times minus their medians between changes.
+std::vector<double> VariationOf(std::vector<double> x) {
+  const auto places = static_cast<double>(x.size());
+  std::vector<LevelChange> changes = FindChanges(x, ResolutionOf(Rule::kTime, 0.0, places));
+  changes.push_back({x.size()});
+  std::size_t begin = 0;
+  for (const LevelChange& change : changes) {
+    const auto segment = std::span(x).subspan(begin, change.at - begin);
+    const double level = Median(segment);
+    for (double& value : segment) value -= level;
+    begin = change.at;
+  }
+  return x;
+}
+
 /// Finds the changes of a series. Levels are compared as logarithms.
 void FindChangesOf(HistorySeries* series, double places) {
   const double floor = FloorOf(*series);
@@ -172,17 +199,7 @@ void FindChangesOf(HistorySeries* series, double places) {
     }
   }
   series->changes = FindChanges(logarithms, ResolutionOf(series->rule, most, places));
-  const auto median = [&](std::size_t from, std::size_t to) {
-    return Median(std::span(values).subspan(from, to - from));
-  };
-  std::size_t begin = 0;
-  for (std::size_t k = 0; k < series->changes.size(); ++k) {
-    LevelChange& change = series->changes[k];
-    const bool is_last = k + 1 == series->changes.size();
-    change.before = median(begin, change.at);
-    change.after = median(change.at, is_last ? values.size() : series->changes[k + 1].at);
-    begin = change.at;
-  }
+  SetLevels(values, &series->changes);
   for (LevelChange& change : series->changes) change.at = steady[change.at];
 }
 
@@ -225,7 +242,36 @@ void MarkUnsteady(const std::vector<std::string>& compilers, std::vector<History
   }
 }
 
-/// Pools times if a machine has many cases, and sets their common slowdown.
+/// Sets the variation common to `cases`: the median over cases of their values without their own
+/// changes, again without changes. A change of some cases thus never shows in the others.
+void SetCommon(const std::vector<HistorySeries*>& cases) {
+  std::map<std::size_t, std::vector<double>> at_entry;
+  for (const HistorySeries* one : cases) {
+    std::vector<std::size_t> entries;
+    std::vector<double> logarithms;
+    for (const HistoryValue& value : one->values) {
+      if (!value.is_steady || !(value.value > 0.0)) continue;
+      entries.push_back(value.entry);
+      logarithms.push_back(std::log(value.value));
+    }
+    const std::vector<double> variation = VariationOf(std::move(logarithms));
+    for (std::size_t i = 0; i < entries.size(); ++i) at_entry[entries[i]].push_back(variation[i]);
+  }
+  std::vector<double> medians;
+  for (const auto& [entry, values] : at_entry) medians.push_back(Median(values));
+  const std::vector<double> variation = VariationOf(std::move(medians));
+  std::map<std::size_t, double> common;
+  std::size_t i = 0;
+  for (const auto& [entry, values] : at_entry) common[entry] = std::exp(variation[i++]);
+  for (HistorySeries* one : cases) {
+    for (HistoryValue& value : one->values) {
+      const auto at = common.find(value.entry);
+      if (value.is_steady && at != common.end()) value.common = at->second;
+    }
+  }
+}
+
+/// Pools times if a machine has many cases, and sets their common variation.
 std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
   constexpr std::size_t kMany = 5;
   std::map<std::pair<std::string, std::string>, std::vector<HistorySeries*>> times;
@@ -238,17 +284,53 @@ std::vector<HistorySeries> PoolTimes(std::vector<HistorySeries>* all) {
     if (cases.size() < kMany) continue;
     HistorySeries pool = Pooled({cases.begin(), cases.end()});
     if (pool.values.empty()) continue;
-    std::map<std::size_t, double> common;
-    for (const HistoryValue& value : pool.values) common[value.entry] = value.value;
-    for (HistorySeries* one : cases) {
-      for (HistoryValue& value : one->values) {
-        const auto at = common.find(value.entry);
-        if (value.is_steady && at != common.end()) value.common = at->second;
-      }
-    }
+    SetCommon(cases);
     pooled.push_back(std::move(pool));
   }
   return pooled;
+}
+
+/// Returns the median over the cases of a pool of their own changes between entries, as
+/// logarithms of median ratios.
+double ChangeOfCases(const HistorySeries& pool, const std::vector<HistorySeries>& all,
+                     std::size_t begin, std::size_t at, std::size_t end) {
+  std::vector<double> changes;
+  for (const HistorySeries& one : all) {
+    if (one.machine != pool.machine || one.measure != pool.measure || one.one == kAllCases)
+      continue;
+    std::vector<double> before, after;
+    for (const HistoryValue& value : one.values) {
+      if (!value.is_steady || value.entry < begin || value.entry >= end) continue;
+      (value.entry < at ? before : after).push_back(value.value);
+    }
+    const double change = std::log(Median(after) / Median(before));
+    if (std::isfinite(change)) changes.push_back(change);
+  }
+  return Median(changes);
+}
+
+/// Removes changes of a pool that its cases do not have: few that change move the median of all.
+void RequireChangeOfCases(const std::vector<HistorySeries>& all, HistorySeries* pool) {
+  std::vector<double> values;
+  for (const HistoryValue& value : pool->values) values.push_back(value.value);
+  std::vector<LevelChange>& changes = pool->changes;
+  const auto entry_of = [pool](std::size_t i) {
+    return i < pool->values.size() ? pool->values[i].entry : pool->values.back().entry + 1;
+  };
+  for (std::size_t k = 0; k < changes.size();) {
+    const std::size_t begin = k == 0 ? 0 : changes[k - 1].at;
+    const std::size_t end = k + 1 < changes.size() ? changes[k + 1].at : values.size();
+    const double size = std::log(changes[k].after / changes[k].before);
+    const double of_cases =
+        ChangeOfCases(*pool, all, entry_of(begin), entry_of(changes[k].at), entry_of(end));
+    if (of_cases / size >= 0.5) {
+      ++k;
+      continue;
+    }
+    changes.erase(changes.begin() + static_cast<std::ptrdiff_t>(k));
+    SetLevels(values, &changes);
+    k = 0;  // the neighbours have longer segments now
+  }
 }
 
 }  // namespace
@@ -279,7 +361,10 @@ HistoryFindings FindingsOf(const History& history) {
   found.series.insert(found.series.begin(), pooled.begin(), pooled.end());
   double values = 0.0;
   for (const HistorySeries& one : found.series) values += static_cast<double>(one.values.size());
-  for (HistorySeries& one : found.series) FindChangesOf(&one, values);
+  for (HistorySeries& one : found.series) {
+    FindChangesOf(&one, values);
+    if (one.one == kAllCases) RequireChangeOfCases(found.series, &one);
+  }
   return found;
 }
 namespace {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <random>
 #include <sstream>
 
@@ -166,6 +167,57 @@ std::size_t FoundNearTheEnd(const fs::path& folder, std::size_t before, std::siz
     EXPECT_LE(series.changes.size(), ratio == 1.0 ? 0u : 1u) << series.one;
   }
   return found;
+}
+
+/// Ratios of the changes by case in 200 commits, of which the first `doubled` cases double at 100.
+std::map<std::string, std::vector<double>> ChangesIfDoubled(const fs::path& folder, int cases,
+                                                            int doubled, double own, double common,
+                                                            unsigned seed) {
+  fs::remove_all(folder);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (int commit = 0; commit < 200; ++commit) {
+    std::vector<Record> records;
+    const double shared = common * normal(random);
+    for (int k = 0; k < cases; ++k) {
+      const double level = 1e-3 * (k < doubled && commit >= 100 ? 2.0 : 1.0);
+      const double time = level * std::exp(shared + own * normal(random));
+      records.push_back(Measured("case" + std::to_string(k), 1e-7, 1000, {time, 1.1 * time}));
+    }
+    AddToHistory(folder, {.commit = CommitName(commit), .date = Date(commit)}, records, false);
+  }
+  std::map<std::string, std::vector<double>> found;
+  for (const HistorySeries& series : FindingsOf(ReadHistory(folder)).series) {
+    for (const LevelChange& change : series.changes) {
+      found[series.one].push_back(change.after / change.before);
+      EXPECT_NEAR(static_cast<double>(change.at), 100.0, 1.0) << series.one;
+    }
+  }
+  return found;
+}
+
+// What varies in common is subtracted, but not what changed in most of the cases.
+TEST_F(PlantedHistory, EachCaseHasItsOwnChanges) {
+  for (const int doubled : {2, 3, 4}) {
+    for (unsigned seed = 0; seed < 3; ++seed) {
+      auto found = ChangesIfDoubled(folder_, 5, doubled, 0.005, 0.02, seed);
+      found.erase(kAllCases);
+      EXPECT_EQ(found.size(), static_cast<std::size_t>(doubled));
+      for (const auto& [one, ratios] : found) {
+        EXPECT_LT(one.back(), '0' + doubled) << one;
+        ASSERT_EQ(ratios.size(), 1u) << one;
+        EXPECT_NEAR(ratios[0], 2.0, 0.02) << one;
+      }
+    }
+  }
+}
+
+TEST_F(PlantedHistory, OneCaseIsNotAllCases) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    const auto found = ChangesIfDoubled(folder_, 6, 1, 0.03, 0.0, seed);
+    EXPECT_EQ(found.size(), 1u) << seed;
+    EXPECT_FALSE(found.contains(kAllCases)) << seed;
+  }
 }
 
 // People look at a history when something has just become slow, not twenty commits later.

@@ -303,8 +303,11 @@ int PrintVerdicts(const VerdictCommand& command, const Typed& typed) {
   Table verdicts = VerdictTable(results);
   for (const ClaimResult& result : results) {
     for (const CheckResult& check : result.checks) {
-      if (result.verdict != Verdict::kNotMeasured || check.reason.empty()) continue;
-      AddNote(verdicts.notes, "{}: {}", result.rule.id, check.reason);
+      const bool is_told = result.verdict == Verdict::kNotMeasured;
+      for (const std::string& text : {is_told ? check.reason : "", check.remark}) {
+        const std::string note = result.rule.id + ": " + text;
+        if (!text.empty() && !Contains(verdicts.notes, note)) verdicts.notes.push_back(note);
+      }
     }
   }
   AppendProvenance(verdicts, typed.line);

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -18,6 +19,7 @@
 namespace loopbench::harness {
 namespace {
 
+constexpr const char* kNoNumber = "no number";
 constexpr std::string_view kStatistics[] = {"max", "min", "mean", "every", "any"};
 
 bool IsQuantified(const Check& check) {
@@ -65,6 +67,11 @@ Sample Take(const Check& check, const Selection& selection, std::span<const Reco
   return sample;
 }
 
+// Returns "no record of formulation=odca has drift".
+std::string NoneHas(const Selection& selection, const std::string& key) {
+  return fmt::format("no record of {} has {}", ToText(selection), key);
+}
+
 // Returns "2 of 3 runs failed", or "" if all rows of the sample are usable.
 std::string Defect(const Check& check, const Sample& sample) {
   const std::size_t rows = sample.rows.size();
@@ -75,6 +82,32 @@ std::string Defect(const Check& check, const Sample& sample) {
     return fmt::format("{} of {} rows without {}", sample.unmet, rows, ToText(check.require));
   }
   return "";
+}
+
+// Returns "no record of formulation=odca has coordinats" for a required key that no row has, or "".
+std::string KeyMissing(const Check& check, const Selection& selection, const Sample& sample) {
+  for (const Condition& one : check.require) {
+    const bool is_there = std::ranges::any_of(
+        sample.rows, [&one](const Record& row) { return row.Find(one.key) != nullptr; });
+    if (sample.unmet > 0 && !is_there) return NoneHas(selection, one.key);
+  }
+  return "";
+}
+
+// Returns "12 of 24 runs have warnings: energy, drift", or "".
+std::string Flagged(std::initializer_list<const Sample*> samples) {
+  std::set<std::string> words;
+  std::size_t rows = 0, flagged = 0;
+  for (const Sample* sample : samples) {
+    for (const Record& row : sample->rows) {
+      std::istringstream codes(row.Text("warnings"));
+      const std::size_t before = flagged;
+      for (std::string code; codes >> code; flagged = before + 1) words.insert(code);
+      ++rows;
+    }
+  }
+  if (flagged == 0) return "";
+  return fmt::format("{} of {} runs have warnings: {}", flagged, rows, fmt::join(words, ", "));
 }
 
 // Returns "1 of 2 values missing or not finite", or "". Incomplete samples decide nothing.
@@ -113,7 +146,7 @@ bool HoldsOfTexts(const Check& check, const Sample& sample, std::string* measure
 bool HoldsOfNumbers(const Check& check, const Sample& sample, std::string* measured) {
   // if all runs failed in a check that expects failure, it holds without a number
   bool holds = true;
-  *measured = "no number";
+  *measured = kNoNumber;
   if (!sample.values.empty()) {
     const auto [low, high] = std::ranges::minmax(sample.values);
     const double value = Apply(check.statistic, sample.values);
@@ -142,12 +175,21 @@ double OtherSpeed(const Check& check, const Sample& above, const Sample& below) 
   return most > kOtherSpeed * least ? most / least : 1.0;
 }
 
-bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below,
-                  std::string* measured, std::string* uncertain) {
+/// An infinite ratio counts as the largest number.
+bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below, CheckResult* result,
+                  std::string* uncertain) {
   const double numerator = Apply(check.statistic, above.values);
   const double denominator = Apply(check.statistic, below.values);
-  const double ratio = numerator / denominator;
-  *measured = fmt::format("{:.3g} ({:.3g} / {:.3g})", ratio, numerator, denominator);
+  constexpr double kMost = std::numeric_limits<double>::max();
+  const double quotient = numerator / denominator, ratio = std::clamp(quotient, -kMost, kMost);
+  const std::string parts = fmt::format("{:.3g} / {:.3g}", numerator, denominator);
+  if (std::isnan(quotient)) {
+    *uncertain = fmt::format("the ratio {} has no value", parts);
+    result->measured = kNoNumber;
+    return false;
+  }
+  result->measured = fmt::format("{:.3g} ({})", quotient, parts);
+  if (std::isinf(quotient)) result->remark = fmt::format("the ratio {} is infinite", parts);
   const double speed = OtherSpeed(check, above, below);
   const bool holds = Meets(check.demand, ratio);
   if (Meets(check.demand, ratio * speed) != holds || Meets(check.demand, ratio / speed) != holds) {
@@ -174,25 +216,32 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
       fmt::format("{}{} {}", is_ratio ? "ratio of " : "", statistic, check.demand.measure), true);
   if (sample.rows.empty() || (is_ratio && base.rows.empty())) {
     const Sample& empty = sample.rows.empty() ? sample : base;
-    result.reason = "no record of " +
-                    ToText(sample.rows.empty() ? check.select : check.relative_to) +
-                    (empty.is_selected ? " has " + check.demand.measure : "");
+    const Selection& selection = sample.rows.empty() ? check.select : check.relative_to;
+    result.reason = empty.is_selected ? NoneHas(selection, check.demand.measure)
+                                      : "no record of " + ToText(selection);
     return result;
   }
+  result.reason = KeyMissing(check, check.select, sample);
+  if (result.reason.empty()) result.reason = KeyMissing(check, check.relative_to, base);
+  if (!result.reason.empty()) return result;
   std::string uncertain;
-  const bool holds = is_ratio ? HoldsOfRatio(check, sample, base, &result.measured, &uncertain)
+  const bool holds = is_ratio ? HoldsOfRatio(check, sample, base, &result, &uncertain)
                      : check.demand.IsText() ? HoldsOfTexts(check, sample, &result.measured)
                                              : HoldsOfNumbers(check, sample, &result.measured);
   const std::string defect = Defect(check, sample);
   result.reason = defect.empty() ? Defect(check, base) : defect;
   result.state = holds && result.reason.empty() ? CheckState::kHolds : CheckState::kFails;
   for (const Sample* one : {&sample, &base}) {
-    if (uncertain.empty()) uncertain = NumbersMissing(*one);
+    if (uncertain.empty() || result.measured == kNoNumber) {
+      if (const std::string missing = NumbersMissing(*one); !missing.empty()) uncertain = missing;
+    }
   }
   if (result.reason.empty() && !uncertain.empty()) {
     result.reason = uncertain;
     result.state = CheckState::kNotMeasured;
   }
+  const std::string flagged = Flagged({&sample, &base});
+  if (!flagged.empty()) result.remark += (result.remark.empty() ? "" : "; ") + flagged;
   return result;
 }
 namespace {
@@ -221,8 +270,9 @@ Table CheckTable(const ClaimResult& result) {
   table.columns = {{"condition", "condition"},         {"result", "result"},
                    {"measured", "measured"},           {"expected", "expected"},
                    {"rows", "rows", Format::kInteger}, {"reason", "remark"}};
-  for (const auto& [label, state, rows, measured, expected, reason] : result.checks) {
-    AddRow({label, state, measured, expected, rows, reason}, &table);
+  for (const auto& [label, state, rows, measured, expected, reason, remark] : result.checks) {
+    const char* between = reason.empty() || remark.empty() ? "" : "; ";
+    AddRow({label, state, measured, expected, rows, reason + between + remark}, &table);
   }
   return table;
 }

@@ -153,6 +153,7 @@ struct CheckResult {
   std::string measured;  ///< the numbers: "2.02 (1.98 .. 2.05)", "finished (3)"
   std::string expected;  ///< the demand: "mean growth_exponent = 2 +- 0.15"
   std::string reason;    ///< reason for failing or missing measurement, in addition to the numbers
+  std::string remark;    ///< without effect on the state: flagged runs, an infinite ratio
 };
 
 enum class Verdict { kReproduced, kNotReproduced, kOnlyUnder, kNotMeasured };
@@ -170,8 +171,8 @@ struct ClaimResult {
 /// An unfinished run ("outcome" other than "finished") or a record that violates `require` makes
 /// the check fail. Failed runs are allowed if the check measures or selects the outcome, or if
 /// failed_runs_hold. A missing or non-finite value makes the check kNotMeasured, because it may be
-/// decisive. A ratio of times is kNotMeasured if a change of the machine's speed between them,
-/// measured by the calibration, may decide it.
+/// decisive, as is a ratio 0 / 0; a ratio x / 0 is infinite. A ratio of times is kNotMeasured if a
+/// change of the machine's speed between them, measured by the calibration, may decide it.
 CheckResult Evaluate(const Check& check, std::span<const Record> records);
 
 /// Evaluates all checks of a rule. All hold: reproduced. None holds and at least one fails: not

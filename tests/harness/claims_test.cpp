@@ -193,8 +193,28 @@ TEST(Claims, ARatioComparesTwoSelections) {
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails);
   records[0] = RunOf("chain-100", "drift", 0.0);
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kFails);
+  EXPECT_EQ(Evaluate(check, records).remark, "the ratio 3e+05 / 0 is infinite");
+  check.demand.relation = Relation::kAtLeast;
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
+  records[1] = RunOf("chain-1000", "drift", 0.0);
+  result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kNotMeasured);
+  EXPECT_EQ(result.reason, "the ratio 0 / 0 has no value");
   records.erase(records.begin());
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kNotMeasured);
+}
+
+TEST(Claims, FlaggedRunsAndUnknownRequiredKeysAreNamed) {
+  Check check = DriftCheck("square");
+  std::vector<Record> records = {RunOf("square", "drift", 1e-14), RunOf("square", "drift", 1e-13)};
+  EXPECT_EQ(Evaluate(check, records).remark, "");
+  records[1].Set("warnings", std::string("energy drift"));
+  const CheckResult result = Evaluate(check, records);
+  EXPECT_EQ(result.state, CheckState::kHolds);
+  EXPECT_EQ(result.remark, "1 of 2 runs have warnings: drift, energy");
+  check.require = {{"outcom", {"finished"}}};
+  EXPECT_EQ(Evaluate(check, records).state, CheckState::kNotMeasured);
+  EXPECT_EQ(Evaluate(check, records).reason, "no record of mechanism=square has outcom");
 }
 
 TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {

@@ -1,6 +1,7 @@
 // trajectory: output of a run over time, or an external trajectory checked against a mechanism.
 #include "harness/trajectory/trajectory.h"
 
+#include <array>
 #include <iterator>
 #include <numbers>
 #include <ranges>
@@ -170,6 +171,13 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
   return code;
 }
 
+/// Returns the first labels, separated by commas.
+std::string FirstOf(const std::vector<std::string>& labels) {
+  constexpr std::size_t kMaxNamed = 6;
+  return fmt::format("{}{}", fmt::join(labels | std::views::take(kMaxNamed), ", "),
+                     labels.size() > kMaxNamed ? ", ..." : "");
+}
+
 void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
   const MechanismDescription user = ReadMechanism(command.mechanism).description;
   const TrajectoryCheck check = CheckTrajectory(command.source, user);
@@ -191,11 +199,20 @@ void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
           ? fmt::format("energy: changes by {:.3e} J at most, at {:g} s; kinetic up to {:.3e} J",
                         check.energy.value, check.energy.t, check.kinetic)
           : "energy: not checked: " + check.no_energy);
+  for (const auto& [label, apart] : check.energies) {
+    if (!apart.is_known) continue;
+    AddNote(table.notes, "{}: at most {:.3e} J from the energy of the mechanism, at {:g} s", label,
+            apart.value, apart.t);
+  }
   if (!check.speeds.empty()) {
     const auto worst = std::ranges::max_element(
         check.speeds, {}, [](const SpeedCheck& speed) { return speed.apart.value; });
     AddNote(table.notes, "speeds: at most {:.3e} from the differences of positions, {} at {:g} s",
             worst->apart.value, worst->label, worst->apart.t);
+  }
+  if (!check.unchecked.empty()) {
+    AddNote(table.notes, "{} not checked: {}", WithCount(check.unchecked.size(), "column"),
+            FirstOf(check.unchecked));
   }
   for (const std::string& label : check.unknown) {
     table.notes.push_back("not of this mechanism, passed over: " + label);
@@ -209,18 +226,23 @@ bool IsMotion(const std::string& label) {
   return label.starts_with("joint:") || label.starts_with("body:") || label.starts_with("point:");
 }
 
-void RequireFinite(double number, const std::string& label, double t,
-                   const std::filesystem::path& file, const std::filesystem::path& other) {
+/// Throws with the line of the first cell from time `from` on that is not finite, if `number`,
+/// which comes from them, is not finite.
+void RequireFinite(double number, const std::filesystem::path& file, std::size_t column,
+                   double from) {
   if (std::isfinite(number)) return;
-  Reject<std::runtime_error>("{}: found {} in \"{}\" at t = {}, expected a finite number, as in {}",
-                             file.string(), number, label, t, other.string());
+  TrajectoryReader reader(file);
+  for (std::vector<double> row; reader.Next(&row);) {
+    if (row[reader.time()] >= from) reader.RequireNumbers(row, std::array{column});
+  }
+  Reject<std::runtime_error>("{}: found {} between rows after t = {}, expected a finite number",
+                             file.string(), number, from);
 }
 
 /// Names the columns of a trajectory whose indices are not in `compared`, for example those of
 /// another unit.
 void NoteOthers(const Trajectory& trajectory, const std::filesystem::path& path,
                 const std::set<std::size_t>& compared, std::vector<std::string>& notes) {
-  constexpr std::size_t kMaxNamed = 6;
   std::vector<std::string> labels;
   for (std::size_t i = 0; i < trajectory.columns.size(); ++i) {
     const TrajectoryColumn& column = trajectory.columns[i];
@@ -228,9 +250,8 @@ void NoteOthers(const Trajectory& trajectory, const std::filesystem::path& path,
     labels.push_back(column.kind.empty() ? column.component : column.Label());
   }
   if (labels.empty()) return;
-  AddNote(notes, "{} of {} not compared: {}{}", WithCount(labels.size(), "column"), path.string(),
-          fmt::join(labels | std::views::take(kMaxNamed), ", "),
-          labels.size() > kMaxNamed ? ", ..." : "");
+  AddNote(notes, "{} of {} not compared: {}", WithCount(labels.size(), "column"), path.string(),
+          FirstOf(labels));
 }
 
 int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
@@ -270,8 +291,8 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
       if (std::isnan(ValueAt(ours, ours.time, t))) continue;  // outside its times
       const double own = ValueAt(ours, column.in_ours, t);
       if (!IsMotion(column.label) && std::isnan(number) && std::isnan(own)) continue;
-      RequireFinite(number, column.label, t, command.source, command.ours);
-      RequireFinite(own, column.label, t, command.ours, command.source);
+      RequireFinite(number, command.source, column.in_theirs, t);
+      RequireFinite(own, command.ours, column.in_ours, FirstTimeFor(ours, t));
       ++compared;
       largest.Add(std::abs(apart[row]), t);
       if (column.unit == "rad") {

@@ -228,18 +228,29 @@ class Checker {
         motion_(user, reader.columns(), file),
         mechanism_(user),
         pairs_(PairsOf(reader.columns())) {
+    check_.has_speeds = motion_.has_speeds();
+    const auto place_of = [&reader](const char* part) {
+      return PlaceOf({"energy", "", part, "J"}, reader.columns());
+    };
+    energies_ = {place_of("kinetic"), place_of("potential")};
+    supplied_ = place_of("supplied");
+    dissipated_ = place_of("dissipated");
+    const bool balances = check_.has_speeds && mechanism_.mechanism().has_power() &&
+                          supplied_ != kNowhere && dissipated_ != kNowhere;
     OutputOptions all;
     const auto known = TrajectoryColumns(user, all);
     for (std::size_t i = 0; i < reader.columns().size(); ++i) {
       const TrajectoryColumn& column = reader.columns()[i];
       if (std::ranges::find(known, column) == known.end()) {
         check_.unknown.push_back(column.kind.empty() ? column.component : column.Label());
-      } else if (column.kind == "joint" || column.kind == "body" || column.kind == "point") {
+      } else if (column.kind == "joint" || column.kind == "body" || column.kind == "point" ||
+                 (check_.has_speeds && Contains(energies_, i))) {
         motions_.push_back(i);
+      } else if (i != reader.time() && !(balances && (i == supplied_ || i == dissipated_))) {
+        check_.unchecked.push_back(column.Label());
       }
     }
     check_.source = motion_.from_joints() ? "joint coordinates" : "body poses";
-    check_.has_speeds = motion_.has_speeds();
     for (const JointDescription& joint : user.joints) check_.joints.push_back({joint.name});
     for (const CouplingDescription& coupling : user.couplings) {
       check_.joints.push_back({"coupling " + coupling.name});
@@ -252,8 +263,6 @@ class Checker {
       }
     }
     followed_.resize(user.joints.size());
-    supplied_ = PlaceOf({"energy", "", "supplied", "J"}, reader.columns());
-    dissipated_ = PlaceOf({"energy", "", "dissipated", "J"}, reader.columns());
     if (!check_.has_speeds) {
       check_.no_energy = "there are no speeds";
     } else if (mechanism_.mechanism().has_power() &&
@@ -290,8 +299,15 @@ class Checker {
     mechanism_.Set(t, motion_.Read(t, row), followed_);
     for (std::size_t j = 0; j < user_.joints.size(); ++j) AddJoint(j, t, row);
     for (std::size_t c = 0; c < turns_.size(); ++c) AddCoupling(c, t);
+    const Energy<double> energy = ComputeEnergy(mechanism_.kinematics());
+    for (std::size_t i = 0; check_.has_speeds && i < energies_.size(); ++i) {
+      if (energies_[i] == kNowhere) continue;
+      SpeedCheck& check = check_.energies[i];
+      if (check_.rows == 1) check.label = reader_.columns()[energies_[i]].Label();
+      check.apart.Add(std::abs(row[energies_[i]] - (i == 0 ? energy.kinetic : energy.potential)),
+                      t);
+    }
     if (check_.no_energy.empty()) {
-      const Energy<double> energy = ComputeEnergy(mechanism_.kinematics());
       double balance = energy.total();
       if (mechanism_.mechanism().has_power()) balance += row[dissipated_] - row[supplied_];
       if (check_.rows == 1) first_energy_ = balance;
@@ -361,6 +377,7 @@ class Checker {
   std::vector<double> followed_;                 ///< given coordinates, NaN if not given
   std::vector<double> turns_;                    ///< of each coupling, whole turns in the first row
   std::size_t supplied_ = kNowhere, dissipated_ = kNowhere;
+  std::array<std::size_t, 2> energies_{};  ///< columns of kinetic and potential energy
   double first_energy_ = 0.0;
   Window window_;
   TrajectoryCheck check_;
@@ -387,13 +404,32 @@ std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory
   return shared;
 }
 
-double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_between) {
-  const std::size_t rows = ours.rows();
-  std::size_t low = 0, high = rows;  // first row not before t
+namespace {
+
+/// Returns the first row not before a time.
+std::size_t RowFrom(const Trajectory& ours, double t) {
+  std::size_t low = 0, high = ours.rows();
   while (low < high) {
     const std::size_t middle = (low + high) / 2;
     (ours.At(middle, ours.time) < t ? low : high) = middle + (ours.At(middle, ours.time) < t);
   }
+  return low;
+}
+
+/// Returns the first row of the cubic before row `low`.
+std::size_t FirstOfCubic(const Trajectory& ours, std::size_t low) {
+  const std::size_t rows = ours.rows();
+  return std::min(low < 2 ? 0 : low - 2, rows - std::min<std::size_t>(4, rows));
+}
+
+}  // namespace
+
+double FirstTimeFor(const Trajectory& ours, double t) {
+  return ours.At(FirstOfCubic(ours, RowFrom(ours, t)), ours.time);
+}
+
+double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_between) {
+  const std::size_t rows = ours.rows(), low = RowFrom(ours, t);
   if (is_between != nullptr) *is_between = false;
   // times written with fewer digits count as equal
   constexpr double kSame = 1e-12;
@@ -406,7 +442,7 @@ double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_be
   if (low == 0 || low == rows) return std::numeric_limits<double>::quiet_NaN();
   if (is_between != nullptr) *is_between = true;
   const std::size_t count = std::min<std::size_t>(4, rows);
-  const std::size_t first = std::min(low < 2 ? 0 : low - 2, rows - count);
+  const std::size_t first = FirstOfCubic(ours, low);
   double value = 0.0;
   for (std::size_t i = first; i < first + count; ++i) {
     double weight = 1.0;

@@ -148,8 +148,12 @@ void TrajectoryReader::RequireNumbers(const std::vector<double>& row,
                                       std::span<const std::size_t> columns) const {
   for (const std::size_t i : columns) {
     if (std::isfinite(row[i])) continue;
+    std::string room, cell;
+    std::size_t at = 0;
+    for (std::size_t k = 0; k <= i; ++k) cell = NextCell(line_, &at, &room).value_or("");
+    const std::string found = Trimmed(cell).empty() ? "an empty cell" : fmt::format("{}", row[i]);
     const std::string label = Excerpt(columns_[i].Label());
-    Refuse(fmt::format("{} in \"{}\" at t = {}", row[i], label, row[time_]), "a finite number");
+    Refuse(fmt::format("{} in \"{}\" at t = {}", found, label, row[time_]), "a finite number");
   }
 }
 

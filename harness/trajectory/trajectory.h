@@ -449,6 +449,10 @@ struct TrajectoryCheck {
   LargestAt energy;                ///< change of kinetic + potential - supplied + dissipated [J]
   double kinetic = 0.0;            ///< largest [J]
   std::string no_energy;           ///< reason why the energy is unknown; or empty
+  /// Kinetic and potential energy of the file minus those of the mechanism [J]; unknown without
+  /// speeds.
+  std::array<SpeedCheck, 2> energies;
+  std::vector<std::string> unchecked;  ///< labels of forces, reactions and work that nothing checks
   /// Mean speed over two steps by the parabola through three speeds (Simpson's rule), minus the
   /// difference of positions. They differ by (h^4 / 90) times the fourth derivative of the speed.
   std::vector<SpeedCheck> speeds;
@@ -475,6 +479,9 @@ std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory
 /// Returns the value of `ours` at a time: of that row, or of the cubic through the four rows around
 /// it. NaN outside. `is_between` (may be null): true if the time is no row's.
 double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_between = nullptr);
+
+/// Returns the time of the first row that ValueAt() uses at a time within the trajectory.
+double FirstTimeFor(const Trajectory& ours, double t);
 
 /// Returns `theirs` minus `ours` at the times of `theirs`, angles modulo full turns; NaN outside
 /// `ours`.

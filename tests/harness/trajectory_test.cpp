@@ -436,6 +436,27 @@ TEST_F(Command, OptionsWithoutEffectAreRejected) {
   ExpectEnding(Call(ours + "--columns t"), 2, {"--columns: found neither --out"});
 }
 
+TEST_F(Command, EnergiesOfAFileAreCompared) {
+  WriteExperiment(R"({"number": 5})", "four-bar.json");
+  ExpectEnding(Call("run out.json --out out"), 0, {});
+  const Trajectory ours = ReadTrajectory(Files("out/trajectories").at(0));
+  const std::size_t kinetic = *ours.Find("energy", "", "kinetic"), width = ours.columns.size();
+  const auto check = [&](double value) {
+    std::vector<double> values = ours.values;
+    values[width + kinetic] = value;
+    TrajectoryWriter writer(folder_ / "theirs.csv", ours.columns, {}, TrajectoryFormat::kCsv);
+    for (std::size_t row = 0; row < ours.rows(); ++row) {
+      writer.Write(std::span(values).subspan(row * width, width));
+    }
+    writer.Finish();
+    return Call("trajectory theirs.csv --mechanism four-bar.json");
+  };
+  ExpectEnding(check(ours.At(1, kinetic) + 1.0), 0,
+               {"energy:kinetic [J]: at most 1.000e+00 J from the energy of the mechanism",
+                "energy:potential [J]: at most ", " not checked: reaction:"});
+  ExpectEnding(check(std::nan("")), 2, {"theirs.csv:3: found nan in \"energy:kinetic [J]\""});
+}
+
 TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   WriteExperiment(R"({"number": 5, "quantities": ["joints", "bodies"]})", "four-bar.json");
   ExpectEnding(Call("run out.json --out out"), 0, {});
@@ -468,8 +489,14 @@ TEST_F(Command, AMotionWithoutNumbersIsAnError) {
   }
   write(1, "nan");
   ExpectEnding(Call("trajectory ours.csv --compare-with theirs.csv"), 2,
-               {"theirs.csv: found nan in", "as in ours.csv"});
+               {"theirs.csv:3: found nan in", "expected a finite number"});
   ExpectEnding(Call("trajectory theirs.csv --compare-with theirs.csv"), 2, {"found nan in"});
+  write(1, "");
+  for (const char* command : {"trajectory theirs.csv --mechanism four-bar.json",
+                              "trajectory theirs.csv --compare-with ours.csv",
+                              "trajectory ours.csv --compare-with theirs.csv"}) {
+    ExpectEnding(Call(command), 2, {"theirs.csv:3: found an empty cell in"});
+  }
   // numbers whose energy is none
   write(1, "1e300");
   ExpectEnding(Call("trajectory theirs.csv --mechanism four-bar.json"), 0, {"energy: not checked"});

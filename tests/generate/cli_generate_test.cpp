@@ -158,6 +158,16 @@ TEST_F(GenerateTest, NamesOfUsersNeverBecomeCode) {
   }
 }
 
+TEST_F(GenerateTest, TheExampleNamesItsMistakes) {
+  ExpectEnding(Call("generate four-bar.json --out code"), 0, {});
+  Compile("cc", "four_bar");
+  for (const char* arguments :
+       {"abc", "1 0", "1 -1e-3", "-1", "nan", "1 1e-3x", "1e300", "1 1 1"}) {
+    ExpectEnding(Shell(std::string("./example ") + arguments), 2, {"usage: ./example [SECONDS"});
+  }
+  ExpectEnding(Shell("./example 1e300 1e300"), 1, {"a shorter step may help"});
+}
+
 /// CMake reserves such names for targets of its own.
 TEST_F(GenerateTest, AMechanismMayBeCalledTestOrExample) {
   for (const std::string name : {"test", "example"}) {

@@ -310,7 +310,7 @@ struct CoordinateRange {
 };
 
 /// `joint` has one coordinate; a motion of the file is ignored. All other motions, except idle
-/// ones, must follow from it and from "fixed" joints.
+/// ones, must follow from it and from "fixed" joints; these do not count if they leave no motion.
 CoordinateRange FindRange(MechanismDescription description, int joint);
 
 // Warnings about runs: agreement between runs, tolerance refinement, drift growth.

@@ -408,9 +408,14 @@ void Search(const MechanismDescription& description, int joint, CoordinateRange*
     return;
   }
   range->start = own->values.front();
+  const auto freedom = [&, idle = FindIdleFreedoms(description, structure).size()] {
+    return FindBranches(start.description, 0).freedom - static_cast<int>(idle);
+  };
+  // joints that leave no motion are fixed at the start only
+  std::erase(initial.held, joint);
+  if (freedom() <= 0) initial.held.clear();
   AddOnce(initial.held, joint);
-  const int free = FindBranches(start.description, 0).freedom -
-                   static_cast<int>(FindIdleFreedoms(description, structure).size());
+  const int free = freedom();
   if (free > 0) {
     range->why = fmt::format(
         "{} other motions remain if \"{}\" is held, expected none: list as many coordinates under "

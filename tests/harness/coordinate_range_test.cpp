@@ -99,6 +99,16 @@ TEST(CoordinateRangeTest, MotionsAndScaleDoNotMatter) {
   }
 }
 
+TEST(CoordinateRangeTest, AFixedJointThatHoldsAllIsFixedAtTheStartOnly) {
+  MechanismDescription four_bar = FourBar(4, 3, 2, 2.5, 0.4, 1.6);
+  four_bar.initial.held = {0};
+  const CoordinateRange fixed = FindRange(four_bar, 1);
+  four_bar.initial.held.clear();
+  ASSERT_EQ(fixed.why, "");
+  EXPECT_GT(fixed.high.value - fixed.low.value, 0.1);
+  EXPECT_NEAR(fixed.high.value, FindRange(four_bar, 1).high.value, kSlack);
+}
+
 TEST(CoordinateRangeTest, WhatHasNoRangeIsNamed) {
   const MechanismDescription four_bar = FourBar(4, 3, 2, 2.5, 0.4, 1.6);
   EXPECT_NE(FindRange(four_bar, 3).why.find("closes a loop"), std::string::npos);

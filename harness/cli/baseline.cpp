@@ -234,6 +234,7 @@ int Baseline(const BaselineCommand& command, const Typed& typed) {
   if (command.keep.empty()) temporary.emplace("loopbench");
   const std::filesystem::path work = temporary ? temporary->path() : command.keep;
   if (const int code = MeasureAll(command, work); code != 0) return code;
+  RemoveAbandoned(command.dir);
   if (command.action == "selftest") return SelfTest(command, work);
   if (command.action == "check") {
     return PrintComparison(command.dir, work / kResults, typed);

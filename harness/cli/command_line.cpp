@@ -125,7 +125,9 @@ std::string Metavariable(const CLI::Option& option) {
   if (option.get_lnames().empty()) return "";
   const std::string word = "/" + option.get_lnames().front() + "/";
   for (const auto& [name, options] : kMetavariables) {
-    if (options.find(word) != options.npos) return std::string(name);
+    if (options.find(word) == options.npos) continue;
+    const bool is_list = option.get_description().find("a,b") != std::string::npos;
+    return name == "KEYS" && !is_list ? "KEY" : std::string(name);
   }
   return "TEXT";
 }

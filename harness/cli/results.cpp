@@ -231,9 +231,13 @@ int PrintTable(const TableCommand& command, const Typed& typed) {
   view.compact = on_terminal || command.format == "latex";
   Table table = MakeTable(loaded.records, view);
   if (table.rows.empty()) {
-    PrintError("{}: no {} records match{}{}\n", command.store.string(),
+    const auto kind = std::ranges::find(view.where, "kind", &Condition::key);
+    PrintError("{}: no {} records match{}{}{}\n", command.store.string(),
                view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",
-               ToText(view.where));
+               ToText(view.where),
+               view.kind.empty() && kind != view.where.end()
+                   ? "; --kind chooses the kind of a table, for example --kind timing"
+                   : "");
     return 2;
   }
   AppendProvenance(table, typed.line);

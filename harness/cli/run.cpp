@@ -389,8 +389,10 @@ int Merge(const MergeCommand& command, const Typed&) {
   with_target.push_back(target.file());
   const MergedReferences references = MergeReferences(with_target);
   std::set<std::string> problems;
+  std::map<std::string, std::size_t> kinds = {{"accuracy", 0}};
   for (std::size_t i = 0; i < merged.size(); ++i) {
     const Record record = merged[i];
+    ++kinds[record.Text("kind")];
     std::vector<std::filesystem::path> owners;
     for (const auto& store : merged.StoresOf(i)) owners.push_back(StoreFile(store));
     for (const std::string& name : CopyTrajectories({record}, owners, target.file())) {
@@ -405,7 +407,12 @@ int Merge(const MergeCommand& command, const Typed&) {
   target.Commit();
   for (const std::string& note : references.notes) PrintError("{}\n", note);
   Print("{} of {}: {} in {}\n", WithCount(merged.read(), "record"),
-        WithCount(command.stores.size(), "store"), WithCount(merged.size(), "case"),
+        WithCount(command.stores.size(), "store"),
+        Joined(kinds, ", ",
+               [](const auto& kind) {
+                 return WithCount(kind.second,
+                                  kind.first == "accuracy" ? "case" : kind.first + " record");
+               }),
         target.file().string());
   if (!references.texts.empty()) {
     Print("{} beside it\n", WithCount(references.texts.size(), "reference"));

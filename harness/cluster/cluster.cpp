@@ -35,7 +35,10 @@ std::string SubmitJob(const std::filesystem::path& script,
                           : "; without Slurm, let another engine call part.sh (docs/clusters.md)"));
   }
   // "12" or "12;cluster"
-  return result.output.substr(0, result.output.find_first_of(";\n"));
+  const std::string job = result.output.substr(0, result.output.find_first_of(";\n"));
+  if (!job.empty() && job.find_first_not_of("0123456789") == job.npos) return job;
+  throw std::runtime_error(
+      fmt::format("sbatch: found \"{}\", expected the number of a job", Excerpt(job)));
 }
 
 std::optional<std::map<int, std::string>> QueuedTasks(const std::string& job,

@@ -190,7 +190,7 @@ std::string ReadTextFile(const std::filesystem::path& path) {
   }
   if (stream.bad()) fail("reading it failed");
   if (text.size() > kMaxConfigBytes) {
-    fail(fmt::format("it is larger than {} MiB", kMaxConfigBytes >> 20));
+    fail(fmt::format("found more than {0} MiB, expected at most {0} MiB", kMaxConfigBytes >> 20));
   }
   return text;
 }

@@ -58,8 +58,8 @@ class LineReader {
   LineReader(std::filesystem::path file, Take take, Wanted wanted = {}, int lines_before = 0);
 
   /// Takes the next part of the text, of any length. Throws std::runtime_error with file, line
-  /// number and text for an invalid line, or one without checksum among lines with one. Ignores
-  /// empty lines.
+  /// number and text for an invalid line, one without "kind", or one without checksum among lines
+  /// with one. Ignores empty lines.
   void Feed(std::string_view text);
 
   /// Ends the text. A last line without line end may be a record, or the torn beginning of one

@@ -193,7 +193,13 @@ TEST_F(ComparisonCommands, ExportNamesTheCasesThatFailed) {
 TEST_F(ComparisonCommands, ABaselineIsRenewedHeldAgainstAndTested) {
   const std::string tiny = " --experiments tiny.json --dir kept";
   Expect("baseline check" + tiny, 2, {"kept/results.jsonl: no such file", "baseline renew"});
+  const pid_t ended = ::fork();
+  if (ended == 0) ::_exit(0);
+  ::waitpid(ended, nullptr, 0);
+  const std::string part = "kept/results.jsonl." + std::to_string(ended) + "-1.tmp";
+  Write(part, "of a killed process");
   Expect("baseline renew" + tiny, 0, {"renewed kept/results.jsonl: 2 records"});
+  EXPECT_FALSE(fs::exists(folder_ / part));
   Expect("baseline check" + tiny, 0, {"NO CHANGE"});
   Expect("baseline selftest" + tiny, 0,
          {"same: ", "caught: 3 times the drift", "caught: one step more",

@@ -127,6 +127,8 @@ TEST_F(CommandLineTest, ResultsOfARunServeTablePlotAndVerdict) {
   ExpectEnding(Call("table out"), 0, {"four-bar", "odca", "lagrange"});
   ExpectEnding(Call("table out --format csv --where formulation=odca"), 0, {"mechanism", "odca"});
   ExpectEnding(Call("table out --where formulation=reduction"), 2, {"no drift records match"});
+  ExpectEnding(Call("table out --where kind=timing"), 2, {"--kind timing"});
+  ExpectEnding(Call("table --help"), 0, {"--group KEY "});
   ExpectEnding(Call("check-claims out --claims claims.json --out verdicts.md"), 0, {"reproduced"});
   EXPECT_NE(ReadFile(folder_ / "verdicts.md").find("It is."), std::string::npos);
   ExpectEnding(Call("plot out --out figures"), 0, {"figures to figures"});

@@ -119,9 +119,9 @@ TEST(HugeInput, HundredMegabytesAreRefusedBeforeTheyAreRead) {
   std::ofstream(path, std::ios::binary).put(' ');
   fs::resize_file(path, 100u << 20);  // sparse: takes no room
   EXPECT_EQ(MessageOf([&path] { ReadMechanism(path); }),
-            path.string() + ": cannot be read: it is larger than 16 MiB");
+            path.string() + ": cannot be read: found more than 16 MiB, expected at most 16 MiB");
   EXPECT_EQ(MessageOf([&path] { ReadExperiments(path); }),
-            path.string() + ": cannot be read: it is larger than 16 MiB");
+            path.string() + ": cannot be read: found more than 16 MiB, expected at most 16 MiB");
   fs::remove(path);
 }
 

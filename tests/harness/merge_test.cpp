@@ -115,6 +115,7 @@ TEST_F(MergeCommandTest, WhatVariesStandsInTheTableOfMeasures) {
     std::vector<fs::path> stores;
     for (const char* value : {"1", "2"}) {
       Record record;
+      record.Set("kind", std::string("accuracy"));
       record.Set("id", std::string("0123456789abcdef"));
       record.Set("outcome", std::string("finished"));
       record.Set(std::string(key), std::string(value));

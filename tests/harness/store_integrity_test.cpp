@@ -157,10 +157,13 @@ TEST_F(StoreIntegrity, MemoryThatIsTooSmallIsSaid) {
 TEST_F(StoreIntegrity, LinesMadeByHandNeedNoChecksum) {
   EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\n"), "");
   EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\r\n\r\n\n"), "");
+  EXPECT_TRUE(Contains(Complaint("{}\n"), "changed.jsonl:1: found a line without \"kind\""));
 }
 
 TEST_F(StoreIntegrity, ValuesOfWrongTypeAreNamed) {
-  const auto of = [&](const std::string& item) { return Complaint("{" + item + "}\n"); };
+  const auto of = [&](const std::string& item) {
+    return Complaint("{\"kind\":\"timing\"," + item + "}\n");
+  };
   EXPECT_TRUE(Contains(of(R"("drift_position_max":"oops")"),
                        "changed.jsonl:1: key 'drift_position_max': expected a number or null, "
                        "found \"oops\""));
@@ -184,7 +187,7 @@ TEST_F(StoreIntegrity, DepthAndLengthCostNoMoreThanTheirBytes) {
   std::string objects;
   for (std::size_t i = 0; i < kDeep; ++i) objects += "{\"a\":";
   EXPECT_TRUE(Contains(Complaint(objects), "found an object"));
-  std::string wide = "{\"k\":0";
+  std::string wide = "{\"kind\":\"timing\"";
   for (int i = 0; i < 300'000; ++i) wide += ",\"k" + std::to_string(i) + "\":0";
   EXPECT_EQ(Complaint(wide + "}\n"), "");
 }

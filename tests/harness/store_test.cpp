@@ -50,6 +50,7 @@ std::string ErrorOf(const std::filesystem::path& path) {
 
 Record Sample() {
   Record record;
+  record.Set("kind", std::string("timing"));
   record.Set("mechanism", std::string("four-bar \"quoted\"\n\xc3\xa9"));
   record.Set("rtol", 1e-6);
   record.Set("third", 1.0 / 3.0);
@@ -65,16 +66,11 @@ Record Sample() {
 }
 
 TEST_F(StoreTest, EveryValueComesBackWithItsTypeOrderAndBits) {
-  {
-    ResultStore store(folder_);
-    store.Append(Sample());
-    store.Append(Record{});
-  }
+  ResultStore(folder_).Append(Sample());
   const std::vector<Record> records = ReadRecords(folder_);
-  ASSERT_EQ(records.size(), 2u);
+  ASSERT_EQ(records.size(), 1u);
   EXPECT_EQ(records[0], Sample());
   EXPECT_TRUE(std::signbit(records[0].Number("minus_zero")));
-  EXPECT_EQ(records[1], Record{});
 }
 
 TEST(RecordJson, NonFiniteNumbersBecomeNull) {
@@ -124,7 +120,7 @@ TEST(RecordJson, CaseIdDependsOnValuesAndNotOnTheOrderOfKeys) {
 
 TEST_F(StoreTest, ABadLineIsAnErrorWithFileLineAndText) {
   const auto file = folder_ / "broken.jsonl";
-  WriteFileAtomically(file, "{\"a\":1}\n{\"a\":oops}\n{\"a\":3}\n");
+  WriteFileAtomically(file, "{\"kind\":\"timing\"}\n{\"a\":oops}\n");
   EXPECT_TRUE(Contains(ErrorOf(file), "broken.jsonl:2:"));
   EXPECT_TRUE(Contains(ErrorOf(file), "{\"a\":oops}"));
   EXPECT_TRUE(Contains(ErrorOf(folder_ / "absent.jsonl"), "No such file"));

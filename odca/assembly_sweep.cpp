@@ -129,13 +129,13 @@ class AssemblySweep final : public ShortCut<Planar> {
     int first_block = 0;           ///< of its own zeta
     int matrix = 0;                ///< first number of W_
   };
-  /// One of the plan's, with memory that only its own nodes use.
+  /// A piece of the plan, with memory for its nodes alone.
   struct alignas(64) Piece {
     int first_body = 0, last_body = 0;
     int first_node = 0, last_node = 0;
     std::vector<double> U;  ///< L^-1 Y of one join, with the columns of W_
   };
-  static constexpr int kPartOfTurn = 512;  ///< bodies
+  static constexpr int kBodiesPerTask = 512;
 
   struct Layout;
 
@@ -190,7 +190,7 @@ class AssemblySweep final : public ShortCut<Planar> {
   template <bool kOfSpeeds>
   bool Turn() {
     std::atomic<bool> good = true;
-    ForParts<kPartOfTurn>(angle_.size(), [&](std::size_t first, std::size_t last) {
+    ForParts<kBodiesPerTask>(angle_.size(), [&](std::size_t first, std::size_t last) {
       if (!SinesAndCosines(&angle_[first], static_cast<int>(last - first), &sine_[first],
                            &cosine_[first])) {
         good = false;
@@ -241,7 +241,7 @@ class AssemblySweep final : public ShortCut<Planar> {
     return good;
   }
 
-  /// Ends where `good` is false, and sets it to false at a node that may be degenerate.
+  /// Stops if `good` is false. Sets `good` to false at a node that may be degenerate.
   [[gnu::noinline]] void JoinPiece(Piece& piece, std::atomic<bool>& good) {
     for (int i = piece.first_body; i < piece.last_body; ++i) {
       const Body& body = bodies_[i];

@@ -328,7 +328,7 @@ std::vector<bool> CheapestBases(std::span<const Leaf> leaves, std::span<const Pl
 /// Up to so many bodies all fronts are tried: a chain of them is not cut in two, and is deep.
 constexpr int kFewBodies = 16;
 
-/// More would lengthen the nodes above them, fewer would balance the work of threads less well.
+/// More pieces leave more nodes to one thread. Fewer pieces balance threads less well.
 constexpr int kMostPieces = 64;
 
 }  // namespace
@@ -595,8 +595,8 @@ void Plan::CountOperations(std::span<const PlanJoint> joints, std::span<const Dr
   }
 }
 
-/// A piece takes neighbouring subtrees of up to `share` operations each, until it has half of that.
-/// The number of pieces does not depend on that of threads.
+/// A piece takes neighbouring subtrees of up to `share` operations each, until it has share / 2.
+/// Pieces do not depend on the number of threads.
 void Plan::AddPieces(long least) {
   const long share = std::max(least, operations_ / kMostPieces);
   const bool divides = operations_ >= 2 * share;

@@ -55,7 +55,7 @@ struct PlanOptions {
   BoundaryBasis basis = BoundaryBasis::kBodies;
   int dim = 6;            ///< directions of a body: 3 in the plane, 6 in space
   bool branches = false;  ///< several joints of a held body may hold further bodies
-  long piece = 1 << 17;   ///< multiply-adds that are enough for a piece
+  long piece = 1 << 17;   ///< target size of a piece [multiply-adds]
 };
 
 /// As published, joints to Ground close at the root (the paper's section 3.1) and boundaries are
@@ -147,8 +147,8 @@ class Plan {
   const std::vector<Leaf>& leaves() const { return leaves_; }
   /// All leaves, holders before the leaves that they hold.
   const std::vector<int>& leaf_order() const { return leaf_order_; }
-  /// All nodes and leaves. The last piece has the nodes above all others; small plans have no
-  /// other.
+  /// All nodes and leaves. The last piece contains the nodes above all other pieces. Small plans
+  /// have only this piece.
   const std::vector<PlanPiece>& pieces() const { return pieces_; }
   int num_rows() const { return num_rows_; }    ///< of all nodes
   int num_slots() const { return num_slots_; }  ///< numbers of all leaves' handles

@@ -200,7 +200,7 @@ bool Sweep<Space, S>::AssembleAll(const Kinematics<Space, S>& kinematics, Pass p
   std::atomic<int> failed = plan_.num_nodes();
   ForPieces([&](Piece& piece) { AssemblePiece(kinematics, pass, piece, failed); });
   AssemblePiece(kinematics, pass, pieces_.back(), failed);
-  // now as one loop over all nodes would find it
+  // diagnostics up to the first failed node, as in a serial sweep
   const int end = failed;
   AddOperations(end);
   if (pass != Pass::kRegularized) {

@@ -262,7 +262,7 @@ class Sweep {
     Acceleration<Space, S> h;
     Wrench<Space, S> Mh;
   };
-  /// One of the plan's, with memory that only its own nodes use.
+  /// A piece of the plan, with memory for its nodes alone.
   struct alignas(64) Piece {
     std::span<const int> nodes, leaves;
     std::vector<int> lone_leaves;  ///< leaves without sides: inside trees, or without joints
@@ -274,14 +274,14 @@ class Sweep {
   enum class Pass { kPhysical, kGeometric, kRegularized };
 
   bool AssembleAll(const Kinematics<Space, S>& kinematics, Pass pass);
-  /// Ends at a node that fails, and after `failed`, the first one of all that failed so far.
+  /// Stops at a node that fails, or after `failed`, the first failed node of all pieces so far.
   void AssemblePiece(const Kinematics<Space, S>& kinematics, Pass pass, Piece& piece,
                      std::atomic<int>& failed);
   /// Calls `call` with all pieces but the last one; threads share these.
   void ForPieces(const auto& call) {
     pool_.ForEach(static_cast<int>(pieces_.size()) - 1, [&](int i) { call(pieces_[i]); });
   }
-  /// Of pieces that begin before node `end`.
+  /// Adds the operations of pieces that begin no later than node `end`.
   void AddOperations(int end);
   void FillLeaf(const Kinematics<Space, S>& kinematics, Masses masses, Piece& piece, int n);
   void FillHold(const Kinematics<Space, S>& kinematics, Masses masses, Piece& piece, int n);
@@ -291,9 +291,9 @@ class Sweep {
   int Offset(const PlanSide& side) const {
     return c_offset_[side.joint] + (side.at_Q ? side.rows : 0);
   }
-  /// Calls `call` with the number of free directions on the path to a held leaf, and with these.
-  /// The number is a constant up to three. WithTree() takes all free directions of the leaf's tree,
-  /// and N or its factor.
+  /// Calls `call` with the number of free directions on the path to a held leaf, and the
+  /// directions. The number is a constant up to three. WithTree() takes all free directions of the
+  /// leaf's tree, and N or its factor.
   template <class Call>
   [[gnu::always_inline]] auto WithPath(int n, const Call& call) const {
     const FreeDirection* free = free_.data() + places_[n].hold;

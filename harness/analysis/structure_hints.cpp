@@ -411,7 +411,7 @@ void Search(const MechanismDescription& description, int joint, CoordinateRange*
   const auto freedom = [&, idle = FindIdleFreedoms(description, structure).size()] {
     return FindBranches(start.description, 0).freedom - static_cast<int>(idle);
   };
-  // joints that leave no motion are fixed at the start only
+  // if "fixed" joints leave no motion, only the initial assembly holds them
   std::erase(initial.held, joint);
   if (freedom() <= 0) initial.held.clear();
   AddOnce(initial.held, joint);

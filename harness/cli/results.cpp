@@ -236,7 +236,7 @@ int PrintTable(const TableCommand& command, const Typed& typed) {
                view.kind.empty() ? "drift" : view.kind, view.where.empty() ? "" : " ",
                ToText(view.where),
                view.kind.empty() && kind != view.where.end()
-                   ? "; --kind chooses the kind of a table, for example --kind timing"
+                   ? "; select the kind of records with --kind, for example --kind timing"
                    : "");
     return 2;
   }
@@ -307,8 +307,8 @@ int PrintVerdicts(const VerdictCommand& command, const Typed& typed) {
   Table verdicts = VerdictTable(results);
   for (const ClaimResult& result : results) {
     for (const CheckResult& check : result.checks) {
-      const bool is_told = result.verdict == Verdict::kNotMeasured;
-      for (const std::string& text : {is_told ? check.reason : "", check.remark}) {
+      const bool is_unmeasured = result.verdict == Verdict::kNotMeasured;
+      for (const std::string& text : {is_unmeasured ? check.reason : "", check.remark}) {
         const std::string note = result.rule.id + ": " + text;
         if (!text.empty() && !Contains(verdicts.notes, note)) verdicts.notes.push_back(note);
       }

@@ -201,12 +201,12 @@ void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
           : "energy: not checked: " + check.no_energy);
   for (const auto& [label, apart] : check.energies) {
     if (!apart.is_known) continue;
-    AddNote(table.notes, "{}: at most {:.3e} J from the energy of the mechanism, at {:g} s", label,
+    AddNote(table.notes, "{}: differs from the mechanism by {:.3e} J at most, at {:g} s", label,
             apart.value, apart.t);
   }
   if (!check.speeds.empty()) {
     const auto worst = std::ranges::max_element(
-        check.speeds, {}, [](const SpeedCheck& speed) { return speed.apart.value; });
+        check.speeds, {}, [](const ColumnCheck& speed) { return speed.apart.value; });
     AddNote(table.notes, "speeds: at most {:.3e} from the differences of positions, {} at {:g} s",
             worst->apart.value, worst->label, worst->apart.t);
   }
@@ -226,8 +226,8 @@ bool IsMotion(const std::string& label) {
   return label.starts_with("joint:") || label.starts_with("body:") || label.starts_with("point:");
 }
 
-/// Throws with the line of the first cell from time `from` on that is not finite, if `number`,
-/// which comes from them, is not finite.
+/// Throws if `number`, interpolated from `column` from time `from` on, is not finite. Names the
+/// line of the first such cell.
 void RequireFinite(double number, const std::filesystem::path& file, std::size_t column,
                    double from) {
   if (std::isfinite(number)) return;

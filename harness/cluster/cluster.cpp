@@ -38,7 +38,7 @@ std::string SubmitJob(const std::filesystem::path& script,
   const std::string job = result.output.substr(0, result.output.find_first_of(";\n"));
   if (!job.empty() && job.find_first_not_of("0123456789") == job.npos) return job;
   throw std::runtime_error(
-      fmt::format("sbatch: found \"{}\", expected the number of a job", Excerpt(job)));
+      fmt::format("sbatch: found \"{}\", expected a job number", Excerpt(job)));
 }
 
 std::optional<std::map<int, std::string>> QueuedTasks(const std::string& job,

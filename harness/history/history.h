@@ -300,8 +300,9 @@ struct HistoryFindings {
 };
 
 /// Finds all series with their changes. Times use steady values only; those of five and more cases
-/// are also pooled. A change of the pooled series needs half of its size as median of the cases'
-/// own changes. Throws std::runtime_error if a results file cannot be read.
+/// are also pooled. A change of the pooled series is kept if the median change
+/// of its cases is at least half as large. Throws std::runtime_error if a results file cannot be
+/// read.
 HistoryFindings FindingsOf(const History& history);
 
 // Steps of a history as table rows.

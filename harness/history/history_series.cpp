@@ -309,7 +309,7 @@ double ChangeOfCases(const HistorySeries& pool, const std::vector<HistorySeries>
   return Median(changes);
 }
 
-/// Removes changes of a pool that its cases do not have: few that change move the median of all.
+/// Removes changes of a pool that most cases lack: changes of few cases shift its median, too.
 void RequireChangeOfCases(const std::vector<HistorySeries>& all, HistorySeries* pool) {
   std::vector<double> values;
   for (const HistoryValue& value : pool->values) values.push_back(value.value);
@@ -323,7 +323,8 @@ void RequireChangeOfCases(const std::vector<HistorySeries>& all, HistorySeries* 
     const double size = std::log(changes[k].after / changes[k].before);
     const double of_cases =
         ChangeOfCases(*pool, all, entry_of(begin), entry_of(changes[k].at), entry_of(end));
-    if (of_cases / size >= 0.5) {
+    const bool is_large = std::abs(size) >= ResolutionOf(pool->rule, 0.0, 1.0).least;
+    if (is_large && of_cases / size >= 0.5) {
       ++k;
       continue;
     }

@@ -19,7 +19,6 @@
 namespace loopbench::harness {
 namespace {
 
-constexpr const char* kNoNumber = "no number";
 constexpr std::string_view kStatistics[] = {"max", "min", "mean", "every", "any"};
 
 bool IsQuantified(const Check& check) {
@@ -89,7 +88,7 @@ std::string KeyMissing(const Check& check, const Selection& selection, const Sam
   for (const Condition& one : check.require) {
     const bool is_there = std::ranges::any_of(
         sample.rows, [&one](const Record& row) { return row.Find(one.key) != nullptr; });
-    if (sample.unmet > 0 && !is_there) return NoneHas(selection, one.key);
+    if (sample.unmet > 0 && sample.failed == 0 && !is_there) return NoneHas(selection, one.key);
   }
   return "";
 }
@@ -101,10 +100,10 @@ std::string Flagged(std::initializer_list<const Sample*> samples) {
   for (const Sample* sample : samples) {
     for (const Record& row : sample->rows) {
       std::istringstream codes(row.Text("warnings"));
-      const std::size_t before = flagged;
-      for (std::string code; codes >> code; flagged = before + 1) words.insert(code);
-      ++rows;
+      for (std::string code; codes >> code;) words.insert(code);
+      if (!row.Text("warnings").empty()) ++flagged;
     }
+    rows += sample->rows.size();
   }
   if (flagged == 0) return "";
   return fmt::format("{} of {} runs have warnings: {}", flagged, rows, fmt::join(words, ", "));
@@ -146,7 +145,7 @@ bool HoldsOfTexts(const Check& check, const Sample& sample, std::string* measure
 bool HoldsOfNumbers(const Check& check, const Sample& sample, std::string* measured) {
   // if all runs failed in a check that expects failure, it holds without a number
   bool holds = true;
-  *measured = kNoNumber;
+  *measured = "no number";
   if (!sample.values.empty()) {
     const auto [low, high] = std::ranges::minmax(sample.values);
     const double value = Apply(check.statistic, sample.values);
@@ -175,7 +174,7 @@ double OtherSpeed(const Check& check, const Sample& above, const Sample& below) 
   return most > kOtherSpeed * least ? most / least : 1.0;
 }
 
-/// An infinite ratio counts as the largest number.
+/// An infinite ratio counts as the largest number, at any speed of the machine.
 bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below, CheckResult* result,
                   std::string* uncertain) {
   const double numerator = Apply(check.statistic, above.values);
@@ -185,12 +184,12 @@ bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below, 
   const std::string parts = fmt::format("{:.3g} / {:.3g}", numerator, denominator);
   if (std::isnan(quotient)) {
     *uncertain = fmt::format("the ratio {} has no value", parts);
-    result->measured = kNoNumber;
+    result->measured = "no number";
     return false;
   }
   result->measured = fmt::format("{:.3g} ({})", quotient, parts);
   if (std::isinf(quotient)) result->remark = fmt::format("the ratio {} is infinite", parts);
-  const double speed = OtherSpeed(check, above, below);
+  const double speed = std::isinf(quotient) ? 1.0 : OtherSpeed(check, above, below);
   const bool holds = Meets(check.demand, ratio);
   if (Meets(check.demand, ratio * speed) != holds || Meets(check.demand, ratio / speed) != holds) {
     *uncertain = fmt::format(
@@ -232,9 +231,7 @@ CheckResult Evaluate(const Check& check, std::span<const Record> records) {
   result.reason = defect.empty() ? Defect(check, base) : defect;
   result.state = holds && result.reason.empty() ? CheckState::kHolds : CheckState::kFails;
   for (const Sample* one : {&sample, &base}) {
-    if (uncertain.empty() || result.measured == kNoNumber) {
-      if (const std::string missing = NumbersMissing(*one); !missing.empty()) uncertain = missing;
-    }
+    if (const std::string missing = NumbersMissing(*one); !missing.empty()) uncertain = missing;
   }
   if (result.reason.empty() && !uncertain.empty()) {
     result.reason = uncertain;

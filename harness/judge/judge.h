@@ -170,8 +170,8 @@ struct ClaimResult {
 /// ignored, unless their run failed. If no record is left, the state is kNotMeasured, never kHolds.
 /// An unfinished run ("outcome" other than "finished") or a record that violates `require` makes
 /// the check fail. Failed runs are allowed if the check measures or selects the outcome, or if
-/// failed_runs_hold. A missing or non-finite value makes the check kNotMeasured, because it may be
-/// decisive, as is a ratio 0 / 0; a ratio x / 0 is infinite. A ratio of times is kNotMeasured if a
+/// failed_runs_hold. A missing or non-finite value, or a ratio 0 / 0, makes the check kNotMeasured,
+/// because it may be decisive. A ratio x / 0 is infinite. A ratio of times is kNotMeasured if a
 /// change of the machine's speed between them, measured by the calibration, may decide it.
 CheckResult Evaluate(const Check& check, std::span<const Record> records);
 

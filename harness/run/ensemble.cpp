@@ -124,7 +124,7 @@ Run MergeParts(std::span<const Run> parts) {
     }
   }
   whole.drift = MergeDrift(parts);
-  whole.least_open = std::ranges::max(parts, {}, &Run::least_open).least_open;
+  whole.min_violation = std::ranges::max_element(parts, {}, &Run::min_violation)->min_violation;
   return whole;
 }
 namespace {

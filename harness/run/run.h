@@ -86,7 +86,7 @@ struct Run {
   /// Corrections of projections [m], energy balance [J] and largest kinetic energy [J].
   DriftSeries correction = {}, energy = {};
   double kinetic = 0.0;
-  double least_open = 0.0;  ///< violation that projection cannot remove, besides rounding [lengths]
+  double min_violation = 0.0;  ///< smallest violation that projection can reach [link lengths]
   /// The problem's branch combinations (mechanism_reader.h) at the assembled start [rad], or empty.
   std::vector<double> branch_start = {};
 };

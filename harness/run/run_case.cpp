@@ -197,7 +197,7 @@ Record RunCase(const Experiment& experiment, const Case& entry, const Reference*
   Run nominal = RunOnce(experiment, entry, problem.mechanism.description, RunKind::kCase, beside,
                         held, task ? &*task : nullptr);
   for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
-  record.Set("position_goal", std::max(goal, nominal.least_open * link));
+  record.Set("position_goal", std::max(goal, nominal.min_violation * link));
 
   // fixed steps have no tolerance to be judged by; pilots lack the reference of their experiment
   const bool is_unjudged = entry.step > 0.0 && held.series == nullptr &&
@@ -337,8 +337,8 @@ class Runner {
       run.record.Set("compile_s", compile_s_);
     }
     run.drift = {traces.drift.t, traces.drift.value};
-    run.least_open = std::max(mechanism_.is_redundant() ? kRedundantOpen : 0.0,
-                              std::numeric_limits<double>::epsilon() * LargestAngle());
+    run.min_violation = std::max(mechanism_.is_redundant() ? kRedundantOpen : 0.0,
+                                 std::numeric_limits<double>::epsilon() * LargestAngle());
     if (!IsMember()) {
       run.correction = {traces.correction.t, traces.correction.value};
       run.energy = {traces.energy.t, traces.energy.value};
@@ -353,7 +353,8 @@ class Runner {
     double largest = 0.0;
     for (const TreeStep& step : mechanism_.tree()) {
       const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
-      if (joint.num_q() != joint.num_u() || y_.empty()) continue;  // quaternions
+      const bool is_simple = joint.num_q() == joint.num_u() && joint.num_drives == 0;
+      if (!is_simple || y_.empty()) continue;  // quaternions
       for (int i = 0; i < joint.num_q(); ++i) {
         if (joint.kind->axes[i] >= Space::kRot) continue;
         largest = std::max(largest, std::abs(y_[static_cast<std::size_t>(joint.q_offset + i)]));

@@ -70,8 +70,8 @@ void LineReader::TakeLine(std::string_view line) {
     throw std::runtime_error(fmt::format("{}:{}: {} (other lines have one)", file_.string(),
                                          first_bare_, kWithoutChecksum));
   }
-  if (record.Text("kind").empty()) {
-    throw std::runtime_error(fmt::format("{}:{}: found a line without \"kind\", expected records",
+  if (record.items().empty()) {
+    throw std::runtime_error(fmt::format("{}:{}: found a record without values, expected some",
                                          file_.string(), number_));
   }
   take_(std::move(record), place);

@@ -55,7 +55,13 @@ LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
                    std::uintmax_t before) {
   const auto feed = [&](int lines_before) {
     LineReader lines(
-        file, [](const Record&, const LinePlace&) {}, {}, lines_before);
+        file,
+        [&file](const Record& record, const LinePlace&) {
+          if (!record.Text("kind").empty()) return;
+          throw std::runtime_error(
+              fmt::format("{}: found a line without \"kind\", expected records", file.string()));
+        },
+        {}, lines_before);
     lines.Feed(text);
     lines.End();
     if (lines.is_handmade()) {  // lines with a checksum will follow

@@ -58,7 +58,7 @@ class LineReader {
   LineReader(std::filesystem::path file, Take take, Wanted wanted = {}, int lines_before = 0);
 
   /// Takes the next part of the text, of any length. Throws std::runtime_error with file, line
-  /// number and text for an invalid line, one without "kind", or one without checksum among lines
+  /// number and text for an invalid line, one without values, or one without checksum among lines
   /// with one. Ignores empty lines.
   void Feed(std::string_view text);
 

@@ -165,8 +165,7 @@ const Rate* Estimate::RateOfCase(std::size_t experiment, const Case& one, double
     const bool ended = record.Text("outcome") != ToString(Outcome::kFinished);
     PilotCost spent = {.all_s = ThreadCpuSeconds() - begin_s,
                        .running_s = std::isnan(running) ? 0.0 : running};
-    // longer runs have more rows at a fixed distance, but not at a fixed number; and a longer
-    // second run
+    // rows at a fixed distance and second runs grow with the horizon, a fixed number of rows not
     const bool is_refined = record.Find("refinement_difference") != nullptr;
     if (is_refined || (like.output && like.output->number == 0)) spent.running_s = spent.all_s;
     spent.reached = std::isnan(reached) ? 0.0 : fraction * reached / pilot.horizon;

@@ -165,7 +165,7 @@ class MotionReader {
 struct Pair {
   std::size_t position, speed;
   bool turns;
-  SpeedCheck check;
+  ColumnCheck check;
 };
 
 /// Returns the name of the speed of a component, or "".
@@ -302,7 +302,7 @@ class Checker {
     const Energy<double> energy = ComputeEnergy(mechanism_.kinematics());
     for (std::size_t i = 0; check_.has_speeds && i < energies_.size(); ++i) {
       if (energies_[i] == kNowhere) continue;
-      SpeedCheck& check = check_.energies[i];
+      ColumnCheck& check = check_.energies[i];
       if (check_.rows == 1) check.label = reader_.columns()[energies_[i]].Label();
       check.apart.Add(std::abs(row[energies_[i]] - (i == 0 ? energy.kinetic : energy.potential)),
                       t);

@@ -434,7 +434,7 @@ struct JointCheck {
   LargestAt coordinates = {};  ///< given coordinates minus those from body poses [rad], [m]
 };
 
-struct SpeedCheck {
+struct ColumnCheck {
   std::string label;  ///< label of the speed
   LargestAt apart;    ///< difference from the positions, in its unit
 };
@@ -451,11 +451,12 @@ struct TrajectoryCheck {
   std::string no_energy;           ///< reason why the energy is unknown; or empty
   /// Kinetic and potential energy of the file minus those of the mechanism [J]; unknown without
   /// speeds.
-  std::array<SpeedCheck, 2> energies;
-  std::vector<std::string> unchecked;  ///< labels of forces, reactions and work that nothing checks
+  std::array<ColumnCheck, 2> energies;
+  std::vector<std::string>
+      unchecked;  ///< labels of forces, reactions and work that are not checked
   /// Mean speed over two steps by the parabola through three speeds (Simpson's rule), minus the
   /// difference of positions. They differ by (h^4 / 90) times the fourth derivative of the speed.
-  std::vector<SpeedCheck> speeds;
+  std::vector<ColumnCheck> speeds;
   std::vector<std::string> unknown;  ///< labels that do not exist in the mechanism
 };
 

@@ -86,8 +86,8 @@ SelfStress<Space, S>::SelfStress(const Mechanism<Space, S>& mechanism) : mechani
 }
 
 /// In joint coordinates the forest is the tree of the mechanism, in absolute ones a forest of
-/// joints without released directions, the same one if couplings are given along it. All other
-/// constraints close loops.
+/// joints without released directions; with couplings it contains only joints of the same tree.
+/// All other constraints close loops.
 template <class Space, class S>
 void SelfStress<Space, S>::Span() {
   const auto& joints = mechanism_->joints();

@@ -102,8 +102,8 @@ class SelfStress {
     bool is_reversed = false;
     Linear<Space, S> arm, arm_rate;  ///< from it to the point of the loop's joint
   };
-  /// A joint that closes a loop. Rows of loops are imposed ones, those of couplings, moving ones,
-  /// then released ones.
+  /// A joint that closes a loop. Order of rows: imposed rows of loops, couplings, moving rows,
+  /// released rows.
   struct Loop {
     int joint = 0, imposed = 0;      ///< first row
     std::vector<int> rows_released;  ///< of its released directions: moving or not imposed
@@ -117,7 +117,7 @@ class SelfStress {
     }
     int directions() const { return num_imposed + num_released; }
   };
-  /// A coupling's coefficient of a joint of the forest, in scale.
+  /// Scaled coefficient of a coupling for one joint of the forest.
   struct Coefficient {
     int column = 0;  ///< of J
     S value = S(0);
@@ -171,7 +171,7 @@ class SelfStress {
   std::vector<CoupledRow> coupled_;
   bool is_exact_ = false, is_arranged_ = false;
   std::vector<Released> arranged_;
-  int r_ = 0, d_ = 0;  ///< imposed rows (of couplings and moving ones, too), and released ones
+  int r_ = 0, d_ = 0;  ///< imposed rows (with couplings and moving rows), released rows
   int H_ = 0, D_ = 0;  ///< columns of J_H and J_D
   MatrixX<S> rows_;    ///< J_H transposed; rows and columns in scale
   /// Factors of rows and their inverses, and of columns: 1 / length.

@@ -51,7 +51,8 @@ S Kinematics<Space, S>::JointCoordinate(int index) const {
   if constexpr (Space::kRot == 1) {
     return q + (turns_are_counted_ ? whole_turns_[index] : WholeTurns(index, q));
   }
-  // Space measures an angle modulo a turn; take the one next to that expected by the last speed.
+  // Space measures an angle modulo a turn; take the value nearest to the prediction by the last
+  // speed.
   using std::remainder;
   const S near = accepted_[index] + accepted_speeds_[index] * (time_ - accepted_time_);
   return near + remainder(q - near, S(2 * std::numbers::pi_v<S>));

@@ -269,8 +269,8 @@ class Kinematics {
   std::vector<Pose<Space, S>> joint_poses_;
   std::vector<TimeValue<S>> drives_;
   std::vector<S> accepted_;  ///< last accepted coordinate of each joint
-  /// In space: speeds of cut joints and the time there, by which angles are expected between
-  /// accepted steps. By coupling: the turns that measured angles lack.
+  /// In space: speeds of cut joints and the time at the last accepted step; they predict angles. By
+  /// coupling: the turns that measured angles lack.
   std::vector<S> accepted_speeds_, turns_;
   S accepted_time_ = S(0);
   std::vector<S> whole_turns_;

@@ -70,7 +70,7 @@ Excursion<Space> Roam(Excursion<Space> excursion, const Mechanism<Space, double>
   const int enough = Positions(mechanism.num_u());
   const bool is_large = mechanism.num_u() > kMaxWithTurns;
   const int all = enough * (is_large ? 1 : std::clamp(best.freedom(), 1, kMostTurns));
-  for (int k = 1; k <= all && best.rank() < mechanism.num_rows(); ++k) {
+  for (int k = 1; k <= all && best.rank() < mechanism.num_equations(); ++k) {
     const Excursion<Space> before = excursion;
     if (excursion.Step(kApart, k) != StepKind::kMoved || excursion.rank() < best.rank()) continue;
     if (excursion.rank() > best.rank() &&
@@ -157,17 +157,21 @@ Redundancy FindFrom(const Kinematics<Space, double>& start, double residual,
                     const MechanismDescription& free) {
   Redundancy result;
   const Mechanism<Space, double> mechanism(free, Coordinates::kJoint);
-  const VectorX<double> q = start.CoordinatesIn(mechanism);
+  VectorX<double> q = start.CoordinatesIn(mechanism);
+  for (const TreeStep& step : mechanism.tree()) {  // couplings count turns
+    const Joint<Space, double>& joint = mechanism.joints()[step.joint];
+    if (joint.num_q() == 1) q[joint.q_offset] = start.JointCoordinate(step.joint);
+  }
   Kinematics<Space, double> here(mechanism);
   here.UpdatePosition(q);
   const bool independent =
       free.couplings.empty() && free.accuracy <= kRankRatio && AreIndependent(here);
   if (!independent && mechanism.num_u() > kMaxAnalysedSpeeds) return result;
-  result.num_couplings = static_cast<int>(free.couplings.size());
   result.rows = result.rank = result.rank_at_start = mechanism.num_equations();
   if (independent) return result;
   // rounded axes leave no motion, or none that closes to round-off
   for (const double accuracy : {0.0, free.accuracy}) {
+    result.num_couplings = static_cast<int>(free.couplings.size());
     Excursion<Space> excursion(mechanism, q, accuracy);
     result.rank = result.rank_at_start = excursion.rank();
     if (result.rank == result.rows) return result;
@@ -180,6 +184,7 @@ Redundancy FindFrom(const Kinematics<Space, double>& start, double residual,
     if (!IsRegular(excursion,
                    accuracy > 0.0 ? std::max(kRoundedProbe, WayBeyond(accuracy)) : kProbe)) {
       result.rank = std::min(result.rows, mechanism.num_u() - (moves ? 1 : 0));
+      result.num_couplings = 0;  // their part in this rank is unknown
       continue;
     }
     if (result.rank == result.rows || result.rank == mechanism.num_u()) return result;
@@ -195,14 +200,14 @@ Redundancy FindFrom(const Kinematics<Space, double>& start, double residual,
   return result;
 }
 
-/// True if the couplings relate tree joints only and are independent of each other: rows of these
-/// constants are then known (self_stress.h).
-bool AreKnown(const MechanismDescription& free) {
+/// True if the couplings are independent and relate tree joints only, so that their rows are
+/// constant (self_stress.h).
+bool HaveConstantRows(const MechanismDescription& description, const MechanismDescription& free) {
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(std::ssize(free.couplings), std::ssize(free.joints));
   for (Eigen::Index c = 0; c < rows.rows(); ++c) {
     for (const auto& [joint, ratio] : free.couplings[static_cast<std::size_t>(c)].parts) {
       if (free.joints[joint].cut) return false;
-      rows(c, joint) = ratio;
+      if (description.joints[joint].motions.empty()) rows(c, joint) = ratio;
     }
   }
   return Eigen::FullPivLU<Eigen::MatrixXd>(rows).rank() == rows.rows();
@@ -213,32 +218,28 @@ template <class Space>
 Redundancy Find(const MechanismDescription& description) {
   const Mechanism<Space, double> driven(description, Coordinates::kJoint);
   Redundancy result;
-  if (driven.num_rows() > 0) {
-    const Start<double> start = Assemble<Space>(description, driven);
-    if (start.outcome != Outcome::kInconsistentStart) {
-      Kinematics<Space, double> at_start(driven);
-      at_start.UpdatePosition(start.q);
-      MechanismDescription free = description;
-      for (JointDescription& joint : free.joints) joint.motions.clear();
-      for (int index : driven.constraints()) free.joints[index].cut = true;  // the same forest
-      const double residual = start.position_residual;
-      MechanismDescription uncoupled = free;
-      uncoupled.couplings.clear();
-      result = FindFrom(at_start, residual, uncoupled);
-      if (result.rows > 0 && !free.couplings.empty() && AreKnown(free)) {
-        Redundancy coupled = FindFrom(at_start, residual, free);
-        if (coupled.rank == result.rank + coupled.num_couplings) {
-          result.num_couplings = coupled.num_couplings;
-          result.rows += coupled.num_couplings;
-          result.rank = coupled.rank;
-          result.rank_at_start = coupled.rank_at_start;
-        } else if (!coupled.released.empty()) {
-          result = std::move(coupled);
-          for (const CouplingDescription& one : free.couplings) {
-            result.couplings.push_back(one.name);
-          }
-        }
-      }
+  result.cut = driven.constraints();
+  if (driven.num_rows() == 0) return result;
+  const Start<double> start = Assemble<Space>(description, driven);
+  if (start.outcome == Outcome::kInconsistentStart) return result;
+  Kinematics<Space, double> at_start(driven);
+  at_start.UpdatePosition(start.q);
+  MechanismDescription free = description;
+  for (JointDescription& joint : free.joints) joint.motions.clear();
+  for (int index : driven.constraints()) free.joints[index].cut = true;  // the same forest
+  MechanismDescription uncoupled = free;
+  uncoupled.couplings.clear();
+  result = FindFrom(at_start, start.position_residual, uncoupled);
+  if (result.rows > 0 && !free.couplings.empty() && HaveConstantRows(description, free)) {
+    Redundancy coupled = FindFrom(at_start, start.position_residual, free);
+    if (coupled.num_couplings > 0 && coupled.rank == result.rank + coupled.num_couplings) {
+      result.num_couplings = coupled.num_couplings;
+      result.rows += coupled.num_couplings;
+      result.rank = coupled.rank;
+      result.rank_at_start = coupled.rank_at_start;
+    } else if (!coupled.released.empty()) {
+      result = std::move(coupled);
+      for (const CouplingDescription& one : free.couplings) result.couplings.push_back(one.name);
     }
   }
   result.cut = driven.constraints();

@@ -104,7 +104,7 @@ class Assembler {
     VectorX<double> left = target - J * start_.u;
     const double misfit = left.template lpNorm<Eigen::Infinity>(), least = 1e-10 * size;
     const double accuracy = description_.accuracy * size;
-    bool fits = misfit <= least;
+    bool fits = misfit <= least && std::isfinite(size) && left.allFinite();
     const bool is_rounding = !fits && mechanism_.num_u() > 0 && misfit < kHintFactor * accuracy;
     if (is_rounding) {
       // Given speeds are rounded if a small change of all makes them exact. Otherwise redundant

@@ -106,8 +106,7 @@ using Solver = std::unique_ptr<System<Spatial, double>> (*)(const Mechanism<Spat
 struct Off {
   const char* mechanism;
   Coordinates coordinates;
-  bool is_coupled =
-      false;  ///< the first three coordinates have the sum that they have at the start
+  bool is_coupled = false;  ///< keeps the sum of the first three coordinates
 };
 
 class ReleasedRows : public ::testing::TestWithParam<Off> {};

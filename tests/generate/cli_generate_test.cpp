@@ -158,7 +158,7 @@ TEST_F(GenerateTest, NamesOfUsersNeverBecomeCode) {
   }
 }
 
-TEST_F(GenerateTest, TheExampleNamesItsMistakes) {
+TEST_F(GenerateTest, TheExampleRejectsInvalidArguments) {
   ExpectEnding(Call("generate four-bar.json --out code"), 0, {});
   Compile("cc", "four_bar");
   for (const char* arguments :

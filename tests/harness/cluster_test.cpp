@@ -230,7 +230,7 @@ TEST_F(Cluster, WhatCannotRunIsRefusedBeforeAnythingIsWritten) {
   Write("bin/sbatch", "#!/bin/sh\necho hello\n");
   fs::permissions(folder_ / "bin/sbatch", fs::perms::owner_all);
   ExpectEnding(Call("submit six.json --tasks 2 --out said", "PATH=$PWD/bin:$PATH"), 2,
-               {"sbatch: found \"hello", "expected the number of a job"});
+               {"sbatch: found \"hello", "expected a job number"});
   ExpectEnding(Call("status nowhere"), 2, {"nowhere/cluster.json: no such file"});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 0, {});
   ExpectEnding(Call("submit six.json --tasks 2 --no-queue --out parts"), 2,

@@ -169,7 +169,8 @@ std::size_t FoundNearTheEnd(const fs::path& folder, std::size_t before, std::siz
   return found;
 }
 
-/// Ratios of the changes by case in 200 commits, of which the first `doubled` cases double at 100.
+/// Returns ratios of changes by case in 200 commits; the first `doubled` cases double at commit
+/// 100.
 std::map<std::string, std::vector<double>> ChangesIfDoubled(const fs::path& folder, int cases,
                                                             int doubled, double own, double common,
                                                             unsigned seed) {
@@ -196,7 +197,7 @@ std::map<std::string, std::vector<double>> ChangesIfDoubled(const fs::path& fold
   return found;
 }
 
-// What varies in common is subtracted, but not what changed in most of the cases.
+// Common variation is subtracted; changes of level are not, even if most cases have them.
 TEST_F(PlantedHistory, EachCaseHasItsOwnChanges) {
   for (const int doubled : {2, 3, 4}) {
     for (unsigned seed = 0; seed < 3; ++seed) {

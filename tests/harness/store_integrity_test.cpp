@@ -157,7 +157,7 @@ TEST_F(StoreIntegrity, MemoryThatIsTooSmallIsSaid) {
 TEST_F(StoreIntegrity, LinesMadeByHandNeedNoChecksum) {
   EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\n"), "");
   EXPECT_EQ(Complaint("{\"kind\":\"timing\",\"bodies\":3}\r\n\r\n\n"), "");
-  EXPECT_TRUE(Contains(Complaint("{}\n"), "changed.jsonl:1: found a line without \"kind\""));
+  EXPECT_TRUE(Contains(Complaint("{}\n"), "changed.jsonl:1: found a record without values"));
 }
 
 TEST_F(StoreIntegrity, ValuesOfWrongTypeAreNamed) {

@@ -352,7 +352,7 @@ TEST_F(Command, EveryKindOfJointHasTheCoordinatesThatTheUserGave) {
     }
     // Simpson's rule with h = 0.01 s: h^4 / 90 times a fourth derivative of some 1e3
     EXPECT_EQ(check.speeds.size(), 67u);  // three of each body, 25 of joints
-    for (const SpeedCheck& speed : check.speeds) EXPECT_LE(speed.apart.value, 1e-6) << speed.label;
+    for (const ColumnCheck& speed : check.speeds) EXPECT_LE(speed.apart.value, 1e-6) << speed.label;
     // gravity's potential and kinetic energy: steps at 1e-9
     EXPECT_LE(check.energy.value, 1e-5);
   }

@@ -219,6 +219,13 @@ TEST(RedundancyTest, CouplingsThatFollowFromLoopsReplaceConstraints) {
   EXPECT_EQ(Count(both.released), 3);
   EXPECT_EQ(both.couplings, (std::vector<std::string>{"legs", "level"}));
 
+  // angles of a start beyond a turn
+  d.initial.coordinates[0].values[0] += 2 * std::numbers::pi;
+  const Redundancy turned = find({{"level", level.parts, 2 * std::numbers::pi}});
+  d.initial.coordinates[0].values[0] -= 2 * std::numbers::pi;
+  EXPECT_EQ(turned.rank, 4);
+  EXPECT_EQ(Count(turned.released), 2);
+
   // one that depends on another, and one of the joint that closes the loop, are not analysed
   for (const CouplingDescription& other : {CouplingDescription{"again", {{0, 2.0}, {3, 2.0}}},
                                            CouplingDescription{"closing", {{2, 1.0}, {5, 1.0}}}}) {

@@ -188,7 +188,7 @@ MechanismFile CardanCircles(const std::string& motion) {
                         "cardan-circles.json");
 }
 
-TEST(Couplings, ThatFollowFromLoopsDecideWhereTheseAreSingular) {
+TEST(Couplings, ThatFollowFromLoopsKeepTheBranchAtSingularPositions) {
   constexpr double kTolerance = 1e-9;
   const MechanismFile driven = CardanCircles(
                           R"(, "motion": {"type": "polynomial", "coefficients": [0.4, 9]})"),
@@ -211,6 +211,57 @@ TEST(Couplings, ThatFollowFromLoopsDecideWhereTheseAreSingular) {
             EXPECT_LT(record.Number("closed_form_error_max"), 1e3 * kTolerance) << ToString(method);
           }
         }
+      }
+    }
+  }
+}
+
+/// Two parallelograms one after the other, each flat where the other is not, and a coupling of the
+/// first crank with the last one: rows move between the loops. The middle crank has two arms.
+TEST(Couplings, ThatFollowFromTwoLoopsLetRowsMoveBetweenThem) {
+  const MechanismFile file = ParseMechanism(R"({
+    "name": "two-parallelograms", "space": "planar", "gravity": [0, 0],
+    "ground": {"points": {"C": [1, 0], "E": [2, 0]}},
+    "bodies": [
+      {"name": "first", "mass": 1, "inertia": 0.05, "points": {"A": [0.4, 0]}},
+      {"name": "middle", "mass": 1, "inertia": 0.05, "points": {"A": [0.4, 0], "B": [0, 0.4]}},
+      {"name": "last", "mass": 1, "inertia": 0.05, "points": {"B": [0, 0.4]}},
+      {"name": "rod1", "mass": 1.5, "inertia": 0.1, "points": {"A": [1, 0]}},
+      {"name": "rod2", "mass": 2, "inertia": 0.1, "points": {"B": [1, 0]}}],
+    "joints": [
+      {"name": "O", "type": "revolute", "from": {"body": "ground"}, "to": {"body": "first"}},
+      {"name": "C", "type": "revolute", "from": {"body": "ground", "at": "C"},
+       "to": {"body": "middle"}},
+      {"name": "E", "type": "revolute", "from": {"body": "ground", "at": "E"},
+       "to": {"body": "last"}},
+      {"name": "P", "type": "revolute", "from": {"body": "first", "at": "A"},
+       "to": {"body": "rod1"}},
+      {"name": "Q", "type": "revolute", "from": {"body": "middle", "at": "B"},
+       "to": {"body": "rod2"}},
+      {"name": "X", "type": "revolute", "from": {"body": "rod1", "at": "A"},
+       "to": {"body": "middle", "at": "A"}},
+      {"name": "Y", "type": "revolute", "from": {"body": "rod2", "at": "B"},
+       "to": {"body": "last", "at": "B"}}],
+    "couplings": [{"name": "shaft", "coefficients": {"O": 1, "E": -1}}],
+    "initial": {"coordinates": {"O": 0.7, "C": 0.7, "E": 0.7, "P": -0.7, "Q": -0.7},
+                "speeds": {"O": 9}},
+    "known_solution": {"branch": [{"first": 1, "middle": -1}, {"rod1": 1}, {"rod2": 1}],
+                       "length": 1}})",
+                                            "two-parallelograms.json");
+  constexpr double kTolerance = 1e-9;
+  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Enforcement level :
+         {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
+      for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+        const Method method{.formulation = formulation,
+                            .enforcement = level,
+                            .coordinates = set,
+                            .solver = SolverKind::kRankRevealing};
+        const Record record = RunFile(file, method, kTolerance, 2.0);
+        ASSERT_EQ(record.Text("outcome"), "finished") << ToString(method);
+        EXPECT_EQ(record.Number("regularized_evaluations"), 0.0) << ToString(method);
+        EXPECT_LT(record.Number("branch_error_max"), 1e3 * kTolerance) << ToString(method);
+        EXPECT_LT(record.Number("energy_error_relative"), 1e3 * kTolerance) << ToString(method);
       }
     }
   }

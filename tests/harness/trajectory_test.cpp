@@ -452,8 +452,8 @@ TEST_F(Command, EnergiesOfAFileAreCompared) {
     return Call("trajectory theirs.csv --mechanism four-bar.json");
   };
   ExpectEnding(check(ours.At(1, kinetic) + 1.0), 0,
-               {"energy:kinetic [J]: at most 1.000e+00 J from the energy of the mechanism",
-                "energy:potential [J]: at most ", " not checked: reaction:"});
+               {"energy:kinetic [J]: differs from the mechanism by 1.000e+00 J at most",
+                "energy:potential [J]: differs from the mechanism by ", " not checked: reaction:"});
   ExpectEnding(check(std::nan("")), 2, {"theirs.csv:3: found nan in \"energy:kinetic [J]\""});
 }
 

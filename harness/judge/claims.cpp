@@ -83,7 +83,7 @@ std::string Defect(const Check& check, const Sample& sample) {
   return "";
 }
 
-// Returns "no record of formulation=odca has coordinats" for a required key that no row has, or "".
+// Returns "no record of formulation=odca has colour" for a required key that no row has, or "".
 std::string KeyMissing(const Check& check, const Selection& selection, const Sample& sample) {
   for (const Condition& one : check.require) {
     const bool is_there = std::ranges::any_of(

@@ -348,7 +348,7 @@ class Runner {
   }
 
  private:
-  /// Returns the largest angle of the last state: angles count turns, and are rounded to eps of it.
+  /// Returns the largest angle of the last state [rad]. Angles count turns, so rounding grows.
   double LargestAngle() const {
     double largest = 0.0;
     for (const TreeStep& step : mechanism_.tree()) {

@@ -449,7 +449,7 @@ struct TrajectoryCheck {
   LargestAt energy;                ///< change of kinetic + potential - supplied + dissipated [J]
   double kinetic = 0.0;            ///< largest [J]
   std::string no_energy;           ///< reason why the energy is unknown; or empty
-  /// Kinetic and potential energy of the file minus those of the mechanism [J]; unknown without
+  /// Kinetic and potential energy of the file minus energies of the mechanism [J]; unknown without
   /// speeds.
   std::array<ColumnCheck, 2> energies;
   std::vector<std::string>

@@ -177,7 +177,7 @@ class SelfStress {
   /// Factors of rows and their inverses, and of columns: 1 / length.
   VectorX<S> row_scale_, inverse_scale_, column_scale_;
   MatrixX<S> gram_, C_;  ///< Cholesky factors, C = W^T W
-  /// Numbers by rows of J: r_ imposed ones, d_ released ones, those of the forest. W has -T, 1 and
+  /// Numbers by rows of J: r_ imposed rows, d_ released rows, rows of the forest. W has -T, 1 and
   /// -J_D^T W_c there.
   MatrixX<S> W_;
   VectorX<S> z_;

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 
 #include "harness/config/mechanism_sections.h"
 #include "harness/text/text.h"
@@ -374,7 +375,9 @@ void ReadCoefficients(const JsonNode& node, Coupling& coupling) {
   bool all_driven = true;
   for (const auto& [name, value] : node.Members()) {
     const double ratio = value.Number();
-    if (ratio == 0.0 && value.value().is_number()) value.Fail("a number that is not 0");
+    // squares must not overflow or vanish
+    const bool is_usable = std::abs(ratio) > 1e-100 && std::abs(ratio) < 1e100;
+    if (!is_usable && value.value().is_number()) value.Fail("a size between 1e-100 and 1e100");
     const auto joint = draft.joint_names.Find(name);
     if (!joint) continue;
     const JointDescription& described = draft.joints[*joint];

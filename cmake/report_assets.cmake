@@ -28,6 +28,6 @@ if(NPM)
     string(APPEND script "${text}")
   endforeach()
 endif()
-file(WRITE ${OUTPUT} "// Written by the build from web/report/ and uPlot.\n#include \"harness/report/report.h\"\n\n"
+file(WRITE ${OUTPUT} "// Written by the build from web/report/ and uPlot.\n#include \"harness/figures/report.h\"\n\n"
   "namespace loopbench::harness {\n\nconst std::string_view kReportScript = R\"~~~~(${script})~~~~\";\n"
   "const std::string_view kReportStyle = R\"~~~~(${style})~~~~\";\n\n}  // namespace loopbench::harness\n")

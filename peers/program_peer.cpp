@@ -6,8 +6,8 @@
 #include <cmath>
 #include <exception>
 
+#include "harness/base/text.h"
 #include "harness/exchange/export_mechanism.h"
-#include "harness/text/text.h"
 
 namespace loopbench::peers {
 namespace {

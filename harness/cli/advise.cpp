@@ -1,9 +1,9 @@
 // advise: the cheapest method that meets an error bound.
-#include "harness/advise/advise.h"
+#include "harness/suite/advise.h"
 
-#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
+#include "harness/judge/analysis.h"
 #include "harness/run/run.h"
 #include "harness/suite/suite.h"
 

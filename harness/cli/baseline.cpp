@@ -1,9 +1,9 @@
 // baseline: a repository's own baseline, measured again and compared with the committed one.
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/run/run.h"
-#include "harness/store/store.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

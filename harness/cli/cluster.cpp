@@ -1,5 +1,5 @@
 // submit, status and collect: a run divided into parts.
-#include "harness/cluster/cluster.h"
+#include "harness/suite/cluster.h"
 
 #include <fmt/chrono.h>
 #include <fmt/ranges.h>
@@ -7,9 +7,9 @@
 #include <chrono>
 #include <set>
 
+#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 #include "harness/run/run.h"
-#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

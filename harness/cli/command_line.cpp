@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "harness/record/record.h"
-#include "harness/text/numeric_option.h"
-#include "harness/text/text.h"
+#include "harness/base/numeric_option.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 

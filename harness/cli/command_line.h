@@ -11,10 +11,10 @@
 #include <variant>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/isolation/processes.h"
-#include "harness/record/record.h"
-#include "harness/text/text.h"
+#include "harness/run/processes.h"
 
 namespace CLI {
 class App;

@@ -20,19 +20,19 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/cli/command_line.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/figures/figures.h"
 #include "harness/history/history.h"
-#include "harness/isolation/processes.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/reference/reference.h"
-#include "harness/store/store.h"
+#include "harness/judge/tables.h"
+#include "harness/observers/reference.h"
+#include "harness/run/processes.h"
 #include "harness/suite/suite.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
 #include "mechanism/simplify/model.h"
 #include "mechanism/simplify/structure.h"
 

@@ -2,10 +2,10 @@
 #include <ranges>
 #include <set>
 
+#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 #include "harness/history/history.h"
 #include "harness/judge/judge.h"
-#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

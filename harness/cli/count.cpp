@@ -7,7 +7,7 @@
 #include "harness/config/formulations.h"
 #include "harness/generate/record.h"
 #include "harness/run/run.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 
 namespace loopbench::harness {
 namespace {

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
@@ -16,12 +18,10 @@
 #include "harness/exchange/export_c.h"
 #include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/import.h"
+#include "harness/figures/view.h"
 #include "harness/integrator/arkode.h"
-#include "harness/isolation/processes.h"
-#include "harness/record/record.h"
+#include "harness/run/processes.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
-#include "harness/view/view.h"
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {

@@ -1,16 +1,16 @@
 // list, check and assemble: files before a run.
 #include <tuple>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/file_kind.h"
+#include "harness/base/record.h"
 #include "harness/cli/commands.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/options.h"
-#include "harness/json/file_kind.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
 #include "harness/run/run.h"
+#include "harness/run/timing.h"
 #include "harness/suite/suite.h"
-#include "harness/timing/timing.h"
 #include "mechanism/start/branches.h"
 
 namespace loopbench::harness {

@@ -2,12 +2,12 @@
 
 #include <set>
 
+#include "harness/base/file_kind.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/json/file_kind.h"
 #include "harness/observers/registry.h"
+#include "harness/run/timing.h"
 #include "harness/suite/suite.h"
-#include "harness/timing/timing.h"
 
 namespace loopbench::harness {
 namespace {

@@ -2,10 +2,10 @@
 #include <array>
 #include <numbers>
 
-#include "harness/analysis/analysis.h"
 #include "harness/cli/commands.h"
+#include "harness/judge/analysis.h"
+#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
-#include "harness/trajectory/trajectory.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
 

@@ -7,12 +7,12 @@
 #include <ranges>
 #include <stdexcept>
 
+#include "harness/base/json_document.h"
+#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
-#include "harness/json/json_document.h"
 #include "harness/judge/judge.h"
 #include "harness/judge/rule_schemas.h"
-#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

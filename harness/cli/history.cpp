@@ -1,8 +1,8 @@
 // history: measurements of successive commits.
 #include "harness/history/history.h"
 
+#include "harness/base/store.h"
 #include "harness/cli/commands.h"
-#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace {

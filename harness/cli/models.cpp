@@ -6,12 +6,12 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "harness/advise/advise.h"
-#include "harness/analysis/analysis.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/cli/commands.h"
-#include "harness/record/record.h"
+#include "harness/judge/analysis.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
+#include "harness/suite/advise.h"
 
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"

@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "harness/store/store.h"
-#include "harness/text/text.h"
 #include "mechanism/model/dense_memory.h"
 
 namespace loopbench {

@@ -5,12 +5,12 @@
 
 #include <fstream>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 #include "harness/figures/figures.h"
+#include "harness/judge/analysis.h"
+#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
-#include "harness/store/store.h"
-#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,11 +1,11 @@
 // table, plot, report, robustness, check-claims, work-precision: views of the records of a store.
 #include <array>
 
+#include "harness/base/json_document.h"
 #include "harness/cli/commands.h"
 #include "harness/figures/figures.h"
-#include "harness/json/json_document.h"
+#include "harness/figures/report.h"
 #include "harness/judge/judge.h"
-#include "harness/report/report.h"
 
 namespace loopbench::harness {
 namespace {

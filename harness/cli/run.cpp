@@ -5,14 +5,14 @@
 #include <iterator>
 #include <set>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/cli/commands.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
-#include "harness/store/store.h"
+#include "harness/observers/trajectory.h"
+#include "harness/run/timing.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
-#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,5 +1,5 @@
 // trajectory: output of a run over time, or an external trajectory checked against a mechanism.
-#include "harness/trajectory/trajectory.h"
+#include "harness/observers/trajectory.h"
 
 #include <array>
 #include <iterator>
@@ -7,8 +7,8 @@
 #include <ranges>
 #include <set>
 
+#include "harness/base/json_document.h"
 #include "harness/cli/commands.h"
-#include "harness/json/json_document.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "harness/base/fields.h"
+#include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
-#include "harness/json/fields.h"
-#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 #include "mechanism/simplify/compile.h"

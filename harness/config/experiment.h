@@ -11,10 +11,10 @@
 #include <string_view>
 #include <vector>
 
+#include "harness/base/record.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/config/published_series.h"
-#include "harness/record/record.h"
 #include "mechanism/description/topology.h"
 #include "mechanism/formulation/options.h"
 #include "mechanism/simplify/compile.h"
@@ -176,7 +176,7 @@ struct ReferenceOptions {
   double cpu_s = 20.0;  ///< CPU time of one integration [s]; it certifies the completed part
 };
 
-/// Quantities in rows of a trajectory, in the order of columns (harness/trajectory/trajectory.h).
+/// Quantities in rows of a trajectory, in the order of columns (harness/observers/trajectory.h).
 enum class OutputPart { kJoints, kBodies, kPoints, kReactions, kForces, kEnergy };
 template <>
 inline constexpr std::array<std::string_view, 6> kNames<OutputPart> = {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <charconv>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/options.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -8,11 +8,11 @@
 #include <set>
 #include <system_error>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
 

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
+#include "harness/base/fields.h"
+#include "harness/base/json_document.h"
+#include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
 #include "harness/config/options.h"
-#include "harness/json/fields.h"
-#include "harness/json/json_document.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

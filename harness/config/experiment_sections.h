@@ -14,10 +14,10 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/fields.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
-#include "harness/json/fields.h"
 
 namespace loopbench::harness {
 

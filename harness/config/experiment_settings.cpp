@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/base/text.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/experiment.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/published_series.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

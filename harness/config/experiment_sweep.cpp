@@ -5,10 +5,10 @@
 #include <cmath>
 #include <set>
 
+#include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/formulations.h"
-#include "harness/record/record.h"
 
 namespace loopbench::harness {
 namespace {

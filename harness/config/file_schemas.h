@@ -1,7 +1,7 @@
-// Schemas of whole files, printed by harness/json/schema.h.
+// Schemas of whole files, printed by harness/base/schema.h.
 #pragma once
 
-#include "harness/json/schema.h"
+#include "harness/base/schema.h"
 
 namespace loopbench::harness {
 

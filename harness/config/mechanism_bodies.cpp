@@ -4,8 +4,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "harness/base/text.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/text/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::harness {

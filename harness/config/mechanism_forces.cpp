@@ -1,8 +1,8 @@
 // Sections of a mechanism: forces, and functions of time.
 #include <fmt/format.h>
 
+#include "harness/base/text.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -6,11 +6,11 @@
 #include <set>
 #include <utility>
 
+#include "harness/base/fields.h"
+#include "harness/base/json_document.h"
+#include "harness/base/text.h"
 #include "harness/config/file_schemas.h"
 #include "harness/config/mechanism_sections.h"
-#include "harness/json/fields.h"
-#include "harness/json/json_document.h"
-#include "harness/text/text.h"
 #include "mechanism/start/poses.h"
 
 namespace loopbench::harness {

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/fields.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/fields.h"
 
 namespace loopbench::harness {
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "harness/base/fields.h"
 #include "harness/config/file_schemas.h"
-#include "harness/json/fields.h"
 #include "mechanism/description/joint_type.h"
 
 namespace loopbench::harness {

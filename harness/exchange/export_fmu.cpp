@@ -3,10 +3,10 @@
 #include <boost/crc.hpp>
 #include <cstdint>
 
+#include "harness/base/text.h"
 #include "harness/exchange/export_c.h"
 #include "harness/exchange/export_names.h"
 #include "harness/generate/generated.h"
-#include "harness/text/text.h"
 
 namespace loopbench::exchange {
 

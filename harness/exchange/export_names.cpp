@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 
 namespace loopbench::exchange {

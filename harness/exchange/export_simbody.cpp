@@ -4,8 +4,8 @@
 
 #include <optional>
 
+#include "harness/base/record.h"
 #include "harness/exchange/export_names.h"
-#include "harness/record/record.h"
 
 namespace loopbench::exchange {
 namespace {

@@ -3,9 +3,9 @@
 #include <limits>
 #include <tuple>
 
+#include "harness/base/text.h"
 #include "harness/config/mechanism_sections.h"
 #include "harness/exchange/import_draft.h"
-#include "harness/text/text.h"
 #include "mechanism/algebra/symmetric_eigen.h"
 #include "mechanism/description/topology.h"
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "mechanism/simplify/plane.h"
 
 namespace loopbench::harness {

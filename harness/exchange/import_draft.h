@@ -12,10 +12,10 @@
 #include <set>
 #include <span>
 
+#include "harness/base/text.h"
 #include "harness/exchange/export_names.h"
 #include "harness/exchange/import.h"
 #include "harness/exchange/xml_document.h"
-#include "harness/text/text.h"
 #include "mechanism/simplify/attach.h"
 
 namespace loopbench::harness {

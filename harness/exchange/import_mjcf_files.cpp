@@ -3,8 +3,8 @@
 
 #include <set>
 
+#include "harness/base/text.h"
 #include "harness/exchange/xml_document.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

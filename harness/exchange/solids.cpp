@@ -4,7 +4,7 @@
 #include <cstring>
 #include <tuple>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 

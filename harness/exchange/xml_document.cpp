@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 

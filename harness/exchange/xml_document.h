@@ -25,7 +25,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/json/json_reader.h"
+#include "harness/base/json_reader.h"
 
 namespace loopbench::harness {
 

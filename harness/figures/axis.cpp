@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <limits>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
-#include "harness/tables/tables.h"
+#include "harness/judge/analysis.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

@@ -16,9 +16,9 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/record.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/trajectory/trajectory.h"
+#include "harness/observers/trajectory.h"
 
 namespace loopbench::harness {
 

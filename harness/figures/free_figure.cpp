@@ -7,11 +7,11 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/analysis.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

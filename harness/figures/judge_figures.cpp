@@ -9,9 +9,9 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

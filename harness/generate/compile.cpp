@@ -15,9 +15,9 @@
 #include <sstream>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/generate/graph.h"
 #include "harness/generate/record.h"
-#include "harness/text/text.h"
 
 namespace loopbench::generate {
 

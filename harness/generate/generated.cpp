@@ -4,9 +4,9 @@
 #include <array>
 #include <map>
 
+#include "harness/base/text.h"
 #include "harness/generate/graph.h"
 #include "harness/generate/print_c.h"
-#include "harness/text/text.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/formulation/side_by_side.h"
 

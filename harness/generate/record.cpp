@@ -7,9 +7,9 @@
 #include <optional>
 #include <set>
 
+#include "harness/base/text.h"
 #include "harness/generate/print_c.h"
 #include "harness/generate/recorded.h"
-#include "harness/text/text.h"
 //
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/projection_steps.h"

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "harness/base/text.h"
 #include "harness/history/history.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

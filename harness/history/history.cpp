@@ -10,9 +10,9 @@
 #include <set>
 #include <utility>
 
-#include "harness/record/record.h"
-#include "harness/store/store.h"
-#include "harness/text/text.h"
+#include "harness/base/record.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <ranges>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
+#include "harness/figures/view.h"
 #include "harness/history/history.h"
 #include "harness/judge/judge.h"
-#include "harness/text/text.h"
-#include "harness/view/view.h"
 
 namespace loopbench::harness {
 namespace {

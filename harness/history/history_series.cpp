@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/record.h"
 #include "harness/history/history.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
 
 namespace loopbench::harness {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/config/options.h"
 #include "harness/integrator/arkode.h"
-#include "harness/text/text.h"
 #include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {

@@ -11,10 +11,10 @@
 #include <string>
 #include <string_view>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

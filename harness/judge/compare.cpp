@@ -9,11 +9,11 @@
 #include <set>
 #include <sstream>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 

@@ -11,14 +11,14 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
+#include "harness/base/record.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 
 // Demands on measures: keys, relations, and rules of comparison.
 
-// Rules for the comparison of measures (harness/record/record.h): their groups and valid values.
+// Rules for the comparison of measures (harness/base/record.h): their groups and valid values.
 
 /// Returns the group of a rule, for `--only` and the summary.
 std::string_view GroupOf(Rule rule);
@@ -41,7 +41,7 @@ std::string_view Expected(Rule rule);
 std::string Shown(const Record& record, std::string_view key);
 
 /// Returns the calibration time [ns] of the machine for the time under `key`
-/// (harness/timing/timing.h); NaN if unknown or if the value is not a time.
+/// (harness/run/timing.h); NaN if unknown or if the value is not a time.
 double CalibrationOf(const Record& record, std::string_view key);
 
 /// Returns the text that identifies a case of a store: the keys before "case_id" or "outcome" in

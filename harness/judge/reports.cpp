@@ -9,9 +9,9 @@
 #include <set>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

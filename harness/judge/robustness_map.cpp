@@ -10,10 +10,10 @@
 #include <tuple>
 #include <utility>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "harness/json/fields.h"
+#include "harness/base/fields.h"
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
 #include "harness/judge/rule_schemas.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace {

@@ -1,7 +1,7 @@
-// Schemas of files of rules, printed by harness/json/schema.h.
+// Schemas of files of rules, printed by harness/base/schema.h.
 #pragma once
 
-#include "harness/json/schema.h"
+#include "harness/base/schema.h"
 
 namespace loopbench::harness {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
 
 namespace loopbench::harness {

@@ -5,8 +5,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "harness/base/record.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
 
 namespace loopbench::harness {
 namespace {

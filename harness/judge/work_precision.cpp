@@ -8,10 +8,10 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/record.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/record/record.h"
 #include "mechanism/formulation/system.h"
 
 namespace loopbench::harness {
@@ -72,7 +72,7 @@ struct Watched {
 
 /// Returns all observers of a run, in the order of their record keys. Built-in observers have a
 /// line here (observers.cpp) and an entry per key in the table of measures
-/// (harness/record/measures.cpp). User-defined ones (registry.h) follow.
+/// (harness/base/measures.cpp). User-defined ones (registry.h) follow.
 template <class Space>
 std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run);
 

@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/record.h"
 #include "harness/observers/observer.h"
-#include "harness/record/record.h"
 #include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {

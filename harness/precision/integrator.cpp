@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/base/text.h"
 #include "harness/precision/scalars.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <stdexcept>
 
+#include "harness/base/text.h"
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
-#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/system.h"
 #include "odca/odca.h"

@@ -12,7 +12,7 @@
 
 #include <string>
 
-#include "harness/reference/reference.h"
+#include "harness/observers/reference.h"
 
 namespace loopbench::harness {
 

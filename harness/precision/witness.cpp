@@ -8,10 +8,10 @@
 #include <limits>
 #include <memory>
 
+#include "harness/base/text.h"
 #include "harness/precision/exact.h"
 #include "harness/precision/integrator.h"
 #include "harness/precision/scalars.h"
-#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "odca/odca.h"
 

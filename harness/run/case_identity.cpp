@@ -1,10 +1,10 @@
 #include <algorithm>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/config/experiment.h"
 #include "harness/config/options.h"
-#include "harness/record/record.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

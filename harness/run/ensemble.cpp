@@ -9,9 +9,9 @@
 #include <string_view>
 #include <utility>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/start/assembly.h"
 

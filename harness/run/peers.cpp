@@ -2,9 +2,9 @@
 
 #include <map>
 
+#include "harness/base/text.h"
 #include "harness/config/formulations.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {

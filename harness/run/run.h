@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/record.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/options.h"
 #include "harness/generate/generated.h"
 #include "harness/integrator/arkode.h"
-#include "harness/record/record.h"
-#include "harness/reference/reference.h"
-#include "harness/trajectory/trajectory.h"
+#include "harness/judge/analysis.h"
+#include "harness/observers/reference.h"
+#include "harness/observers/trajectory.h"
 #include "mechanism/formulation/forward_jacobian.h"
 #include "mechanism/formulation/side_by_side.h"
 #include "mechanism/simplify/compile.h"
@@ -273,11 +273,11 @@ std::vector<double> AtolsOf(const Case& entry, const MechanismDescription& descr
 /// the outcome and all measured values of the unperturbed run. Growth is analysed over the ensemble
 /// (or over the single run, which resolves nothing). Limits hold for each run.
 ///
-/// With a reference (harness/reference/), the unperturbed run is compared with it at the
+/// With a reference (harness/observers/), the unperturbed run is compared with it at the
 /// reference's times, by dense output.
 ///
 /// If the experiment requests output, the unperturbed run's trajectory is written to `trajectory`
-/// (harness/trajectory/), unless that is empty.
+/// (harness/observers/), unless that is empty.
 ///
 /// Members of the ensemble run in batches on `threads` threads (side_by_side.h), which does not
 /// change their bits. Other cases may run `beside` the unperturbed run.

@@ -6,14 +6,14 @@
 #include <memory>
 #include <optional>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/text.h"
 #include "harness/integrator/arkode.h"
+#include "harness/judge/analysis.h"
 #include "harness/observers/observer.h"
+#include "harness/observers/reference.h"
 #include "harness/observers/registry.h"
-#include "harness/reference/reference.h"
+#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
-#include "harness/trajectory/trajectory.h"
 
 namespace loopbench::harness {
 

@@ -9,10 +9,10 @@
 #include <set>
 #include <sstream>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
 #include "mechanism/start/assembly.h"
 
 #ifdef LOOPBENCH_PRECISIONS

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <set>
 
-#include "harness/analysis/analysis.h"
-#include "harness/record/record.h"
-#include "harness/reference/reference.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
+#include "harness/observers/reference.h"
 #include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
 #include "mechanism/description/outcome.h"
 #include "mechanism/model/mechanism.h"
 

@@ -6,13 +6,13 @@
 #include <numeric>
 #include <optional>
 
-#include "harness/isolation/processes.h"
-#include "harness/record/record.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
+#include "harness/observers/trajectory.h"
+#include "harness/run/processes.h"
 #include "harness/run/run.h"
+#include "harness/run/timing.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
-#include "harness/trajectory/trajectory.h"
 #include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {

@@ -10,14 +10,14 @@
 #include <unordered_set>
 #include <utility>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/isolation/processes.h"
-#include "harness/record/record.h"
-#include "harness/reference/reference.h"
+#include "harness/observers/reference.h"
+#include "harness/observers/trajectory.h"
+#include "harness/run/processes.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
-#include "harness/trajectory/trajectory.h"
+#include "harness/run/timing.h"
 
 namespace loopbench::harness {
 

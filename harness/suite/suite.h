@@ -16,14 +16,14 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/store.h"
 #include "harness/config/experiment.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/isolation/processes.h"
+#include "harness/observers/reference.h"
 #include "harness/precision/ladder.h"
-#include "harness/record/record.h"
-#include "harness/reference/reference.h"
-#include "harness/store/store.h"
-#include "harness/timing/timing.h"
+#include "harness/run/processes.h"
+#include "harness/run/timing.h"
 
 namespace loopbench::harness {
 
@@ -374,12 +374,12 @@ struct SuiteCount {
 /// and this very program. `finished` contains the records in the store at the call. Completed
 /// groups of long sweeps are marked next to the store and not read again.
 ///
-/// Throws Interrupted (harness/isolation/processes.h) on Ctrl-C; complete records are then in the
+/// Throws Interrupted (harness/run/processes.h) on Ctrl-C; complete records are then in the
 /// store.
 ///
 /// Every case gets a record: outcomes "crashed", "process-time-limit", "memory-limit" and
 /// "invalid-result" come from its process. Short cases share processes
-/// (harness/isolation/processes.h).
+/// (harness/run/processes.h).
 SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRuns& finished,
                     ResultStore& store);
 

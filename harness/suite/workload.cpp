@@ -8,10 +8,10 @@
 #include <set>
 #include <utility>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/run/run.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 

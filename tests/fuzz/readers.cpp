@@ -10,16 +10,16 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
 #include "harness/exchange/import.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/store/store.h"
-#include "harness/text/text.h"
-#include "harness/trajectory/trajectory.h"
+#include "harness/observers/trajectory.h"
 
 namespace loopbench::fuzz {
 namespace {

@@ -10,9 +10,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "harness/base/text.h"
 #include "harness/generate/generated.h"
 #include "harness/generate/record.h"
-#include "harness/text/text.h"
 
 namespace loopbench::generate {
 namespace {

@@ -9,13 +9,13 @@
 #include <iterator>
 #include <random>
 
+#include "harness/base/text.h"
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/generate/generated.h"
 #include "harness/generate/print_c.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/description/library.h"
 #include "mechanism/formulation/forward_jacobian.h"

@@ -11,7 +11,7 @@
 #include "harness/generate/record.h"
 #include "harness/generate/recorded.h"
 #include "harness/run/run.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 
 namespace loopbench::generate {
 namespace {

@@ -1,6 +1,6 @@
 // Advice: what it recommends keeps what was asked for, it says so where nothing does, and the
 // command line with what it writes.
-#include "harness/advise/advise.h"
+#include "harness/suite/advise.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/judge/analysis.h"
 #include "tests/harness/cli_fixture.h"
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"

@@ -5,11 +5,11 @@
 #include <random>
 #include <set>
 
+#include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/record/record.h"
 #include "harness/run/run.h"
+#include "harness/run/timing.h"
 #include "harness/suite/suite.h"
-#include "harness/timing/timing.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -1,7 +1,7 @@
 // Room on a terminal, held against what Unicode's East Asian Width and terminals say.
 #include <gtest/gtest.h>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace cells_test {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace claims_test {

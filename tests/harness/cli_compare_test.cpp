@@ -5,7 +5,7 @@
 #include <tuple>
 #include <vector>
 
-#include "harness/store/store.h"
+#include "harness/base/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/store.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/store/store.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

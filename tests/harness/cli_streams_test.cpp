@@ -2,7 +2,7 @@
 // signal, and never a line in a store.
 #include <string>
 
-#include "harness/store/store.h"
+#include "harness/base/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -28,7 +28,7 @@ TEST(Printing, GoesThroughOnePlace) {
     for (const char* way : {"fmt::print", "std::cout", "std::cerr", "std::printf", "fprintf",
                             "std::puts", "fputs", "stdout,", "stderr,"}) {
       EXPECT_EQ(text.find(way), std::string::npos)
-          << path << " prints with " << way << "; use Print or PrintError of harness/text/text.h";
+          << path << " prints with " << way << "; use Print or PrintError of harness/base/text.h";
     }
   }
   EXPECT_GT(files, 100);

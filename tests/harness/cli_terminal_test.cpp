@@ -6,7 +6,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "harness/store/store.h"
+#include "harness/base/store.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/pseudo_terminal.h"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <string>
 
-#include "harness/record/record.h"
-#include "harness/store/store.h"
+#include "harness/base/record.h"
+#include "harness/base/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

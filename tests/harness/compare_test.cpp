@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/store.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
-#include "harness/store/store.h"
 
 namespace loopbench::harness {
 namespace compare_test {

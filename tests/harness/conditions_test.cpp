@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
+#include "harness/judge/tables.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

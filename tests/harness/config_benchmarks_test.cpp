@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/config/benchmarks.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 #include "mechanism/model/mechanism.h"
 #include "tests/harness/places.h"
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

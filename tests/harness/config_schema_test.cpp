@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/file_kind.h"
+#include "harness/base/text.h"
 #include "harness/config/benchmarks.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
-#include "harness/json/file_kind.h"
 #include "harness/judge/judge.h"
-#include "harness/text/text.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

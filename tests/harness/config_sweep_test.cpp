@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "tests/harness/places.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/judge/analysis.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace distinct_points_test {

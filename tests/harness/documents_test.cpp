@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
+#include "harness/base/record.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
-#include "harness/record/record.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <set>
 
+#include "harness/base/text.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 

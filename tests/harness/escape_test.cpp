@@ -4,9 +4,9 @@
 #include <set>
 #include <string>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace escape_test {

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/record/record.h"
 #include "harness/suite/suite.h"
 
 namespace loopbench::harness {

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/judge/analysis.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/harness/cli_fixture.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/tables/tables.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace factorial_test {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace figures_test {

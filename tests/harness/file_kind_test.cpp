@@ -1,10 +1,10 @@
 // What kind a file is of: its top-level keys decide, and nothing that stands inside.
-#include "harness/json/file_kind.h"
+#include "harness/base/file_kind.h"
 
 #include <gtest/gtest.h>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

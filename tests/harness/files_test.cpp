@@ -5,7 +5,7 @@
 #include <csignal>
 #include <string>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace files_test {

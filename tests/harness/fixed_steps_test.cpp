@@ -9,11 +9,11 @@
 #include <variant>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/judge/analysis.h"
+#include "harness/judge/tables.h"
 #include "harness/run/run.h"
-#include "harness/tables/tables.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 

@@ -5,10 +5,10 @@
 
 #include <stdexcept>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
+#include "harness/judge/tables.h"
 #include "harness/suite/suite.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace free_figure_test {

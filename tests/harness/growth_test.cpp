@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 
 namespace loopbench::harness {
 namespace growth_test {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/history/history.h"
-#include "harness/record/record.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace history_test {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/history/history.h"
-#include "harness/text/text.h"
 #include "tests/harness/history_of.h"
 
 namespace loopbench::harness {

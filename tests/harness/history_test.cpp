@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/store/store.h"
-#include "harness/text/text.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "tests/harness/history_of.h"
 
 namespace loopbench::harness {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness {

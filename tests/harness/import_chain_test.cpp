@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "mechanism/model/kinematics.h"
 #include "tests/harness/import_texts.h"
 

@@ -8,9 +8,9 @@
 #include <random>
 #include <set>
 
+#include "harness/base/json_document.h"
+#include "harness/base/text.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/json/json_document.h"
-#include "harness/text/text.h"
 #include "tests/harness/import_texts.h"
 #include "tests/harness/places.h"
 

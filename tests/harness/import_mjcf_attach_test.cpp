@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "harness/base/text.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/text.h"
 #include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {

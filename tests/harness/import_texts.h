@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/exchange/import.h"
-#include "harness/text/text.h"
 #include "mechanism/description/joint_frames.h"
 
 namespace loopbench::harness {

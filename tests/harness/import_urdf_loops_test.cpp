@@ -1,8 +1,8 @@
 // Loops within URDF: <loop_joint>, joints of SDF in <gazebo>, and constraints of Drake.
 #include <gtest/gtest.h>
 
+#include "harness/base/text.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/text.h"
 #include "tests/harness/import_texts.h"
 #include "tests/harness/places.h"
 

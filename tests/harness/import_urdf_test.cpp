@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {

@@ -7,9 +7,9 @@
 namespace loopbench::architecture {
 namespace {
 
-// From the ground floor up: files of a room include those of rooms above it in this list only.
+// From the lowest up: a file includes files of modules above its own in this list only.
 // clang-format off
-constexpr std::string_view kRooms[] = {"mechanism/algebra",
+constexpr std::string_view kModules[] = {"mechanism/algebra",
                                        "mechanism/description",
                                        "mechanism/model",
                                        "mechanism/loops",
@@ -19,37 +19,24 @@ constexpr std::string_view kRooms[] = {"mechanism/algebra",
                                        "odca",
                                        "lagrange",
                                        "reduction",
-                                       "harness/text",
-                                       "harness/json",
-                                       "harness/record",
-                                       "harness/store",
+                                       "harness/base",
                                        "harness/config",
-                                       "harness/analysis",
+                                       "harness/judge",
                                        "harness/generate",
                                        "harness/integrator",
-                                       "harness/reference",
-                                       "harness/trajectory",
                                        "harness/observers",
                                        "harness/run",
                                        "harness/precision",
-                                       "harness/isolation",
-                                       "harness/timing",
                                        "harness/suite",
-                                       "harness/cluster",
-                                       "harness/advise",
-                                       "harness/tables",
-                                       "harness/judge",
                                        "harness/figures",
-                                       "harness/view",
                                        "harness/exchange",
-                                       "harness/report",
                                        "harness/history",
                                        "harness/cli",
                                        "peers",
                                        "examples/own-parts",
                                        "tests"};
 // clang-format on
-// The build writes these headers, and one room reads them.
+// The build writes these headers, and one module reads them.
 constexpr std::string_view kGenerated = "harness/build_";
 
 bool OneOf(std::string_view word, std::initializer_list<std::string_view> words) {
@@ -61,28 +48,32 @@ bool StartsWithOneOf(std::string_view text, std::initializer_list<std::string_vi
                              [text](std::string_view start) { return text.starts_with(start); });
 }
 
-/// The room of a file, "" in none.
-std::string_view Room(std::string_view path) {
-  const auto room = std::ranges::find_if(kRooms, [path](std::string_view one) {
+/// The module of a file, "" in none.
+std::string_view ModuleOf(std::string_view path) {
+  const auto module = std::ranges::find_if(kModules, [path](std::string_view one) {
     return path.starts_with(one) && path.substr(one.size()).starts_with('/');
   });
-  return room == std::end(kRooms) ? "" : *room;
+  return module == std::end(kModules) ? "" : *module;
 }
 
-bool IsFormulation(std::string_view room) { return OneOf(room, {"odca", "lagrange", "reduction"}); }
+bool IsFormulation(std::string_view module) {
+  return OneOf(module, {"odca", "lagrange", "reduction"});
+}
 
-bool IsCore(std::string_view room) { return room.starts_with("mechanism/") || IsFormulation(room); }
+bool IsCore(std::string_view module) {
+  return module.starts_with("mechanism/") || IsFormulation(module);
+}
 
-/// Whether files of `room` may include those of `other`.
-bool Reaches(std::string_view room, std::string_view other) {
-  if (room == other) return true;
-  if (IsFormulation(room) && IsFormulation(other)) return false;
-  return std::ranges::find(kRooms, room) > std::ranges::find(kRooms, other);
+/// Whether files of `module` may include those of `other`.
+bool Reaches(std::string_view module, std::string_view other) {
+  if (module == other) return true;
+  if (IsFormulation(module) && IsFormulation(other)) return false;
+  return std::ranges::find(kModules, module) > std::ranges::find(kModules, other);
 }
 
 /// Why a file at `path` must not include the foreign `header`; "" when it may.
 std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
-  if (IsCore(Room(path)) && header.find_first_of("./") != std::string_view::npos) {
+  if (IsCore(ModuleOf(path)) && header.find_first_of("./") != std::string_view::npos) {
     return header.starts_with("Eigen/") ? "" : "the core knows Eigen and the standard library";
   }
   if (StartsWithOneOf(header, {"arkode/", "cvode/", "ida/", "kinsol/", "nvector/", "sun"})) {
@@ -92,18 +83,17 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
                : "SUNDIALS is for harness/integrator/arkode.cpp and files arkode_*";
   }
   if (header.starts_with("nlohmann/")) {
-    const bool allowed = StartsWithOneOf(
-        path, {"harness/json/", "harness/record/", "harness/config/", "harness/store/",
-               "harness/judge/", "tests/harness/config", "tests/harness/store"});
-    return allowed ? "" : "nlohmann-json is for the rooms that read and write JSON";
+    const bool allowed =
+        StartsWithOneOf(path, {"harness/base/", "harness/judge/track.cpp", "tests/harness/store"});
+    return allowed ? "" : "nlohmann-json is for harness/base";
   }
   if (header.starts_with("CLI/")) {
-    const bool allowed = OneOf(path, {"harness/cli/command_line.cpp", "harness/timing/count.cpp",
-                                      "harness/text/numeric_option.h"});
+    const bool allowed = OneOf(path, {"harness/cli/command_line.cpp", "harness/run/count.cpp",
+                                      "harness/base/numeric_option.h"});
     return allowed ? "" : "CLI11 is for the command lines of programs";
   }
   if (header.starts_with("benchmark/")) {
-    return path.starts_with("harness/timing/") ? "" : "Google Benchmark is for harness/timing";
+    return path.starts_with("harness/run/") ? "" : "Google Benchmark is for harness/run";
   }
   if (StartsWithOneOf(header, {"gtest/", "gmock/"})) {
     return path.starts_with("tests/") ? "" : "GoogleTest is for tests";
@@ -134,13 +124,13 @@ std::string_view WhyNotForeign(std::string_view path, std::string_view header) {
 
 /// The same for a header of this repository, named from its root.
 std::string_view WhyNotOwn(std::string_view path, std::string_view header) {
-  const std::string_view room = Room(header);
-  if (Room(path).empty()) return "its folder is no room: say in kRooms on which floor it is";
-  if (header.starts_with(kGenerated) && Room(path) == "harness/record") return "";
-  if (header.find("..") != std::string_view::npos || room.empty()) {
+  const std::string_view module = ModuleOf(header);
+  if (ModuleOf(path).empty()) return "its folder is no module of kModules";
+  if (header.starts_with(kGenerated) && ModuleOf(path) == "harness/base") return "";
+  if (header.find("..") != std::string_view::npos || module.empty()) {
     return "own headers are named from the root of the repository";
   }
-  return Reaches(Room(path), room) ? "" : "the arrow points the other way";
+  return Reaches(ModuleOf(path), module) ? "" : "the arrow points the other way";
 }
 
 /// `text` with comments blanked, line ends kept.
@@ -198,7 +188,7 @@ std::vector<std::string> Violations(std::string_view path, std::string_view text
     if (header.starts_with('<')) why = WhyNotForeign(path, name);
     if (header.starts_with('"')) why = WhyNotOwn(path, name);
     // own headers in angle brackets, foreign ones in quotes: no way around the rules
-    if (header.starts_with('<') && !Room(name).empty()) {
+    if (header.starts_with('<') && !ModuleOf(name).empty()) {
       why = "own headers stand in quotes";
     }
     if (!why.empty()) {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/experiment_reader.h"
+#include "harness/judge/analysis.h"
 #include "harness/run/run.h"
 #include "mechanism/start/assembly.h"
 #include "tests/harness/integrator_problems.h"

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/integrator/arkode.h"
-#include "harness/text/text.h"
 #include "tests/harness/integrator_problems.h"
 
 namespace loopbench::harness {

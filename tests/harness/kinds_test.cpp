@@ -9,7 +9,7 @@
 
 #include "examples/own-parts/friction.h"
 #include "examples/own-parts/rack_and_pinion.h"
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "mechanism/description/library.h"
 #include "mechanism/model/registry.h"
 #include "tests/harness/in_child.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -4,11 +4,11 @@
 #include <filesystem>
 
 #include "examples/own-parts/half_velocity.h"
-#include "harness/analysis/analysis.h"
+#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/figures/figures.h"
+#include "harness/judge/analysis.h"
 #include "harness/suite/suite.h"
-#include "harness/text/text.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/level.h"
 #include "tests/harness/in_child.h"

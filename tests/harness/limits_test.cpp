@@ -5,10 +5,10 @@
 #include <cmath>
 #include <string>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/isolation/processes.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
+#include "harness/run/processes.h"
+#include "harness/run/timing.h"
 #include "mechanism/model/dense_memory.h"
 #include "tests/harness/cli_fixture.h"
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/record.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/cli/commands.h"
-#include "harness/record/record.h"
-#include "harness/store/store.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -4,7 +4,7 @@
 #include <set>
 #include <string_view>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
 #include "harness/run/run.h"
 #include "tests/reference/cases.h"
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "mechanism/simplify/redundancy.h"
 #include "tests/contract/generators.h"
 #include "tests/harness/places.h"

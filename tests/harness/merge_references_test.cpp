@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/reference/reference.h"
-#include "harness/text/text.h"
+#include "harness/base/text.h"
+#include "harness/observers/reference.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/reference/cases.h"
 

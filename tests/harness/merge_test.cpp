@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/record.h"
-#include "harness/store/store.h"
+#include "harness/base/record.h"
+#include "harness/base/store.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

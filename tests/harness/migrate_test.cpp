@@ -5,8 +5,8 @@
 
 #include <fstream>
 
-#include "harness/record/record.h"
-#include "harness/store/store.h"
+#include "harness/base/record.h"
+#include "harness/base/store.h"
 #include "harness/suite/suite.h"
 #include "tests/harness/cli_fixture.h"
 

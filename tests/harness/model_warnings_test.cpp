@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/judge/analysis.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

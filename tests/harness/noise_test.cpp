@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
-#include "harness/record/record.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 
 namespace loopbench::harness {
 namespace noise_test {

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <string>
 
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
 #include "harness/observers/registry.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"
 

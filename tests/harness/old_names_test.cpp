@@ -70,7 +70,7 @@ TEST_F(OldNamesOfCommands, OptionsInDocumentsExist) {
   std::erase(known, '\\');  // of roff
   known += " --requeue ";   // of sbatch
   for (const char* file :
-       {"reproduce", "check", "harness/timing/bench.cpp", "harness/cli/cluster.cpp"}) {
+       {"reproduce", "check", "harness/run/bench.cpp", "harness/cli/cluster.cpp"}) {
     known += ReadFile(kRoot / file);
   }
   for (const auto& tool : fs::directory_iterator(kRoot / "tools")) known += ReadFile(tool.path());

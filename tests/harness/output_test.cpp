@@ -17,7 +17,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

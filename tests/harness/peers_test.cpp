@@ -1,8 +1,8 @@
 // Peers in a build that has none: their names are known, files are read, runs are refused.
 #include <gtest/gtest.h>
 
+#include "harness/base/text.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 #include "tests/reference/cases.h"

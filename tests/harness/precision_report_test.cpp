@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "harness/figures/figures.h"
-#include "harness/tables/tables.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace precision_report_test {

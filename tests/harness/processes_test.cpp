@@ -1,5 +1,5 @@
 // Work in child processes: each way to end has its name, and the others go on.
-#include "harness/isolation/processes.h"
+#include "harness/run/processes.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace processes_test {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
-#include "harness/text/text.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/reference/cases.h"
 

@@ -1,6 +1,6 @@
 // Reports: what a page holds is what the records and the other commands say, whoever named things
 // and however many there are.
-#include "harness/report/report.h"
+#include "harness/figures/report.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 
 #include "harness/config/formulations.h"
 #include "harness/judge/judge.h"
-#include "harness/tables/tables.h"
+#include "harness/judge/tables.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/work_precision_records.h"
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/json/file_kind.h"
+#include "harness/base/file_kind.h"
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/text/text.h"
 
 namespace loopbench::harness {
 namespace robustness_map_reader_test {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/figures/figures.h"
 #include "harness/judge/judge.h"
-#include "harness/text/text.h"
 #include "tests/harness/robustness_map_runs.h"
 
 namespace loopbench::harness {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
 #include "harness/run/run.h"
 #include "tests/reference/cases.h"
 

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
+#include "harness/judge/tables.h"
 #include "harness/run/run.h"
-#include "harness/tables/tables.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 

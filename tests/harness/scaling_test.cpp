@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
 
 namespace loopbench::harness {

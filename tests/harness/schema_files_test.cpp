@@ -1,4 +1,4 @@
-// The committed schemas and tables are those that the lists of fields make (harness/json/fields.h).
+// The committed schemas and tables are those that the lists of fields make (harness/base/fields.h).
 //
 // To renew them: LOOPBENCH_RENEW_EXPECTED=1 harness_tests --gtest_filter='SchemaFiles*'
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 #include <set>
 #include <string>
 
+#include "harness/base/fields.h"
+#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/config/file_schemas.h"
-#include "harness/json/fields.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/places.h"
 
@@ -57,7 +57,7 @@ TEST(SchemaFiles, KnowTheKeysThatTellKindsApart) {
     const Json document = ParseDocument(keys + "}", kind);
     ErrorList errors(kind, "");
     ExpectDocument(JsonNode(document, "", errors), kinds.at(kind));
-    EXPECT_TRUE(errors.empty()) << kind << ": harness/json/file_kind.cpp lacks a key";
+    EXPECT_TRUE(errors.empty()) << kind << ": harness/base/file_kind.cpp lacks a key";
     const Json unknown = ParseDocument("{\"no such key\": 0, \"" + kind + "\": 0}", kind);
     ErrorList known(kind, "");
     ExpectDocument(JsonNode(unknown, "", known), kinds.at(kind));

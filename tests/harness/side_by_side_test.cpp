@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "mechanism/algebra/lanes.h"
 
 namespace loopbench::harness {

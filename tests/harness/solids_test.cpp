@@ -11,7 +11,7 @@
 #include <numbers>
 #include <random>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 #include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {

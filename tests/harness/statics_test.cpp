@@ -6,7 +6,7 @@
 #include <map>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/trajectory/trajectory.h"
+#include "harness/observers/trajectory.h"
 #include "mechanism/simplify/structure.h"
 #include "tests/harness/places.h"
 

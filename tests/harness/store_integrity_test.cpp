@@ -7,7 +7,7 @@
 #include <fstream>
 #include <random>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

@@ -9,10 +9,10 @@
 #include <string>
 #include <tuple>
 
+#include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/store/store.h"
-#include "harness/text/text.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 
 namespace loopbench::harness {
 namespace store_measurements_test {

@@ -1,5 +1,5 @@
 // The store keeps every value exactly, survives a crash, and names what it cannot read.
-#include "harness/store/store.h"
+#include "harness/base/store.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace store_test {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "harness/analysis/analysis.h"
-#include "harness/text/text.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {

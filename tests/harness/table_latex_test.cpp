@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <string>
 
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/base/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace table_latex_test {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/record.h"
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/base/record.h"
+#include "harness/base/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace table_test {

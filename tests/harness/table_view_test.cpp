@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/tables/tables.h"
-#include "harness/text/text.h"
+#include "harness/base/text.h"
+#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace table_view_test {

@@ -1,6 +1,6 @@
 // Files of trajectories: labels, what is written and read back, what is refused, whole runs by the
 // command line.
-#include "harness/trajectory/trajectory.h"
+#include "harness/observers/trajectory.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -10,9 +10,9 @@
 #include <fstream>
 #include <limits>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/in_child.h"
 

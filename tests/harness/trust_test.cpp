@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
-#include "harness/reference/reference.h"
+#include "harness/base/text.h"
+#include "harness/judge/analysis.h"
+#include "harness/observers/reference.h"
 #include "harness/run/run.h"
-#include "harness/text/text.h"
 #include "tests/reference/cases.h"
 #ifdef LOOPBENCH_PRECISIONS
 #include "harness/precision/make_reference.h"

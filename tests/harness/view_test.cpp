@@ -1,5 +1,5 @@
 // Pictures of mechanisms: what is drawn is what there is, whoever named it and however large it is.
-#include "harness/view/view.h"
+#include "harness/figures/view.h"
 
 #include <gtest/gtest.h>
 

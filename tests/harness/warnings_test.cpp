@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
-#include "harness/tables/tables.h"
+#include "harness/judge/analysis.h"
+#include "harness/judge/tables.h"
 #include "mechanism/description/library.h"
 #include "tests/reference/cases.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/record/record.h"
+#include "harness/base/record.h"
 
 namespace loopbench::harness::work_precision_records {
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
-#include "harness/text/text.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/work_precision_records.h"
 

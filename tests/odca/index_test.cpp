@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/text/text.h"
+#include "harness/base/text.h"
 
 namespace loopbench::odca {
 namespace index_test {

@@ -8,9 +8,9 @@
 
 #include <filesystem>
 
+#include "harness/base/text.h"
 #include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/export_names.h"
-#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
 #include "tests/peers/expressible.h"

@@ -9,9 +9,9 @@
 #include <map>
 #include <sstream>
 
+#include "harness/base/json_document.h"
+#include "harness/base/text.h"
 #include "harness/exchange/export_mechanism.h"
-#include "harness/json/json_document.h"
-#include "harness/text/text.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
 #include "tests/peers/expressible.h"

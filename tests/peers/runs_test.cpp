@@ -2,9 +2,9 @@
 // a peer does not have is named.
 #include <gtest/gtest.h>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 #include "harness/run/run.h"
-#include "harness/timing/timing.h"
+#include "harness/run/timing.h"
 #include "tests/peers/registered.h"
 #include "tests/reference/cases.h"
 

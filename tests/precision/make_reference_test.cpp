@@ -9,8 +9,8 @@
 #include <iostream>
 #include <limits>
 
-#include "harness/analysis/analysis.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/judge/analysis.h"
 #include "harness/precision/witness.h"
 #include "tests/precision/pendulum.h"
 #include "tests/reference/published_numbers.h"

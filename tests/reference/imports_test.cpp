@@ -9,9 +9,9 @@
 #include <iostream>
 #include <numbers>
 
+#include "harness/base/text.h"
 #include "harness/exchange/import.h"
 #include "harness/observers/observer.h"
-#include "harness/text/text.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
 #include "tests/reference/simulate.h"

@@ -9,7 +9,7 @@
 #include <map>
 #include <numbers>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 

@@ -7,7 +7,7 @@
 #include <iostream>
 #include <vector>
 
-#include "harness/analysis/analysis.h"
+#include "harness/judge/analysis.h"
 #include "mechanism/description/joint_frames.h"
 #include "tests/reference/cases.h"
 

@@ -1,5 +1,5 @@
 // Trajectories against closed forms and published numbers, and reactions against statics.
-#include "harness/trajectory/trajectory.h"
+#include "harness/observers/trajectory.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <iostream>
 #include <numbers>
 
+#include "harness/base/text.h"
 #include "harness/observers/observer.h"
-#include "harness/text/text.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"

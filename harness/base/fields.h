@@ -1,0 +1,292 @@
+// Lists of fields: the keys of an object of a file, defined once for all uses.
+//
+//   const Fields<Limits>& LimitsFields() {
+//     static const Fields<Limits> fields(
+//         "limits", "Limits at which a case is stopped.",
+//         {{"cpu_s", Number(&Limits::cpu_s, kPositive), "CPU time of one run [s], ..."},
+//          {"steps", Integer(&Limits::steps, 1, kMaxSteps), "Number of accepted steps."}});
+//     return fields;
+//   }
+//
+// A row contains the key, its value type and target member, and a sentence with the unit. A
+// required key also has a text for the error message. Defaults are the struct's defaults. The rows
+// generate the reader, the errors for unknown keys, the JSON schema (configs/schema/), the tables
+// of docs/fields.md, and, if every row can write its value, the writer.
+#pragma once
+
+#include <concepts>
+#include <functional>
+#include <iterator>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "harness/base/file_kind.h"
+#include "harness/base/json_reader.h"
+#include "harness/base/schema.h"
+#include "harness/base/text.h"
+
+namespace loopbench::harness {
+
+/// Value type of a key, and its member in a T.
+template <class T>
+struct FieldValue {
+  using Read = std::function<void(const JsonNode&, T&)>;
+  using Show = std::function<Json(const T&)>;
+
+  Json schema;
+  Read read;  ///< null: read by other code
+  Show show;  ///< value as in a file; null if there is no unique form
+  /// Value for writing; null if the key is left out. Without `write`, `show` is used, and default
+  /// values of optional keys are left out.
+  Show write;
+
+  FieldValue(Json what, Read reader = nullptr, Show shown = nullptr,  // NOLINT: a schema is one
+             Show written = nullptr)
+      : schema(std::move(what)),
+        read(std::move(reader)),
+        show(std::move(shown)),
+        write(std::move(written)) {}
+  /// Converts a field of a base class to a field of the derived struct.
+  template <class Base>
+  requires(std::derived_from<T, Base> && !std::same_as<T, Base>)
+      FieldValue(const FieldValue<Base>& other)  // NOLINT: as a T is a Base
+      : schema(other.schema), read(other.read), show(other.show), write(other.write) {}
+};
+
+/// Row of a list of fields. Without a name it is a rule for the whole object: `schema` states it,
+/// and `read` is called with the object after the previous rows.
+template <class T>
+struct Field {
+  std::string name;
+  FieldValue<T> value;
+  std::string sentence = "";
+  std::string missing = "";  ///< expected value, for the error if a required key is missing
+  /// Returns true if the rows after it cannot be checked.
+  bool (*ends)(const T&) = nullptr;
+};
+
+template <class T>
+class Fields {
+ public:
+  /// `name` is the object's name in schemas and tables.
+  Fields(std::string name, std::string sentence, std::vector<Field<T>> rows)
+      : name_(std::move(name)), sentence_(std::move(sentence)), rows_(std::move(rows)) {
+    for (const Field<T>& row : rows_) {
+      if (!row.name.empty()) keys_.Add(row.name);
+    }
+  }
+
+  /// Reads all rows into `result`. Returns false, and reads nothing, if `node` is not an object.
+  /// Reports unknown keys first.
+  bool Read(const JsonNode& node, T* result) const {
+    if (!node.ExpectObject(keys_)) return false;
+    ReadRows(node, result);
+    return true;
+  }
+
+  /// Reads all rows of an object whose keys are already checked.
+  void ReadRows(const JsonNode& node, T* result) const {
+    for (const Field<T>& row : rows_) {
+      if (row.name.empty()) {
+        if (row.value.read) row.value.read(node, *result);
+        continue;
+      }
+      const auto member =
+          row.missing.empty() ? node.Optional(row.name) : node.Required(row.name, row.missing);
+      if (member && row.value.read) row.value.read(*member, *result);
+      if (row.ends && row.ends(*result)) return;
+    }
+  }
+
+  /// Calls `put` with the key and plain value of each row, in order.
+  template <class Put>
+  void Show(const T& object, Put put) const {
+    for (const Field<T>& row : rows_) {
+      if (row.value.show) put(row.name, row.value.show(object));
+    }
+  }
+
+  /// Returns the object as JSON, from all rows that can be written. Read() gives the same object.
+  Json Write(const T& object) const {
+    const T standard{};
+    Json written = Json::object();
+    for (const Field<T>& row : rows_) {
+      const auto& say = row.value.write ? row.value.write : row.value.show;
+      if (row.name.empty() || !say) continue;
+      Json value = say(object);
+      const bool may_lack = !row.value.write && row.missing.empty();
+      if (value.is_null() || (may_lack && value == say(standard))) continue;
+      written[row.name] = std::move(value);
+    }
+    return written;
+  }
+
+  /// Return the object's own schema, and a named reference to it.
+  Json OwnSchema() const {
+    const T standard{};
+    std::vector<FieldSchema> fields;
+    for (const Field<T>& row : rows_) {
+      fields.push_back({row.name, row.value.schema, row.sentence, !row.missing.empty(),
+                        row.value.show ? row.value.show(standard) : Json()});
+    }
+    return ObjectSchema(sentence_, fields);
+  }
+  Json Schema() const { return Named(name_, OwnSchema()); }
+
+ private:
+  std::string name_, sentence_;
+  std::vector<Field<T>> rows_;
+  NameList keys_;
+};
+
+/// Returns a value with its own reader, a function of the node and a T, and optionally a writer.
+template <class T>
+FieldValue<T> By(Json schema, void (*read)(const JsonNode&, T&),
+                 Json (*write)(const T&) = nullptr) {
+  return {std::move(schema), read, nullptr, write};
+}
+
+/// Returns the constant word of an object's type; `what` names the object.
+template <class T>
+FieldValue<T> Constant(const std::string& word, const std::string& what = "") {
+  return {ChoiceSchema({word}), [=](const JsonNode& node, T&) { node.Choice({word}, what); },
+          nullptr, [word](const T&) { return Json(word); }};
+}
+
+template <class T>
+FieldValue<T> Number(double T::*member, Range range = {}) {
+  return {NumberSchema(range),
+          [=](const JsonNode& node, T& owner) { owner.*member = node.Number(range); },
+          [=](const T& owner) {
+            // out-of-range values are sentinels and are written as null
+            return range.Contains(owner.*member) ? Json(owner.*member) : Json();
+          }};
+}
+
+template <class T, std::integral Int>
+FieldValue<T> Integer(Int T::*member, std::int64_t min, std::int64_t max) {
+  return {IntegerSchema(min, max),
+          [=](const JsonNode& node, T& owner) {
+            owner.*member = static_cast<Int>(node.Integer(min, max));
+          },
+          [=](const T& owner) { return Json(owner.*member); }};
+}
+
+template <class T>
+FieldValue<T> Bool(bool T::*member) {
+  return {BoolSchema(), [=](const JsonNode& node, T& owner) { owner.*member = node.Bool(); },
+          [=](const T& owner) { return Json(owner.*member); }};
+}
+
+template <class T>
+FieldValue<T> Text(std::string T::*member) {
+  return {TextSchema(), [=](const JsonNode& node, T& owner) { owner.*member = node.Text(); },
+          nullptr,
+          [=](const T& owner) { return (owner.*member).empty() ? Json() : Json(owner.*member); }};
+}
+
+/// Returns a choice among names; `what` names the object. The member is the name, or an enum or
+/// bool with the name's index as its value.
+template <class T, class Chosen>
+FieldValue<T> Choice(Chosen T::*member, const NameList& names, std::string what) {
+  return {ChoiceSchema(names.all()),
+          [=](const JsonNode& node, T& owner) {
+            const auto index = node.Choice(names, what);
+            if (!index) return;
+            if constexpr (std::same_as<Chosen, std::string>) {
+              owner.*member = names.all()[static_cast<std::size_t>(*index)];
+            } else {
+              owner.*member = static_cast<Chosen>(*index);
+            }
+          },
+          [=](const T& owner) {
+            if constexpr (std::same_as<Chosen, std::string>) {
+              return (owner.*member).empty() ? Json() : Json(owner.*member);
+            } else {
+              return Json(names.all()[static_cast<std::size_t>(owner.*member)]);
+            }
+          }};
+}
+
+/// Returns one or several different names of enum values, which are the indices of the names.
+template <class T, class Enum>
+FieldValue<T> Choices(std::vector<Enum> T::*member, const NameList& names, std::string what) {
+  return {OneOrMoreSchema(ChoiceSchema(names.all()), true),
+          [=](const JsonNode& node, T& owner) {
+            (owner.*member).clear();
+            for (const std::size_t index : node.Choices(names, what)) {
+              (owner.*member).push_back(static_cast<Enum>(index));
+            }
+          },
+          [=](const T& owner) {
+            const bool one = (owner.*member).size() == 1;
+            return one ? Json(names.all()[static_cast<std::size_t>((owner.*member)[0])]) : Json();
+          }};
+}
+
+/// Returns one number, several numbers or a range.
+template <class T>
+FieldValue<T> NumberList(std::vector<double> T::*member, Range range = {}) {
+  return {NumberListSchema(range),
+          [=](const JsonNode& node, T& owner) { owner.*member = node.NumberList(range); }};
+}
+
+template <class T>
+FieldValue<T> IntegerList(std::vector<std::int64_t> T::*member, std::int64_t min,
+                          std::int64_t max) {
+  return {IntegerListSchema(min, max),
+          [=](const JsonNode& node, T& owner) { owner.*member = node.IntegerList(min, max); }};
+}
+
+template <class T, class Part>
+FieldValue<T> Object(Part T::*member, const Fields<Part>& fields) {
+  return {fields.Schema(), [member, &fields](const JsonNode& node, T& owner) {
+            fields.Read(node, &(owner.*member));
+          }};
+}
+
+/// Returns an object whose fields are members of the same struct.
+template <class T>
+FieldValue<T> Section(const Fields<T>& fields) {
+  return {fields.Schema(), [&fields](const JsonNode& node, T& owner) { fields.Read(node, &owner); },
+          nullptr,
+          [&fields](const T& owner) {
+            Json section = fields.Write(owner);
+            return section.empty() ? Json() : section;
+          }};
+}
+
+/// Returns an array of objects; `what` names them.
+template <class T, class Part>
+FieldValue<T> ObjectList(std::vector<Part> T::*member, const Fields<Part>& fields,
+                         std::string what) {
+  return {ArraySchema(fields.Schema()), [=, &fields](const JsonNode& node, T& owner) {
+            for (const JsonNode& element : node.Elements(what)) {
+              fields.Read(element, &(owner.*member).emplace_back());
+            }
+          }};
+}
+
+// Top level of each kind of file: its keys, and the error for a file of another kind.
+//
+// Internal to harness/config (see json_document.h).
+
+/// Returns true if `root` is an object that may be of this kind. Reports all errors: not an object,
+/// a document with more keys of another kind ("found a mechanism (it has "bodies"), expected an
+/// experiment"), another format, otherwise every unknown key, and a "$schema" that is not a string.
+/// "$schema" is allowed in every kind, for editors only.
+bool ExpectDocument(const JsonNode& root, FileKind kind);
+
+/// Returns the common rows of all kinds, followed by `own`.
+template <class T>
+std::vector<Field<T>> DocumentRows(std::vector<Field<T>> own) {
+  std::vector<Field<T>> rows = {
+      {"$schema", TextSchema(), "Address of this schema, for editors."},
+      {"format", IntegerSchema(kFileFormat, kFileFormat),
+       "Version of the file format. Files of other versions are rejected."}};
+  rows.insert(rows.end(), std::make_move_iterator(own.begin()), std::make_move_iterator(own.end()));
+  return rows;
+}
+
+}  // namespace loopbench::harness

@@ -1,0 +1,406 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <string_view>
+
+#include "harness/base/record.h"
+#include "harness/base/store.h"
+#include "harness/base/text.h"
+
+namespace loopbench::harness {
+namespace {
+
+/// Returns the end of a large file, from the beginning of a line: the last megabyte, or the last
+/// two lines if these are longer.
+std::string LastLines(const std::filesystem::path& file, std::uintmax_t size) {
+  std::ifstream in(file, std::ios::binary);
+  for (std::uintmax_t length = 1 << 20;; length *= 4) {
+    const std::uintmax_t taken = std::min(length, size);
+    std::string text(static_cast<std::size_t>(taken), '\0');
+    in.seekg(static_cast<std::streamoff>(size - taken));
+    in.read(text.data(), static_cast<std::streamsize>(text.size()));
+    if (!in) FailOn("read", file);
+    const std::size_t begin = text.find('\n');
+    if (taken == size) return text;
+    if (begin != std::string::npos && text.find('\n', begin + 1) != std::string::npos) {
+      return text.substr(begin + 1);
+    }
+  }
+}
+
+/// Counts line ends among the first bytes of a file.
+int CountLines(const std::filesystem::path& file, std::uintmax_t bytes) {
+  std::ifstream in(file, std::ios::binary);
+  std::string block(std::size_t{4} << 20, '\0');
+  std::ptrdiff_t lines = 0;
+  while (bytes > 0) {
+    block.resize(static_cast<std::size_t>(std::min<std::uintmax_t>(bytes, block.size())));
+    if (!in.read(block.data(), static_cast<std::streamsize>(block.size()))) FailOn("read", file);
+    lines += std::ranges::count(block, '\n');
+    bytes -= block.size();
+  }
+  return static_cast<int>(lines);
+}
+
+/// Feeds the end of a file. For an invalid line, the error names its line number in the file;
+/// earlier lines are counted only then.
+LineReader ReadEnd(const std::filesystem::path& file, const std::string& text,
+                   std::uintmax_t before) {
+  const auto feed = [&](int lines_before) {
+    LineReader lines(
+        file,
+        [&file](const Record& record, const LinePlace&) {
+          if (!record.Text("kind").empty()) return;
+          throw std::runtime_error(
+              fmt::format("{}: found a line without \"kind\", expected records", file.string()));
+        },
+        {}, lines_before);
+    lines.Feed(text);
+    lines.End();
+    if (lines.is_handmade()) {  // lines with a checksum will follow
+      throw std::runtime_error(fmt::format("{}: {}", file.string(), kWithoutChecksum));
+    }
+    return lines;
+  };
+  try {
+    return feed(0);
+  } catch (const std::runtime_error&) {
+    if (before == 0) throw;
+  }
+  return feed(CountLines(file, before));
+}
+
+/// Completes the last line: adds a line end to a complete record, removes a torn one. Leaves a file
+/// that is no store unchanged.
+void MendLastLine(const std::filesystem::path& file, int descriptor) {
+  const std::uintmax_t size = std::filesystem::file_size(file);
+  const std::string text = IsLarge(file) ? LastLines(file, size) : ReadFile(file);
+  const LineReader lines = [&] {
+    try {
+      return ReadEnd(file, text, size - text.size());
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(
+          fmt::format("{}\n'{}' is no store, or a damaged one: nothing was changed", error.what(),
+                      file.string()));
+    }
+  }();
+  if (!lines.warning().empty()) {
+    const std::uintmax_t whole = size - (text.size() - lines.whole());
+    if (::ftruncate(descriptor, static_cast<off_t>(whole)) != 0) {
+      FailOn("mend the last line of", file);
+    }
+  } else if (!lines.is_ended()) {
+    WriteAll(descriptor, "\n", file);
+  }
+}
+
+}  // namespace
+
+std::filesystem::path StoreFile(const std::filesystem::path& path) {
+  return path.extension() == ".jsonl" ? path : path / "results.jsonl";
+}
+
+bool IsLarge(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kLarge = 32u << 20;
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  return !error && size >= kLarge;
+}
+
+ResultStore::ResultStore(const std::filesystem::path& path, bool waits) : file_(StoreFile(path)) {
+  MakeFolderOf(file_);
+  descriptor_ = OpenLocked(file_, waits);
+  try {
+    MendLastLine(file_, descriptor_);
+    SyncFolderOf(file_);
+  } catch (...) {
+    ::close(descriptor_);
+    throw;
+  }
+}
+
+ResultStore::~ResultStore() { LeaveToParent(); }
+
+void ResultStore::LeaveToParent() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = -1;
+}
+
+void ResultStore::Append(const std::vector<Record>& records) {
+  std::string text;
+  for (const Record& record : records) text += ToJsonLine(record) + '\n';
+  const std::lock_guard lock(mutex_);
+  if (!IsStillNamed(descriptor_, file_)) {
+    throw std::runtime_error(fmt::format(
+        "'{}' was removed or replaced while this run was writing to it; give the command again",
+        file_.string()));
+  }
+  const off_t before = ::lseek(descriptor_, 0, SEEK_END);
+  try {
+    WriteAll(descriptor_, text, file_);
+    if (::fsync(descriptor_) != 0) FailOn("write to the disk", file_);
+    appended_ += records.size();
+  } catch (...) {
+    // partial lines are removed: the next run finds complete records only
+    [[maybe_unused]] const int failed = ::ftruncate(descriptor_, before);
+    throw;
+  }
+}
+
+std::vector<Record> LatestRecords(const std::vector<Record>& records, std::string_view version) {
+  std::vector<Record> latest;
+  std::map<std::string, std::size_t> place;
+  for (const Record& record : records) {
+    const std::string id = record.Text("case_id");
+    const auto [at, is_new] = place.try_emplace(id, latest.size());
+    if (id.empty() || is_new) {
+      latest.push_back(record);
+      continue;
+    }
+    Record& known = latest[at->second];
+    const bool is_known_preferred = !version.empty() && known.Text("version") == version;
+    if (!is_known_preferred || record.Text("version") == version) known = record;
+  }
+  return WithContents(std::move(latest));
+}
+
+namespace {
+
+/// Returns conditions on parameters, each with the text before its value in a line.
+std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& where) {
+  std::vector<std::pair<std::string, Condition>> conditions;
+  for (const Condition& condition : where) {
+    const bool is_plain = condition.key.find_first_of("\"\\") == std::string::npos;
+    if (FindMeasure(condition.key) != nullptr || !is_plain) continue;
+    conditions.push_back({"\"" + condition.key + "\":", condition});
+  }
+  return conditions;
+}
+
+/// Keys of conditions that no record so far has, in the form that conditions use.
+class Missing {
+ public:
+  explicit Missing(const Selection& where) {
+    for (const Condition& condition : where) {
+      const bool is_ordered =
+          condition.op != Operator::kEqual && condition.op != Operator::kUnequal;
+      keys_.push_back({condition.key, "\"" + condition.key + "\":", is_ordered});
+    }
+  }
+
+  bool MayBeIn(std::string_view line) const {
+    return std::ranges::any_of(keys_, [line](const Key& key) {
+      const std::size_t at = line.find(key.before);
+      return at != std::string_view::npos &&
+             !(key.is_ordered && line.substr(at + key.before.size()).starts_with("null"));
+    });
+  }
+
+  void Look(const Record& record) {
+    std::erase_if(keys_, [&record](const Key& key) {
+      return key.is_ordered ? !std::isnan(record.Number(key.name))
+                            : record.Find(key.name) != nullptr;
+    });
+  }
+
+ private:
+  struct Key {
+    std::string name, before;
+    bool is_ordered;  ///< true if a number is required
+  };
+  std::vector<Key> keys_;
+};
+
+/// Returns true if a number among the case keys excludes the record.
+bool IsExcluded(std::string_view line,
+                const std::vector<std::pair<std::string, Condition>>& conditions) {
+  const std::string_view keys = line.substr(0, line.find("\"case_id\":"));
+  for (const auto& [before, condition] : conditions) {
+    const std::size_t at = keys.find(before);
+    if (at == std::string_view::npos) continue;
+    double value = 0.0;
+    const char* begin = keys.data() + at + before.size();
+    const auto [end, fault] = std::from_chars(begin, keys.data() + keys.size(), value);
+    if (fault != std::errc() || end == keys.data() + keys.size() || *end != ',') continue;
+    Record record;
+    record.Set(condition.key, value);
+    if (!Matches(record, {condition})) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool ChoosesLines(const Selection& where) { return !OnParameters(where).empty(); }
+
+LineReader::Wanted LinesThatMayMatch(const Selection& where) {
+  return [conditions = OnParameters(where)](std::string_view line, const LinePlace&) {
+    return !IsExcluded(line, conditions);
+  };
+}
+
+std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
+                                std::vector<std::string>* warnings, const ReadWatch& watch) {
+  if (!ChoosesLines(where) || !IsLarge(StoreFile(path))) return ReadRecords(path, warnings);
+  const LineReader::Wanted may_match = LinesThatMayMatch(where);
+  std::vector<Record> records;
+  std::uint64_t bytes = 0;
+  Missing missing(where);
+  ForEachRecord(
+      path,
+      [&](Record record, const LinePlace& place) {
+        missing.Look(record);
+        records.push_back(std::move(record));
+        bytes += place.length;
+        if (watch) watch(records.size(), bytes);
+      },
+      warnings,
+      [&](std::string_view line, const LinePlace& place) {
+        return records.empty() || may_match(line, place) || missing.MayBeIn(line);
+      });
+  return records;
+}
+
+std::vector<Record> ReadRecords(const std::filesystem::path& path,
+                                std::vector<std::string>* warnings) {
+  std::vector<Record> records;
+  ForEachRecord(
+      path, [&records](Record record, const LinePlace&) { records.push_back(std::move(record)); },
+      warnings);
+  return records;
+}
+namespace {
+
+/// Returns the keys of a case: all keys before its case_id.
+Record KeysBeforeId(const Record& record) {
+  Record keys;
+  for (const auto& [key, value] : record.items()) {
+    if (key == "case_id") break;
+    keys.Set(key, value);
+  }
+  return keys;
+}
+
+/// Cases with equal keys.
+struct Namesakes {
+  std::set<std::string> case_ids;
+  bool has_set = false;
+};
+
+Record ToldApart(const Record& record, const Namesakes& namesakes) {
+  Record told = KeysBeforeId(record);
+  told.Set("config_hash", record.Text("config_hash"));
+  if (namesakes.has_set) told.Set("set", record.Text("set"));
+  for (const auto& [key, value] : record.items()) told.Set(key, value);
+  return told;
+}
+
+}  // namespace
+
+std::vector<Record> WithContents(std::vector<Record> records) {
+  std::map<std::string, Namesakes> all;
+  std::vector<std::string> names;
+  for (const Record& record : records) {
+    const std::string case_id = record.Text("case_id");
+    names.push_back(case_id.empty() ? "" : ToJsonLine(KeysBeforeId(record)));
+    if (case_id.empty()) continue;
+    Namesakes& namesakes = all[names.back()];
+    namesakes.case_ids.insert(case_id);
+    namesakes.has_set = namesakes.has_set || !record.Text("set").empty();
+  }
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (names[i].empty() || all[names[i]].case_ids.size() == 1) continue;
+    records[i] = ToldApart(records[i], all[names[i]]);
+  }
+  return records;
+}
+
+void ShareContents(std::vector<Record>* one, std::vector<Record>* other) {
+  std::map<std::string, Namesakes> told;
+  for (const std::vector<Record>* records : {one, other}) {
+    for (const Record& record : *records) {
+      Record bare;
+      const Record keys = KeysBeforeId(record);
+      for (const auto& [key, value] : keys.items()) {
+        if (key != "config_hash" && key != "set") bare.Set(key, value);
+      }
+      if (keys.Find("config_hash") == nullptr) continue;
+      told[ToJsonLine(bare)].has_set = keys.Find("set") != nullptr;
+    }
+  }
+  for (std::vector<Record>* records : {one, other}) {
+    for (Record& record : *records) {
+      const auto namesakes = told.find(ToJsonLine(KeysBeforeId(record)));
+      if (namesakes != told.end()) record = ToldApart(record, namesakes->second);
+    }
+  }
+}
+
+void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,
+                       std::string_view command) {
+  const auto told = std::ranges::find_if(records, [](const Record& record) {
+    // references of a sweep differ only in content, and no judgement uses them
+    return record.Text("kind") != "reference" &&
+           KeysBeforeId(record).Find("config_hash") != nullptr;
+  });
+  if (told == records.end()) return;
+  throw std::runtime_error(fmt::format(
+      "{}: found {} {} more than once, run with different mechanisms, limits or ensembles; {} "
+      "expected each case once: run them into stores of their own (--out)",
+      store.string(), told->Text("mechanism"), told->Text("formulation"), command));
+}
+namespace {
+
+/// Converts the sixteen digits to a number.
+std::optional<std::uint64_t> NumberOfId(std::string_view id) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number, 16);
+  const bool is_whole = error == std::errc() && end == id.data() + id.size() && id.size() == 16;
+  return is_whole ? std::optional(number) : std::nullopt;
+}
+
+}  // namespace
+
+std::string_view TextUnder(std::string_view quoted_key, std::string_view line) {
+  const std::size_t key = line.find(quoted_key);
+  if (key == std::string_view::npos) return {};
+  const std::size_t begin = key + quoted_key.size(), end = line.find('"', begin);
+  return end == std::string_view::npos ? std::string_view() : line.substr(begin, end - begin);
+}
+
+std::optional<bool> FinishedRuns::Find(const std::string& id) {
+  if (!is_read_) Read();
+  is_read_ = true;
+  const auto number = NumberOfId(id);
+  const auto run = number ? finished_.find(*number) : finished_.end();
+  return run == finished_.end() ? std::nullopt : std::optional(run->second);
+}
+
+void FinishedRuns::Read() {
+  const std::filesystem::path file = StoreFile(path_);
+  if (!IsLarge(file)) {
+    for (const Record& record : ReadRecords(path_)) {
+      if (const auto id = NumberOfId(record.Text("id"))) {
+        finished_[*id] = record.Text("outcome") == "finished";
+      }
+    }
+    return;
+  }
+  std::ifstream lines(file, std::ios::binary);
+  std::string line;
+  while (std::getline(lines, line)) {
+    if (const auto id = NumberOfId(TextUnder("\"id\":\"", line))) {
+      finished_[*id] = TextUnder("\"outcome\":\"", line) == "finished";
+    }
+  }
+  if (lines.bad()) FailOn("read", file);
+}
+
+}  // namespace loopbench::harness

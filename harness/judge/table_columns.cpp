@@ -1,0 +1,326 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <ranges>
+#include <utility>
+
+#include "harness/base/text.h"
+#include "harness/judge/tables.h"
+#include "mechanism/formulation/options.h"
+
+namespace loopbench::harness {
+namespace {
+
+using std::string_view;
+
+TableColumn Of(const Measure& measure, string_view key) {
+  const auto& [words, unit, format] = measure.heading;
+  const string_view shown = words == "*" ? key.substr(measure.key.size() - 1) : words;
+  const std::string brackets = unit.empty() ? "" : fmt::format(" [{}]", unit);
+  return {std::string(key), std::string(shown) + brackets, format, {}};
+}
+
+using Abbreviations = std::vector<std::pair<std::string, std::string>>;
+
+/// Column of a narrow table: another heading, and shorter words for values.
+struct ShortColumn {
+  string_view key, header;
+  Abbreviations abbreviations = {};
+};
+
+Abbreviations AbbreviatedLevels() {
+  Abbreviations pairs;
+  for (const LevelTraits& level : Levels()) pairs.emplace_back(level.name, level.abbreviation);
+  return pairs;
+}
+
+/// Other columns of narrow tables have their key as heading.
+const std::vector<ShortColumn>& ShortColumns() {
+  static const Abbreviations kParts = {{"truncation", "trunc"}, {"round-off", "round"}};
+  static const std::vector<ShortColumn> kColumns = {
+      {"formulation", "form."},
+      {"enforcement", "enf.", AbbreviatedLevels()},
+      {"coordinates", "coord", {{"absolute", "abs"}}},
+      {"solver", "fact.", {{"rank-revealing", "r-rev"}}},
+      {"horizon", "T/s"},
+      {"outcome",
+       "outcome",
+       {{"finished", "ok"},
+        {"step-too-small", "small step"},
+        {"inconsistent-start", "bad start"},
+        {"inconsistent-motion", "bad motion"},
+        {"newton-failure", "newton"},
+        {"integrator-error", "integrator"}}},
+      {"drift_position_max", "drift [m]"},
+      {"energy_error_max", "dE [J]"},
+      {"growth_exponent", "t^p"},
+      {"rhs_ns_median", "rhs [ns]"},
+      {"wall_s_median", "wall [s]"},
+      {"error_final", "error [m]"},
+      {"error_dominated_by", "by", kParts},
+      {"drift_dominated_by", "by", kParts},
+      {"model_error", "model error [m]"},
+      {"rhs_evaluations", "rhs"},
+      {"model_rhs_ratio", "of full"},
+      {"wall_s", "wall [s]"},
+      {"model_wall_ratio", "of full"},
+      {"model_verdict", "verdict"},
+      {"reference_valid_until", "valid until [s]"},
+      {"reference_error", "to [m]"},
+      {"cpu_s", "CPU [s]"},
+      {"message", "why no further"}};
+  return kColumns;
+}
+
+/// Returns the column of a narrow table. "key+" is dropped later than columns that identify rows,
+/// "key-" earlier than others.
+TableColumn CompactColumn(string_view word) {
+  constexpr int kAnswer = 2;
+  const int importance = word.ends_with('+') ? kAnswer : word.ends_with('-') ? -1 : 0;
+  if (importance != 0) word.remove_suffix(1);
+  const auto known = std::ranges::find(ShortColumns(), word, &ShortColumn::key);
+  const bool is_known = known != ShortColumns().end();
+  return {std::string(word), std::string(is_known ? known->header : word),
+          FindMeasure(word)->heading.format, is_known ? known->abbreviations : Abbreviations(),
+          importance};
+}
+
+/// Returns columns of measures that a program has added and that have words.
+std::vector<TableColumn> AddedColumns() {
+  std::vector<TableColumn> columns;
+  for (const Measure* measure : AddedMeasures()) {
+    const bool single = measure->type != ValueType::kNumbers && !measure->key.ends_with('*');
+    if (single && !measure->heading.words.empty()) columns.push_back(Of(*measure, measure->key));
+  }
+  return columns;
+}
+
+constexpr string_view kCase =
+    "experiment mechanism formulation enforcement coordinates solver integrator rtol atol horizon "
+    "outcome t_reached";
+constexpr string_view kCompactCase =
+    "mechanism formulation enforcement coordinates solver rtol horizon outcome";
+
+}  // namespace
+
+const std::vector<KindOfTable>& KindsOfTables() {
+  static const std::vector<KindOfTable> kKinds = {
+      {"drift", "accuracy", "Drift",
+       "CASE warnings agreement drift_position_max drift_rotation_max drift_velocity_max "
+       "drift_acceleration_max loop_closure_max correction_max worst_loop energy_error_max "
+       "growth_exponent growth_spread growth_regime growth_resolved growth_hypothesis "
+       "growth_hypothesis_resolved ensemble steps rejected rhs_evaluations rank_min rcond_min "
+       "state_hash restarts branch_error_max closed_form_error_max message ADDED",
+       "CASE drift_position_max+ energy_error_max growth_exponent"},
+      {"precision", "precision", "Precision",
+       "experiment mechanism formulation enforcement coordinates solver integrator scalar rtol "
+       "atol horizon outcome t_reached error_final error_dominated_by drift_position_max "
+       "drift_dominated_by steps rejected restarts rhs_evaluations",
+       "mechanism formulation enforcement coordinates scalar rtol outcome error_final+ "
+       "error_dominated_by drift_position_max drift_dominated_by steps"},
+      {"models", "model", "Models",
+       "mechanism model formulation enforcement coordinates integrator rtol horizon outcome "
+       "model_motion bodies joints model_error model_error_at reference_error "
+       "reference_valid_until model_accepts model_verdict error_position_max rhs_evaluations "
+       "model_rhs_ratio wall_s model_wall_ratio noise",
+       "mechanism model bodies model_error rhs_evaluations model_rhs_ratio wall_s "
+       "model_wall_ratio model_verdict"},
+      {"timing", "timing", "Timing",
+       "CASE bodies joints loops dof rhs_ns_median rhs_ns_p10 rhs_ns_p90 ns_per_body "
+       "step_us_median wall_s_median realtime_factor repeats rhs_ns_min wall_s_min wall_s_p10 "
+       "wall_s_p90 aa_spread aa_spread_wall calibration_ns calibration_wall_ns "
+       "discarded_repetitions load1 processors governor noise",
+       "CASE bodies- rhs_ns_median+ wall_s_median"},
+      {"references", "reference", "References",
+       "experiment mechanism horizon outcome reference reference_valid_until reference_error "
+       "reference_runs cpu_s rhs_evaluations message",
+       "mechanism horizon outcome reference reference_valid_until+ reference_error+ cpu_s "
+       "message"}};
+  return kKinds;
+}
+
+std::vector<TableColumn> ColumnsOfKind(string_view name, bool compact) {
+  const auto known = std::ranges::find(KindsOfTables(), name, &KindOfTable::name);
+  const KindOfTable& kind = known == KindsOfTables().end() ? KindsOfTables().front() : *known;
+  std::string words(compact ? kind.compact : kind.columns);
+  if (words.starts_with("CASE")) words.replace(0, 4, compact ? kCompactCase : kCase);
+  std::vector<TableColumn> columns;
+  for (const auto part : std::views::split(words, ' ')) {
+    const string_view word(part.begin(), part.end());
+    if (word == "ADDED") {
+      for (TableColumn& column : AddedColumns()) columns.push_back(std::move(column));
+    } else {
+      columns.push_back(compact ? CompactColumn(word) : Of(*FindMeasure(word), word));
+    }
+  }
+  return columns;
+}
+
+std::optional<TableColumn> KnownColumn(string_view key) {
+  const Measure* measure = FindMeasure(key);
+  if (measure == nullptr || measure->heading.words.empty()) return std::nullopt;
+  return Of(*measure, key);
+}
+
+std::optional<TableColumn> CompactCaseColumn(string_view key) {
+  for (const auto part : std::views::split(kCompactCase, ' ')) {
+    if (string_view(part.begin(), part.end()) == key) return CompactColumn(key);
+  }
+  return std::nullopt;
+}
+
+// Columns for arbitrary record keys.
+
+namespace {
+
+using enum Format;
+
+// Returns true for keys of per-loop and per-body values, which are no parameters.
+bool IsFamily(const std::string& key) {
+  return key.starts_with("series.") || key.starts_with("drift.loop.");
+}
+
+// Returns true if tables contain this exact key, not only its family. A fixed step is a key only of
+// cases that have one, like a parameter: no table always has its column.
+bool HasColumn(const std::string& key) {
+  if (key == "step") return false;
+  const Measure* measure = FindMeasure(key);
+  return measure != nullptr && measure->key == key && !measure->heading.words.empty();
+}
+
+// Returns the format of a value without a column of its own, by its type.
+Format FormatOf(const std::string& key, std::span<const Record> rows) {
+  for (const Record& row : rows) {
+    const Value* value = row.Find(key);
+    if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
+    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
+    if (std::holds_alternative<double>(*value)) return kShortest;
+    return kText;
+  }
+  return kText;
+}
+
+bool IsShown(const std::vector<TableColumn>& columns, const std::string& key) {
+  return std::ranges::find(columns, key, &TableColumn::key) != columns.end();
+}
+
+void InsertBeforeOutcome(std::vector<TableColumn>* columns, TableColumn column) {
+  columns->insert(std::ranges::find(*columns, "outcome", &TableColumn::key), std::move(column));
+}
+
+}  // namespace
+
+TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
+  if (std::optional<TableColumn> known = KnownColumn(key)) return *std::move(known);
+  return {.key = key, .header = key, .format = FormatOf(key, rows), .abbreviations = {}};
+}
+
+std::string UnitOf(const TableColumn& column) {
+  const std::size_t open = column.header.rfind('[');
+  if (open == std::string::npos || column.header.back() != ']') return "";
+  return column.header.substr(open + 1, column.header.size() - open - 2);
+}
+
+std::string WithUnit(const std::string& words, const std::string& key) {
+  const std::string unit = UnitOf(ColumnOf(key, {}));
+  return unit.empty() ? words : fmt::format("{} [{}]", words, unit);
+}
+
+std::vector<std::string> KeysOf(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
+  std::vector<std::string> keys;
+  for (const Record& row : rows) {
+    for (const auto& [key, value] : row.items()) {
+      if (key == "case_id" || key == "outcome") break;
+      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+    }
+  }
+  return keys;
+}
+
+bool AtolFollowsRtol(std::span<const Record> rows) {
+  return std::ranges::all_of(
+      rows, [](const Record& row) { return row.Text("atol") == row.Text("rtol"); });
+}
+
+void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
+  const std::vector<std::string> keys = KeysOf(rows);
+  // a column of the tables may be empty in every record
+  if (std::ranges::find(keys, key) != keys.end() || HasColumn(key)) return;
+  std::vector<std::string> scalars;
+  std::ranges::copy_if(keys, std::back_inserter(scalars),
+                       [](const std::string& known) { return !IsFamily(known); });
+  const std::string nearest = NearestSpelling(key, keys);
+  const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
+  throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
+                                option, key, cure, fmt::join(scalars, ", ")));
+}
+
+void RequireConditions(const std::string& option, const Selection& selection,
+                       std::span<const Record> rows) {
+  for (const Condition& condition : selection) {
+    RequireKey(option, condition.key, rows);
+    if (condition.op == Operator::kEqual || condition.op == Operator::kUnequal) {
+      continue;
+    }
+    std::string text;  // text of a record instead of a number
+    const bool has_number = std::ranges::any_of(rows, [&](const Record& row) {
+      if (text.empty()) text = row.Text(condition.key);
+      return !std::isnan(row.Number(condition.key));
+    });
+    if (has_number || text.empty()) continue;
+    throw ConfigError(
+        fmt::format("{} {}: found \"{}\" in records, expected a key of numbers behind "
+                    "which {} may stand",
+                    option, ToText({condition}), text, ToString(condition.op)));
+  }
+}
+
+std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
+                                        std::span<const Record> rows) {
+  for (const std::string& key : CaseKeysOf(rows)) {
+    if (!HasColumn(key)) InsertBeforeOutcome(&columns, ColumnOf(key, rows));
+  }
+  return columns;
+}
+
+std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
+                                      std::span<const Record> rows) {
+  std::vector<std::string> looks(rows.size());
+  const auto show = [&](const std::string& key) {
+    for (std::size_t i = 0; i < rows.size(); ++i) looks[i] += rows[i].Text(key) + '\n';
+  };
+  const std::vector<std::string> keys = CaseKeysOf(rows);
+  for (const std::string& key : keys) {
+    if (IsShown(columns, key)) show(key);
+  }
+  for (const std::string& key : keys) {
+    if (IsShown(columns, key)) continue;
+    std::map<std::string, std::string> values;  // of the first row with this appearance
+    const bool tells = [&] {
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const auto [first, is_new] = values.try_emplace(looks[i], rows[i].Text(key));
+        if (!is_new && first->second != rows[i].Text(key)) return true;
+      }
+      return false;
+    }();
+    if (!tells) continue;
+    InsertBeforeOutcome(&columns, CompactCaseColumn(key).value_or(ColumnOf(key, rows)));
+    show(key);
+  }
+  return columns;
+}
+
+}  // namespace loopbench::harness

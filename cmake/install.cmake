@@ -58,7 +58,7 @@ install(FILES ${shell_files}/loopbench.fish DESTINATION ${CMAKE_INSTALL_DATADIR}
 # Headers that need what is private here (JSON, SUNDIALS, CLI11) stay here.
 install(DIRECTORY mechanism ${LOOPBENCH_FORMULATIONS} harness
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench FILES_MATCHING PATTERN "*.h"
-  REGEX "/(base/(json_|fields|numeric_option)|integrator/arkode_|config/.*_sections\\.h|\
+  REGEX "/(base/(json_|fields|numeric_option)|config/.*_sections\\.h|\
 [a-z]+/[a-z]+_schemas|cli/command_line|exchange/(xml_|import_))" EXCLUDE)
 if(TARGET loopbench_contract)
   install(FILES tests/contract/check.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbench/tests/contract)

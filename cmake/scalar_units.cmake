@@ -1,12 +1,12 @@
 # Mechanism and formulations compiled for one more scalar: one source per group, with `prologue` before
 # it. Some sources share a translation unit for a short build, but all together would take gigabytes.
-# Appends the sources to the list `result`; further arguments are further groups.
+# Appends the sources to the list `result`.
 function(loopbench_add_scalar_units result name prologue)
   set(sources ${${result}})
-  foreach(group ${ARGN}
-    "drives force_elements forces joint joint_planar kinematics mechanism time_function joint_directions joint_measures \
-self_stress body_equations tree_dynamics odca sweep"
-    "constraint_solver coupled_solver factored_state level* passage system* null_space dense_reduction dense_equations \
+  foreach(group
+    "drives forces joint kinematics mechanism time_function self_stress \
+ body_equations tree_dynamics odca sweep"
+    "coupled_solver factored_state level* passage system* null_space dense_reduction dense_equations \
 lagrange"
     "factors"
     "loop_solver direction_weights singular_values symmetric_eigen partition")

@@ -2,8 +2,8 @@
 
 #include <type_traits>
 
+#include "mechanism/algebra/dense_memory.h"
 #include "mechanism/algebra/instantiate.h"
-#include "mechanism/model/dense_memory.h"
 
 namespace loopbench::lagrange {
 

@@ -87,10 +87,10 @@ class Closing {
   }
 
   /// Computes forces on both sides. Negative if the joint may be degenerate.
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   double Close(ClosingSide& P, ClosingSide& Q) const {
     return WithSize<double, 1, 2, 3, 4, 5, 6>(joint_.rows(), [&](auto rows) {
-      return CloseRows<kSought, std::max(1, kKnownSize<decltype(rows)>)>(P, Q);
+      return CloseRows<kUnknowns, std::max(1, kKnownSize<decltype(rows)>)>(P, Q);
     });
   }
 
@@ -116,23 +116,23 @@ class Closing {
   };
 
   /// Returns A_Q - A_P besides H udot, less its value without a force in the joint.
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   Acceleration<Spatial, double> Missing(const ClosingSide& P, const ClosingSide& Q) const {
-    if constexpr (kSought == Sought::kAccelerations) {
+    if constexpr (kUnknowns == Unknowns::kAccelerations) {
       const V3& w = V_P_.angular;
       const Acceleration<Spatial, double> g(w.cross(V_rel_.angular), 2.0 * w.cross(V_rel_.linear));
       auto A_P = from_P_.Of<AccelerationKind>(P.assembly.zeta23);
       A_P.linear += w.cross(w.cross(from_P_.e));
       return g + A_P - from_Q_.Of<AccelerationKind>(Q.assembly.zeta23);  // (7)
     } else {
-      const auto& V = kSought == Sought::kSpeeds ? V_rel_ : mismatch_;
+      const auto& V = kUnknowns == Unknowns::kSpeeds ? V_rel_ : mismatch_;
       return {-V.angular, -V.linear};
     }
   }
 
   /// X = D^T (S zeta S^T of both) D as (16), or one of them at Ground (33, 34). The least
   /// eigenvalue of X over X_alone is at least 1 / tr(X^-1 X_alone).
-  template <Sought kSought, int n>
+  template <Unknowns kUnknowns, int n>
   double CloseRows(ClosingSide& P, ClosingSide& Q) const {
     Factors<double, n> X = {};
     Symmetric<double, n> X_alone = {};
@@ -145,7 +145,7 @@ class Closing {
     }
     double slack = 1.0, phi[n], trace = 0.0;
     Factor(X, slack);
-    const Acceleration<Spatial, double> missing = Missing<kSought>(P, Q);
+    const Acceleration<Spatial, double> missing = Missing<kUnknowns>(P, Q);
     for (int a = 0; a < n; ++a) phi[a] = joint_.D(a).dot(missing);
     X.Forward(phi);
     X.Backward(phi);
@@ -246,7 +246,7 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     Link<double> link;
     ArmTip constants;
     GroundSide ground;  ///< as of Arm
-    double zeta13[kRows], zeta23[kAll], about1 = 0.0;
+    Free<double> free;
     arms::EndCut<double, kAll> cut;
     ClosingSide side;
   };
@@ -325,7 +325,7 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     return false;
   }
 
-  bool Place(Sought sought, std::span<const double> q, std::span<const double> u) override {
+  bool Place(Unknowns unknowns, std::span<const double> q, std::span<const double> u) override {
     ForParts<kPart>(index_.size(), [&](std::size_t first, std::size_t last) {
       for (std::size_t place = first; place < last; ++place) {
         angle_[place] = sign_[place] * q[index_[place]];
@@ -335,16 +335,16 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
                                                &sine_[first], &cosine_[first]);
     });
     if (std::ranges::find(in_range_, 0) != in_range_.end()) return false;
-    sought == Sought::kPositions ? Move<Sought::kPositions>()
-    : sought == Sought::kSpeeds  ? Move<Sought::kSpeeds>()
-                                 : Move<Sought::kAccelerations>();
+    unknowns == Unknowns::kPositions ? Move<Unknowns::kPositions>()
+    : unknowns == Unknowns::kSpeeds  ? Move<Unknowns::kSpeeds>()
+                                     : Move<Unknowns::kAccelerations>();
     return true;
   }
   Correction<double> LargestGap() const override { return largest_; }
-  bool Find(Sought sought) override {
-    const bool good = sought == Sought::kPositions ? Solve<Sought::kPositions>()
-                      : sought == Sought::kSpeeds  ? Solve<Sought::kSpeeds>()
-                                                   : Solve<Sought::kAccelerations>();
+  bool Find(Unknowns unknowns) override {
+    const bool good = unknowns == Unknowns::kPositions ? Solve<Unknowns::kPositions>()
+                      : unknowns == Unknowns::kSpeeds  ? Solve<Unknowns::kSpeeds>()
+                                                       : Solve<Unknowns::kAccelerations>();
     if (!good) return false;
     for (const Chain& arm : chains_) Finish(arm);
     operations_ += OperationsOfSweep();
@@ -362,24 +362,24 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
   }
   void AddToSpeeds() override {
     speed_ += rate_;
-    Move<Sought::kAccelerations>();
+    Move<Unknowns::kAccelerations>();
   }
 
-  /// Computes poses of bodies and violations of cut joints, of positions if these are sought.
-  template <Sought kSought>
+  /// Computes poses of bodies and violations of cut joints, of positions if these are unknowns.
+  template <Unknowns kUnknowns>
   void Move() {
-    if (closings_.empty()) return MoveFollowing<kSought, Follow::kSpeeds>();
-    MoveFollowing<kSought, Follow::kPoints>();
-    Correction<double>* largest = kSought == Sought::kPositions ? &(largest_ = {}) : nullptr;
+    if (closings_.empty()) return MoveFollowing<kUnknowns, Follow::kSpeeds>();
+    MoveFollowing<kUnknowns, Follow::kPoints>();
+    Correction<double>* largest = kUnknowns == Unknowns::kPositions ? &(largest_ = {}) : nullptr;
     for (PlacedClosing& at : closings_) {
       at.closing.Place(Side(at, at.tip_P), Side(at, at.tip_Q), largest);
     }
   }
-  template <Sought kSought, Follow kFollow>
+  template <Unknowns kUnknowns, Follow kFollow>
   void MoveFollowing() {
     constexpr Follow kInGroups = kFollow == Follow::kSpeeds ? Follow::kAxes : kFollow;
     pool_->ForEach(static_cast<int>(groups_.size()), [&](int g) { Travel<kInGroups>(groups_[g]); });
-    for (const Chain& arm : chains_) MoveEnds<kSought, kFollow>(arm);
+    for (const Chain& arm : chains_) MoveEnds<kUnknowns, kFollow>(arm);
   }
 
   /// Passages of the group's pieces.
@@ -394,7 +394,7 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
   }
 
   /// Computes the starts of pieces, free motions of single bodies, and the tip's pose and speed.
-  template <Sought kSought, Follow kFollow>
+  template <Unknowns kUnknowns, Follow kFollow>
   void MoveEnds(const Chain& arm) {
     Passage<double> along = NoPassage<double>();
     for (int piece = arm.first_piece; piece < arm.first_piece + arm.pieces; ++piece) {
@@ -406,18 +406,13 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
       const int place = packed_ + single;
       const Link<double>& link = singles_[single];
       const auto w = Pass<kFollow>(link.shape, turn(place), speed_[place], along);
-      FreeMotion<kSought>(link.shape, w, speed_[place], free_[single]);
+      FreeMotion<kUnknowns>(link.shape, w, speed_[place], free_[single]);
     }
     if (arm.tip < 0) return;
     TipState& tip = tips_[arm.tip];
     const int place = place_of_tip(arm.tip);
     const auto w = Pass<Follow::kPoints>(tip.link.shape, turn(place), speed_[place], along);
-    Free<double> free;
-    FreeMotion<kSought>(tip.link.shape, w, speed_[place], free);
-    std::ranges::copy(free.zeta13, tip.zeta13);
-    std::ranges::copy(free.zeta23, tip.zeta23);
-    tip.zeta23[kRows] = free.about2;
-    tip.about1 = free.about1;
+    FreeMotion<kUnknowns>(tip.link.shape, w, speed_[place], tip.free);
     tip.side.pose = Compose(tip.ground.pose, {along.R.transpose(), along.p});
     tip.side.V = {along.w, along.v};
   }
@@ -428,34 +423,34 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     along.w = group.w;
     return along;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   LOOPBENCH_INLINE Free<Lanes> FreeOf(int pack, Passage<Lanes>& along) {
     const Shape<Lanes>& shape = packs_[pack].shape;
     const Lanes speed = Load<Lanes>(&speed_[pack * kLanes]);
     const auto w = Pass<Follow::kSpeeds>(shape, turns(pack * kLanes), speed, along);
     Free<Lanes> free;
-    FreeMotion<kSought>(shape, w, speed, free);
-    about1_[pack] = free.about1;
-    about2_[pack] = free.about2;
+    FreeMotion<kUnknowns>(shape, w, speed, free);
+    about1_[pack] = free.zeta13[kRows];
+    about2_[pack] = free.zeta23[kRows];
     return free;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   Piece<Lanes>& First(Group& group, Passage<Lanes>& along) {
-    const Free<Lanes> free = FreeOf<kSought>(group.pack, along);
+    const Free<Lanes> free = FreeOf<kUnknowns>(group.pack, along);
     group.assemblies.response = packs_[group.pack].response;
-    std::ranges::copy(free.zeta13, group.assemblies.zeta13);
-    std::ranges::copy(free.zeta23, group.assemblies.zeta23);
+    std::copy_n(free.zeta13, kRows, group.assemblies.zeta13);
+    std::copy_n(free.zeta23, kRows, group.assemblies.zeta23);
     return group.assemblies;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Next(int pack, Passage<Lanes>& along, Piece<Lanes>& all, Lanes& slack) {
-    const Free<Lanes> free = FreeOf<kSought>(pack, along);
+    const Free<Lanes> free = FreeOf<kUnknowns>(pack, along);
     Join(all, turns(pack * kLanes), packs_[pack].response, free, cuts_[pack], slack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   OneHandle<double> Start(const Chain& arm) const {
     OneHandle<double> ground = {};
-    if (kSought == Sought::kAccelerations) std::ranges::copy(arm.ground, ground.zeta23);
+    if (kUnknowns == Unknowns::kAccelerations) std::ranges::copy(arm.ground, ground.zeta23);
     return ground;
   }
   void AttachPiece(int piece, bool /*is_first*/, OneHandle<double>& all, double& slack) {
@@ -463,35 +458,36 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     all = Join(all, turn(place_of_piece(piece)), next.response, next.zeta13, next.zeta23,
                end_cuts_[piece], slack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void AttachSingle(int single, bool /*is_first*/, OneHandle<double>& all, double& slack) {
     const Free<double>& free = free_[single];
     all = Join(all, turn(packed_ + single), singles_[single].response, free.zeta13, free.zeta23,
                end_cuts_[num_pieces_ + single], slack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   double End(const Chain& arm, const OneHandle<double>& all, double slack) {
     if (arm.tip < 0) return slack;
     TipState& tip = tips_[arm.tip];
-    tip.side.assembly = Join(all, turn(place_of_tip(arm.tip)), tip.constants.response, tip.zeta13,
-                             tip.zeta23, tip.cut, slack);
+    tip.side.assembly = Join(all, turn(place_of_tip(arm.tip)), tip.constants.response,
+                             tip.free.zeta13, tip.free.zeta23, tip.cut, slack);
     return slack;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   double Close(double slack) {
     for (PlacedClosing& at : closings_) {
-      slack = Min(slack, at.closing.Close<kSought>(Side(at, at.tip_P), Side(at, at.tip_Q)));
+      slack = Min(slack, at.closing.Close<kUnknowns>(Side(at, at.tip_P), Side(at, at.tip_Q)));
     }
     return slack;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   Force<double> EndForce(const Chain& arm) {
     if (arm.tip < 0) return {};
     const TipState& tip = tips_[arm.tip];
     const int place = place_of_tip(arm.tip);
     Force<double> F1;
     arms::ForceIn(tip.cut, tip.side.F2, F1.at);
-    rate_[place] = About(tip.about1, tip.link.about11, tip.constants.about12, F1.at, tip.side.F2);
+    rate_[place] =
+        About(tip.free.zeta13[kRows], tip.link.about11, tip.constants.about12, F1.at, tip.side.F2);
     return Opposite(place, F1);
   }
   Force<double> ForceIn(int node, bool /*is_first*/, const Force<double>& F2) const {
@@ -504,14 +500,14 @@ class ArmSweep final : public ChainSweep<ArmSweep, ArmKind, Spatial, double> {
     arms::ForceIn(cuts_[pack], packs_[pack].response.zeta12, F1.at, F2.at, force.at);
     return force;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void RespondSingle(int single, const Force<double>& F1, const Force<double>& F2) {
     const Link<double>& link = singles_[single];
     const Free<double>& free = free_[single];
-    rate_[packed_ + single] = About(free.about1, link.about11, link.about12, F1.at, F2.at);
-    end_about2_[single] = About(free.about2, link.about21, link.about22, F1.at, F2.at);
+    rate_[packed_ + single] = About(free.zeta13[kRows], link.about11, link.about12, F1.at, F2.at);
+    end_about2_[single] = About(free.zeta23[kRows], link.about21, link.about22, F1.at, F2.at);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Respond(Group& group, int pack, const Force<Lanes>& F1, const Force<Lanes>& F2) {
     const Link<Lanes>& link = packs_[pack];
     const Lanes about2 = About(about2_[pack], link.about21, link.about22, F1.at, F2.at);

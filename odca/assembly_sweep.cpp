@@ -7,16 +7,13 @@
 //   up, matrices                  zeta of each body, then X, W and zeta of each join
 //   up and down, vectors          zeta_i3, then forces: once, or twice where speeds are completed
 //
-// A handle is a joint side that is still open, with the two rows of a pin's D (two_handle.h). A
-// body has as many handles as pins, and Y (67) is a row of blocks of zeta. A tree pin on Ground is
-// a property of its body, not a joint of an assembly, as in two_handle.h.
+// Handles are those of two_handle.h; a body has as many as pins. A tree pin on Ground is a property
+// of its body, not a joint of an assembly. A join factors X = L D L^T, two rows of one pin at a
+// time. It keeps L and W = D^-1 L^-1 Y. The rank of a pin that closes a loop is uncertain under the
+// condition for paths: then the general sweep decides.
 //
 // Threads share the pieces of the plan. One thread goes along the spanning tree and through the
 // last piece. A rejection depends on the positions alone.
-//
-// A join factors X = L D L^T, two rows of one pin at a time. It keeps L and W = D^-1 L^-1 Y. The
-// rank of a pin that closes a loop is uncertain under the condition for paths: then the general
-// sweep decides.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -139,9 +136,9 @@ class AssemblySweep final : public ShortCut<Planar> {
 
   struct Layout;
 
-  bool Place(Sought sought, std::span<const double> q, std::span<const double> u) override {
+  bool Place(Unknowns unknowns, std::span<const double> q, std::span<const double> u) override {
     tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
-    return sought == Sought::kPositions ? Turn<false>() : Turn<true>();
+    return unknowns == Unknowns::kPositions ? Turn<false>() : Turn<true>();
   }
   Correction<double> LargestGap() const override {
     double largest = 0.0;
@@ -150,11 +147,11 @@ class AssemblySweep final : public ShortCut<Planar> {
     }
     return {.shift = std::sqrt(largest)};
   }
-  bool Find(Sought sought) override {
-    if (sought != Sought::kCompleted && !Assemble()) return false;
-    sought == Sought::kAccelerations ? Solve<Sought::kAccelerations>()
-    : sought == Sought::kCompleted   ? Solve<Sought::kCompleted>()
-                                     : Solve<Sought::kSpeeds>();
+  bool Find(Unknowns unknowns) override {
+    if (unknowns != Unknowns::kCompleted && !Assemble()) return false;
+    unknowns == Unknowns::kAccelerations ? Solve<Unknowns::kAccelerations>()
+    : unknowns == Unknowns::kCompleted   ? Solve<Unknowns::kCompleted>()
+                                         : Solve<Unknowns::kSpeeds>();
     return true;
   }
   bool AddChange(std::span<const double> base, std::span<double> sum) override {
@@ -366,7 +363,7 @@ class AssemblySweep final : public ShortCut<Planar> {
   }
 
   /// L^-1 (C b + c0) of all pins (68), b of the remaining handles, and s = D^-1 of the former (21).
-  template <Sought kSought, class Rows>
+  template <Unknowns kUnknowns, class Rows>
   LOOPBENCH_INLINE void Up(const Node& node, Rows rows) {
     const int n = rows;
     const Side* kept = kept_.data() + node.first_kept;
@@ -377,8 +374,8 @@ class AssemblySweep final : public ShortCut<Planar> {
       Vector sum = {0.0, 0.0};
       if (pin.cut >= 0) {
         const CutJoint& cut = cuts_[pin.cut];
-        if constexpr (kSought == Sought::kSpeeds) sum = cut.v;
-        if constexpr (kSought == Sought::kAccelerations)
+        if constexpr (kUnknowns == Unknowns::kSpeeds) sum = cut.v;
+        if constexpr (kUnknowns == Unknowns::kAccelerations)
           sum = -Cross(cut.w_P + cut.w_P, cut.v);  // (7)
       }
       if (pin.Q.place >= 0) sum = sum + b_[pin.Q.handle];
@@ -418,16 +415,16 @@ class AssemblySweep final : public ShortCut<Planar> {
     }
   }
 
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Solve() {
     operations_ += of_vectors_;
-    ForPieces([&](const Piece& piece) { UpPiece<kSought>(piece); });
-    UpPiece<kSought>(pieces_.back());
+    ForPieces([&](const Piece& piece) { UpPiece<kUnknowns>(piece); });
+    UpPiece<kUnknowns>(pieces_.back());
     DownPiece(pieces_.back());
     ForPieces([&](const Piece& piece) { DownPiece(piece); });
   }
 
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   [[gnu::noinline]] void UpPiece(const Piece& piece) {
     for (int i = piece.first_body; i < piece.last_body; ++i) {
       const Body& body = bodies_[i];
@@ -435,17 +432,17 @@ class AssemblySweep final : public ShortCut<Planar> {
       const double a = body.link.cosine * cosine_[i] + body.link.sine * sine_[i] + applied.alpha;
       const double gx = body.link.gx + applied.a.x, gy = body.link.gy + applied.a.y;
       const double w2 = speed_[i] * speed_[i] * body.link.radius;
-      alpha_[i] = kSought == Sought::kSpeeds ? 0.0 : a;
+      alpha_[i] = kUnknowns == Unknowns::kSpeeds ? 0.0 : a;
       for (int h = body.first_handle; h < body.first_handle + body.handles; ++h) {
         const Vector& r = arm_[h];
-        b_[h] = kSought == Sought::kSpeeds
+        b_[h] = kUnknowns == Unknowns::kSpeeds
                     ? Vector{0.0, 0.0}
                     : Vector{gx - a * r.y - w2 * r.x, gy + a * r.x - w2 * r.y};
       }
     }
     for (int n = piece.first_node; n < piece.last_node; ++n) {
       const Node& node = nodes_[n];
-      WithRows(node.pins, [&](auto rows) { Up<kSought>(node, rows); });
+      WithRows(node.pins, [&](auto rows) { Up<kUnknowns>(node, rows); });
     }
   }
 
@@ -622,16 +619,6 @@ struct AssemblySweep::Layout {
     node.kept = all.handles = static_cast<int>(all.pins.size());
   }
 
-  /// Multiply-adds and room of a join.
-  void Count(const Node& node) {
-    const double n = 2.0 * node.pins, d = 2.0 * node.kept;
-    blocks += static_cast<double>(node.kept) * node.kept;
-    work += n * n * n / 6.0 + n * n * d / 2.0 + n * d * d / 2.0;
-    vectors += 2.0 * n * (n + d);
-    W += n * (node.pins > 1 ? n + d : d);
-    most_U = std::max(most_U, n * (n + d));
-  }
-
   /// A pin closes a loop if Ground holds both its sides, both are on one assembly, or the join has
   /// several pins. The lighter side determines the response of one pin, all `bodies` of several.
   void SetLimits(const PlanNode& planned, std::span<const int> joints, int bodies) {
@@ -670,7 +657,12 @@ struct AssemblySweep::Layout {
     node.first_block = all.first_block = static_cast<int>(blocks);
     node.matrix = static_cast<int>(W);
     SetLimits(planned, joints, all.bodies);
-    Count(node);
+    const double n = 2.0 * node.pins, d = 2.0 * node.kept;
+    blocks += static_cast<double>(node.kept) * node.kept;
+    work += n * n * n / 6.0 + n * n * d / 2.0 + n * d * d / 2.0;
+    vectors += 2.0 * n * (n + d);
+    W += n * (node.pins > 1 ? n + d : d);
+    most_U = std::max(most_U, n * (n + d));
     sweep.nodes_.push_back(node);
     return Fits();
   }

@@ -138,17 +138,17 @@ class ChainSweep : public ShortCut<Space, T> {
   }
 
   /// Returns false near a degenerate position.
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   TruthOf<T> Solve() {
     const int groups = static_cast<int>(groups_.size());
-    if constexpr (kIsOne) this->pool_->ForEach(groups, [&](int g) { Up<kSought>(groups_[g]); });
+    if constexpr (kIsOne) this->pool_->ForEach(groups, [&](int g) { Up<kUnknowns>(groups_[g]); });
     T slack = {};
-    for (Chain& chain : chains_) slack = Min(slack, Up<kSought>(chain));
-    slack = own().template Close<kSought>(slack);
+    for (Chain& chain : chains_) slack = Min(slack, Up<kUnknowns>(chain));
+    slack = own().template Close<kUnknowns>(slack);
     const TruthOf<T> good = slack >= 0.0;
     if (!Any(good)) return good;
-    for (const Chain& chain : chains_) Down<kSought>(chain);
-    if constexpr (kIsOne) this->pool_->ForEach(groups, [&](int g) { Down<kSought>(groups_[g]); });
+    for (const Chain& chain : chains_) Down<kUnknowns>(chain);
+    if constexpr (kIsOne) this->pool_->ForEach(groups, [&](int g) { Down<kUnknowns>(groups_[g]); });
     return good;
   }
 
@@ -164,23 +164,23 @@ class ChainSweep : public ShortCut<Space, T> {
  private:
   Own& own() { return static_cast<Own&>(*this); }
 
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Up(Group& group) {
     Lanes slack = {};
     auto start = own().Begin(group);
-    decltype(auto) all = own().template First<kSought>(group, start);  // may be group.assemblies
+    decltype(auto) all = own().template First<kUnknowns>(group, start);  // may be group.assemblies
     for (int pack = group.pack + 1; pack < group.pack + group.length; ++pack) {
-      own().template Next<kSought>(pack, start, all, slack);
+      own().template Next<kUnknowns>(pack, start, all, slack);
     }
     if constexpr (!std::is_reference_v<decltype(all)>) group.assemblies = all;
     group.slack = Smallest(slack);
   }
 
   /// Returns the least slack of all joins of a chain.
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   T Up(Chain& chain) {
     T slack = {};
-    auto all = own().template Start<kSought>(chain);
+    auto all = own().template Start<kUnknowns>(chain);
     for (int piece = chain.first_piece; piece < chain.first_piece + chain.pieces; ++piece) {
       if constexpr (kIsOne) {
         slack = Min(slack, group_of(piece).slack);
@@ -188,21 +188,21 @@ class ChainSweep : public ShortCut<Space, T> {
       }
     }
     for (int k = 0; k < chain.singles; ++k) {
-      own().template AttachSingle<kSought>(chain.first_single + k, k + chain.pieces == 0, all,
-                                           slack);
+      own().template AttachSingle<kUnknowns>(chain.first_single + k, k + chain.pieces == 0, all,
+                                             slack);
     }
-    return own().template End<kSought>(chain, all, slack);
+    return own().template End<kUnknowns>(chain, all, slack);
   }
 
   /// From the end of a chain: the force in the joint before a node, then the body's rates. Forces
   /// on pieces are those in the joints between them.
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Down(const Chain& chain) {
-    Force<T> F2 = own().template EndForce<kSought>(chain);
+    Force<T> F2 = own().template EndForce<kUnknowns>(chain);
     for (int k = chain.singles - 1; k >= 0; --k) {
       const int single = chain.first_single + k;
       const Force<T> F1 = own().ForceIn(num_pieces_ + single, k + chain.pieces == 0, F2);
-      own().template RespondSingle<kSought>(single, F1, F2);
+      own().template RespondSingle<kUnknowns>(single, F1, F2);
       F2 = own().Opposite(packed_ + single, F1);
     }
     for (int piece = chain.first_piece + chain.pieces - 1; piece >= chain.first_piece; --piece) {
@@ -215,12 +215,12 @@ class ChainSweep : public ShortCut<Space, T> {
     }
   }
 
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Down(Group& group) {
     Force<Lanes> F2 = group.F2;
     for (int pack = group.pack + group.length - 1; pack >= group.pack; --pack) {
       const Force<Lanes> F1 = pack == group.pack ? group.F1 : own().ForceIn(pack, group.F1, F2);
-      own().template Respond<kSought>(group, pack, F1, F2);
+      own().template Respond<kUnknowns>(group, pack, F1, F2);
       F2 = own().Opposite(pack * kLanes, F1);
     }
   }

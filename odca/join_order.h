@@ -1,18 +1,10 @@
-// Order of joins: the tree behind an assembly tree's lists (plan.h).
+// Order of joins: the tree behind an assembly tree's lists (plan.h, docs/theory/order-of-joins.md).
 //
-// Three rules compete; the estimated cost of a pass decides (`JoinCost`).
-//
-// *Pairing* grows the tree from below. All pairs of neighbouring assemblies wait in a queue; the
-// next pair has the smallest boundary after its join, in classes a factor sqrt(2) apart (up to four
-// bodies are one class), then the fewest bodies, also in powers of two, then exactly the smallest
-// boundary. A chain becomes a balanced tree, arms are finished before their hub takes them, and
-// pairs whose boundary would grow along a hub come last.
-//
-// If pairing makes large joins, two other rules are tried. *Front* adds body after body to one
-// assembly; it suits bodies between several hubs. *Dissection* cuts from above; a k x k grid is cut
-// by O(k) bodies at the top and halves in area below, hence O(k^3) multiply-adds = O(n^1.5) (George
-// 1973; Lipton, Rose and Tarjan 1979). The best rule orders its parts in turn.
-//
+// Three rules compete; the estimated cost of a pass decides (`JoinCost`). *Pairing* grows the tree
+// from below: the next pair of neighbouring assemblies has the smallest boundary after its join, in
+// classes a factor sqrt(2) apart, then the fewest bodies, in powers of two. If it makes large
+// joins, two other rules are tried. *Front* adds body after body to one assembly. *Dissection* cuts
+// from above (George 1973; Lipton, Rose and Tarjan 1979); the best rule orders its parts in turn.
 // All take O(n log n) steps per level of the dissection, of which there are O(log n).
 #pragma once
 

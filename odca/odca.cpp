@@ -32,36 +32,25 @@ Plan MakePlan(const Mechanism<Space, S>& mechanism, const PlanOptions& options) 
 }
 
 template <class Space, class S>
-Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options)
-    : Odca(mechanism, options, PlanOptionsOf(options.solver)) {}
-
-template <class Space, class S>
 Odca<Space, S>::Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options,
-                     const PlanOptions& plan)
+                     const std::optional<PlanOptions>& plan)
     : mechanism_(mechanism),
-      plan_(MakePlan(mechanism, plan)),
+      plan_(MakePlan(mechanism, plan.value_or(PlanOptionsOf(options.solver)))),
       sweep_(mechanism, plan_, options.solver, options.threads),
       equations_(mechanism),
       change_(VectorX<S>::Zero(mechanism.num_u())) {
-  if (options.solver == SolverKind::kRankRevealing && !options.general) MakeShortCut(options);
-}
-
-template <class Space, class S>
-void Odca<Space, S>::MakeShortCut(const FormulationOptions& options) {
+  if (options.solver != SolverKind::kRankRevealing || options.general) return;
   if constexpr (!std::is_same_v<S, double>) {
     return;
   } else if constexpr (std::is_same_v<Space, Spatial>) {
-    short_cut_ = arms::MakeArmSweep(mechanism_, options.threads);
-  } else if (auto path = pins::MakePathSweep(mechanism_, options.threads)) {
+    short_cut_ = arms::MakeArmSweep(mechanism, options.threads);
+  } else if (auto path = pins::MakePathSweep(mechanism, options.threads)) {
     if (options.beside != nullptr) lane_ = pins::PathLane::Take(*options.beside, *path);
     short_cut_ = std::move(path);
   } else {
-    short_cut_ = pins::MakeAssemblySweep(mechanism_, plan_, options.threads);
+    short_cut_ = pins::MakeAssemblySweep(mechanism, plan_, options.threads);
   }
 }
-
-template <class Space, class S>
-Odca<Space, S>::~Odca() = default;
 
 template <class Space, class S>
 Outcome Odca<Space, S>::Factor(const Kinematics<Space, S>& kinematics) {

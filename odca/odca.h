@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "mechanism/formulation/constraint_solver.h"
 #include "mechanism/loops/body_equations.h"
@@ -23,10 +24,8 @@ template <class Space, class S>
 class Odca final : public ConstraintSolver<Space, S> {
  public:
   /// `mechanism` must outlive the solver. `plan` overrides PlanOptionsOf().
-  Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options);
   Odca(const Mechanism<Space, S>& mechanism, const FormulationOptions& options,
-       const PlanOptions& plan);
-  ~Odca() override;
+       const std::optional<PlanOptions>& plan = {});
 
   const Plan& plan() const { return plan_; }
   const Sweep<Space, S>& sweep() const { return sweep_; }
@@ -57,7 +56,6 @@ class Odca final : public ConstraintSolver<Space, S> {
   Wrench<Space, S> JointForce(int joint) const;
 
  private:
-  void MakeShortCut(const FormulationOptions& options);
   /// The equations as they are set: x and multipliers.
   void SweepTo(VectorX<S>& x, VectorX<S>* lambda);
 

@@ -194,7 +194,7 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
     sweep->singles_.resize(one.singles_.size());
     sweep->single_closures_.resize(one.single_closures_.size());
     sweep->end_cuts_.resize(one.end_cuts_.size());
-    sweep->tree_ = TreeAngles<T>::Like(one.tree_);
+    sweep->tree_ = TreeAngles<T>(one.tree_);
     sweep->Resize(one.singles_.size(), static_cast<int>(one.num_u()), 1.0, 1);
     for (int lane = 0; lane < kLanes; ++lane) sweep->SetConstants(lane, one);
     return sweep;
@@ -216,10 +216,10 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
     return true;
   }
 
-  TruthOf<T> Place(Sought sought, std::span<const T> q, std::span<const T> u) override {
+  TruthOf<T> Place(Unknowns unknowns, std::span<const T> q, std::span<const T> u) override {
     tree_.ToBodies(q, u, angle_.data(), speed_.data(), *pool_);
     if constexpr (kIsOne) {
-      if (sought == Sought::kPositions) return TurnAll<false>();
+      if (unknowns == Unknowns::kPositions) return TurnAll<false>();
     }
     return TurnAll<true>();
   }
@@ -228,10 +228,10 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
     for (const Group& group : groups_) largest = std::max(largest, group.largest);
     return {.shift = std::sqrt(largest)};
   }
-  TruthOf<T> Find(Sought sought) override {
-    return sought == Sought::kAccelerations ? this->template Solve<Sought::kAccelerations>()
-           : sought == Sought::kCompleted   ? this->template Solve<Sought::kCompleted>()
-                                            : this->template Solve<Sought::kSpeeds>();
+  TruthOf<T> Find(Unknowns unknowns) override {
+    return unknowns == Unknowns::kAccelerations ? this->template Solve<Unknowns::kAccelerations>()
+           : unknowns == Unknowns::kCompleted   ? this->template Solve<Unknowns::kCompleted>()
+                                                : this->template Solve<Unknowns::kSpeeds>();
   }
   TruthOf<T> AddChange(std::span<const T> base, std::span<T> sum) override {
     return tree_.ToJoints(alpha_.data(), base, sum, *pool_);
@@ -483,26 +483,26 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
 
   // steps of ChainSweep
   int Begin(const Group&) const { return 0; }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   TwoHandle<Lanes> LeafOf(int pack) const {
-    if constexpr (kSought == Sought::kAccelerations) return LeafAlone(pack);
-    return Leaf<kSought>(packs_[pack], turned_packs_[pack], Load<Lanes>(&speed_[pack * kLanes]));
+    if constexpr (kUnknowns == Unknowns::kAccelerations) return LeafAlone(pack);
+    return Leaf<kUnknowns>(packs_[pack], turned_packs_[pack], Load<Lanes>(&speed_[pack * kLanes]));
   }
   /// Not inlined: its products would be fused with sums of a join, which gives other bits.
   [[gnu::noinline]] TwoHandle<Lanes> LeafAlone(int pack) const {
-    return Leaf<Sought::kAccelerations>(packs_[pack], turned_packs_[pack],
-                                        Load<Lanes>(&speed_[pack * kLanes]));
+    return Leaf<Unknowns::kAccelerations>(packs_[pack], turned_packs_[pack],
+                                          Load<Lanes>(&speed_[pack * kLanes]));
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   TwoHandle<Lanes> First(const Group& group, int) const {
-    return LeafOf<kSought>(group.pack);
+    return LeafOf<kUnknowns>(group.pack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Next(int pack, int, TwoHandle<Lanes>& all, Lanes& slack) {
     const Lanes limit = packs_[pack].limit;
-    all = Join(all, LeafOf<kSought>(pack), limit, cuts_[pack], slack);
+    all = Join(all, LeafOf<kUnknowns>(pack), limit, cuts_[pack], slack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   OneHandle<T> Start(const Chain&) const {
     OneHandle<T> none = {};
     return none;
@@ -521,16 +521,16 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
     Attach(piece, is_first, LaneOf(group.assemblies, this->lane_of(piece)),
            packs_[group.pack].limit[this->lane_of(piece)], all, slack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void AttachSingle(int single, bool is_first, OneHandle<T>& all, T& slack) {
     const Link<T>& link = singles_[single];
     const T speed = speed_[packed_ + single];
-    Attach(num_pieces_ + single, is_first, Leaf<kSought>(link, turned_singles_[single], speed),
+    Attach(num_pieces_ + single, is_first, Leaf<kUnknowns>(link, turned_singles_[single], speed),
            link.limit, all, slack);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   T End(Chain& path, const OneHandle<T>& all, T slack) {
-    constexpr int kOfEach = Operations::Leaf(kSought) + Operations::kAngularAcceleration + 1;
+    constexpr int kOfEach = Operations::Leaf(kUnknowns) + Operations::kAngularAcceleration + 1;
     operations_ +=
         path.pieces * this->length(path) * (kOfEach + Operations::kJoin + Operations::kForceIn) +
         path.singles * (kOfEach + Operations::kEndJoin + Operations::kForceInEnd);
@@ -538,16 +538,16 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
     // Ground has no response (33, 34)
     const Factored2<T> factors = FactorsOf(all.zeta22, path.end_limit, slack);
     Vector2<T> wanted = {};  // of the last body, as TwoHandle::zeta13 of Leaf()
-    if (kSought == Sought::kSpeeds) wanted = -path.gap_v;
-    if (kSought == Sought::kAccelerations) wanted = Cross<T>(2.0 * path.gap_w, path.gap_v);
+    if (kUnknowns == Unknowns::kSpeeds) wanted = -path.gap_v;
+    if (kUnknowns == Unknowns::kAccelerations) wanted = Cross<T>(2.0 * path.gap_w, path.gap_v);
     path.end_force = factors * (all.zeta23 - wanted);
     return slack;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   T Close(T slack) {
     return slack;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   Vector2<T> EndForce(const Chain& path) {
     return path.ends_at_ground ? -path.end_force : Vector2<T>{};
   }
@@ -557,14 +557,14 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
   Vector2<Lanes> ForceIn(int pack, const Vector2<Lanes>& F1, const Vector2<Lanes>& F2) const {
     return pins::ForceIn(cuts_[pack], F1, F2);
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void RespondSingle(int single, const Vector2<T>& F1, const Vector2<T>& F2) {
     alpha_[packed_ + single] =
-        AngularAcceleration<kSought>(turned_singles_[single], F1, F2) / singles_[single].radius;
+        AngularAcceleration<kUnknowns>(turned_singles_[single], F1, F2) / singles_[single].radius;
   }
-  template <Sought kSought>
+  template <Unknowns kUnknowns>
   void Respond(const Group&, int pack, const Vector2<Lanes>& F1, const Vector2<Lanes>& F2) {
-    const Lanes alpha = AngularAcceleration<kSought>(turned_packs_[pack], F1, F2);
+    const Lanes alpha = AngularAcceleration<kUnknowns>(turned_packs_[pack], F1, F2);
     Store(alpha / packs_[pack].radius, &alpha_[pack * kLanes]);
   }
   template <class U>
@@ -579,13 +579,6 @@ class PathSweep final : public ChainSweep<PathSweep<T>, PathKind, Planar, T> {
   std::vector<T> angle_, speed_, alpha_;  ///< by place; the last one is Ground's
   T largest_ = {};  ///< square of the largest gap, of positions, of all joints outside of groups
   TreeAngles<T> tree_;
-};
-
-/// Pending evaluation of a run.
-struct Wanted {
-  SpeedsUsed speeds = SpeedsUsed::kGiven;
-  std::span<const double> q, u;
-  std::span<double> qdot, udot;
 };
 
 void Gather(std::span<const double> one, int lane, std::vector<Lanes>& all) {
@@ -611,6 +604,14 @@ bool SetMechanism(ShortCut<Planar, Lanes>& lanes, int lane, const ShortCut<Plana
       lane, static_cast<const PathSweep<double>&>(one));
 }
 
+/// A lane: the pending evaluation of its run.
+struct PathLane::Run {
+  bool is_taken = false, waits = false, was_good = false;
+  SpeedsUsed speeds = SpeedsUsed::kGiven;
+  std::span<const double> q, u;
+  std::span<double> qdot, udot;
+};
+
 /// All lanes of mechanisms of one shape. Unused lanes keep stale data; their results are discarded.
 class PathLane::All final : public SharedWork {
  public:
@@ -618,74 +619,65 @@ class PathLane::All final : public SharedWork {
       : sweep_(MakePathLanes(one)), q_(one.num_u()), u_(q_), qdot_(q_), udot_(q_) {}
   bool HasLanes() const { return sweep_ != nullptr; }
 
-  /// Returns -1 if no lane is free or the mechanism differs.
-  int Take(const ShortCut<Planar>& own) {
-    const auto free = std::ranges::find(taken_, false);
-    const int lane = static_cast<int>(free - taken_.begin());
-    if (free == taken_.end() || !SetMechanism(*sweep_, lane, own)) return -1;
-    *free = true;
-    return lane;
+  /// Returns null if no lane is free or the mechanism differs.
+  Run* Take(const ShortCut<Planar>& own) {
+    const auto free = std::ranges::find(runs_, false, &Run::is_taken);
+    const int lane = static_cast<int>(free - runs_.begin());
+    if (free == runs_.end() || !SetMechanism(*sweep_, lane, own)) return nullptr;
+    free->is_taken = true;
+    return &*free;
   }
-  void GiveBack(int lane) { taken_[lane] = false; }
-
-  void Want(int lane, const Wanted& wanted) {
-    wanted_[lane] = wanted;
-    waits_[lane] = true;
-  }
-  bool WasGood(int lane) const { return good_[lane]; }
 
   void Do() noexcept override {
     for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
-      std::array<bool, kLanes> now{};
+      const auto is_due = [&](const Run& run) { return run.waits && run.speeds == speeds; };
+      if (std::ranges::none_of(runs_, is_due)) continue;
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (!waits_[lane] || wanted_[lane].speeds != speeds) continue;
-        now[lane] = true;
-        Gather(wanted_[lane].q, lane, q_);
-        Gather(wanted_[lane].u, lane, u_);
+        if (!is_due(runs_[lane])) continue;
+        Gather(runs_[lane].q, lane, q_);
+        Gather(runs_[lane].u, lane, u_);
       }
-      if (std::ranges::none_of(now, std::identity())) continue;
       const LaneBits good = sweep_->Evaluate(speeds, nullptr, q_, u_, qdot_, udot_);
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (!now[lane]) continue;
-        waits_[lane] = false;
-        good_[lane] = good[lane] != 0;
-        Scatter(qdot_, lane, wanted_[lane].qdot);
-        Scatter(udot_, lane, wanted_[lane].udot);
+        Run& run = runs_[lane];
+        if (!is_due(run)) continue;
+        run.waits = false;
+        run.was_good = good[lane] != 0;
+        Scatter(qdot_, lane, run.qdot);
+        Scatter(udot_, lane, run.udot);
       }
     }
   }
 
  private:
   std::unique_ptr<ShortCut<Planar, Lanes>> sweep_;
-  std::array<bool, kLanes> taken_{}, waits_{}, good_{};
-  std::array<Wanted, kLanes> wanted_;
+  std::array<Run, kLanes> runs_;
   std::vector<Lanes> q_, u_, qdot_, udot_;
 };
 
 std::unique_ptr<PathLane> PathLane::Take(SideBySide& beside, const ShortCut<Planar>& own) {
-  const auto take = [&](All& all) -> std::unique_ptr<PathLane> {
-    const int lane = all.Take(own);
-    return lane < 0 ? nullptr : std::unique_ptr<PathLane>(new PathLane(beside, all, lane));
-  };
+  Run* run = nullptr;
   for (const std::unique_ptr<SharedWork>& work : beside.works) {
     auto* all = dynamic_cast<All*>(work.get());
-    if (all == nullptr) continue;
-    if (auto lane = take(*all)) return lane;
+    if (all != nullptr && run == nullptr) run = all->Take(own);
   }
-  auto all = std::make_unique<All>(own);
-  if (!all->HasLanes()) return nullptr;
-  auto lane = take(*all);
-  beside.works.push_back(std::move(all));
-  return lane;
+  if (run == nullptr) {
+    auto all = std::make_unique<All>(own);
+    if (!all->HasLanes()) return nullptr;
+    run = all->Take(own);
+    if (run == nullptr) return nullptr;
+    beside.works.push_back(std::move(all));
+  }
+  return std::unique_ptr<PathLane>(new PathLane(beside, *run));
 }
 
-PathLane::~PathLane() { all_.GiveBack(lane_); }
+PathLane::~PathLane() { run_.is_taken = false; }
 
 bool PathLane::Evaluate(SpeedsUsed speeds, std::span<const double> q, std::span<const double> u,
                         std::span<double> qdot, std::span<double> udot) {
-  all_.Want(lane_, {speeds, q, u, qdot, udot});
+  run_ = {true, true, false, speeds, q, u, qdot, udot};
   beside_.Meet();
-  return all_.WasGood(lane_);
+  return run_.was_good;
 }
 
 }  // namespace loopbench::odca::pins

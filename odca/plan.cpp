@@ -1,6 +1,7 @@
 #include "odca/plan.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "odca/join_order.h"
@@ -83,32 +84,22 @@ class Planner {
   }
 
  private:
-  /// Returns the representative body of each body's connected part.
-  std::vector<int> PartOfBody() const {
-    std::vector<int> part(assemblies_.size());
-    std::iota(part.begin(), part.end(), 0);
-    const auto find = [&](int body) {
-      while (part[body] != body) body = part[body] = part[part[body]];
-      return body;
-    };
-    for (const PlanJoint& joint : between_leaves_) {
-      if (joint.from != 0 && joint.to != 0) part[find(joint.from)] = find(joint.to);
-    }
-    for (std::size_t body = 0; body < part.size(); ++body)
-      part[body] = find(static_cast<int>(body));
-    return part;
-  }
-
   /// Closes the joints of leaves. Returns by body the number of joints that must wait.
   std::vector<int> CloseLeaves() {
-    const std::vector<int> part = PartOfBody();
-    std::vector<int> in_part(assemblies_.size(), 0), waiting(assemblies_.size(), 0);
-    for (std::size_t body = 1; body < assemblies_.size(); ++body) {
-      in_part[part[body]] += static_cast<int>(assemblies_[body].leaf_joints.size());
+    std::vector<int> part(assemblies_.size());  // forest of connected bodies, see RootOf()
+    std::iota(part.begin(), part.end(), 0);
+    for (const PlanJoint& joint : between_leaves_) {
+      if (joint.from == 0 || joint.to == 0) continue;
+      part[RootOf(joint.from, part)] = RootOf(joint.to, part);
     }
-    for (std::size_t body = 1; body < assemblies_.size(); ++body) {
+    std::vector<int> in_part(assemblies_.size(), 0), waiting(assemblies_.size(), 0);
+    const int num_bodies = static_cast<int>(assemblies_.size());
+    for (int body = 1; body < num_bodies; ++body) {
+      in_part[RootOf(body, part)] += static_cast<int>(assemblies_[body].leaf_joints.size());
+    }
+    for (int body = 1; body < num_bodies; ++body) {
       Assembly& assembly = assemblies_[body];
-      if (options_.grounding == Grounding::kAtRoot && in_part[part[body]] <= 2) {
+      if (options_.grounding == Grounding::kAtRoot && in_part[RootOf(body, part)] <= 2) {
         waiting[body] = static_cast<int>(assembly.leaf_joints.size());
       } else if (!assembly.leaf_joints.empty()) {
         CloseLeafJoints(assembly);
@@ -126,7 +117,8 @@ class Planner {
     std::vector<int> between, leaving;
     for (int j : assemblies_[from].joints) {
       if (closed_[j]) continue;
-      const bool there = Find(joints_[j].from) == into || Find(joints_[j].to) == into;
+      const bool there = RootOf(joints_[j].from, assembly_of_) == into ||
+                         RootOf(joints_[j].to, assembly_of_) == into;
       (there ? between : leaving).push_back(j);
     }
     std::ranges::sort(between);
@@ -142,12 +134,10 @@ class Planner {
     return into;
   }
 
-  /// Returns the index of the assembly that holds a body.
-  int Find(int body) {
-    while (assembly_of_[body] != body) {
-      body = assembly_of_[body] = assembly_of_[assembly_of_[body]];
-    }
-    return body;
+  /// Returns the root of the tree that holds `i`, and shortens the way there.
+  static int RootOf(int i, std::vector<int>& forest) {
+    while (forest[i] != i) i = forest[i] = forest[forest[i]];
+    return i;
   }
 
   void CloseLeafJoints(Assembly& assembly) {
@@ -195,34 +185,32 @@ class Planner {
   /// Renumbers the nodes depth-first, so that children are executed just before their parent.
   std::vector<Draft> DepthFirst() {
     const int leaves = static_cast<int>(assemblies_.size()) - 1;
-    std::vector<int> new_number(drafts_.size(), -1);
-    std::vector<bool> has_parent(drafts_.size(), false);
+    std::vector<bool> is_root(drafts_.size(), true);
     for (const Draft& draft : drafts_) {
       for (int child : draft.node.children) {
-        if (child >= leaves) has_parent[child - leaves] = true;
+        if (child >= leaves) is_root[child - leaves] = false;
       }
     }
+    std::vector<int> waiting, order;  // the order from its end: parents first
+    for (int n = 0; n < static_cast<int>(drafts_.size()); ++n) {
+      if (is_root[n]) waiting.push_back(n);
+    }
+    while (!waiting.empty()) {
+      order.push_back(waiting.back());
+      waiting.pop_back();
+      for (int child : drafts_[order.back()].node.children) {
+        if (child >= leaves) waiting.push_back(child - leaves);
+      }
+    }
+    std::vector<int> new_number(drafts_.size(), -1);
     std::vector<Draft> ordered;
     ordered.reserve(drafts_.size());
-    for (int root = 0; root < static_cast<int>(drafts_.size()); ++root) {
-      if (has_parent[root]) continue;
-      std::vector<std::pair<int, bool>> stack = {{root, false}};
-      while (!stack.empty()) {
-        auto [n, expanded] = stack.back();
-        stack.pop_back();
-        if (!expanded) {
-          stack.push_back({n, true});
-          for (int child : {drafts_[n].node.children[1], drafts_[n].node.children[0]}) {
-            if (child >= leaves) stack.push_back({child - leaves, false});
-          }
-          continue;
-        }
-        for (int& child : drafts_[n].node.children) {
-          if (child >= leaves) child = leaves + new_number[child - leaves];
-        }
-        new_number[n] = static_cast<int>(ordered.size());
-        ordered.push_back(std::move(drafts_[n]));
+    for (auto n = order.rbegin(); n != order.rend(); ++n) {
+      for (int& child : drafts_[*n].node.children) {
+        if (child >= leaves) child = leaves + new_number[child - leaves];
       }
+      new_number[*n] = static_cast<int>(ordered.size());
+      ordered.push_back(std::move(drafts_[*n]));
     }
     return ordered;
   }
@@ -232,7 +220,7 @@ class Planner {
   PlanOptions options_;
   std::vector<int> open_rows_;        ///< rows of joints still to come, by body
   std::vector<bool> closed_;          ///< joints between assemblies
-  std::vector<int> assembly_of_;      ///< forest of merged places, see Find()
+  std::vector<int> assembly_of_;      ///< forest of merged places, see RootOf()
   std::vector<Assembly> assemblies_;  ///< by place: at first the body's own
   std::vector<Draft> drafts_;
 };
@@ -479,13 +467,10 @@ void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> dr
     }
   }
   std::vector<int> row_of(joints.size(), 0);
-  std::vector<std::size_t> first_handle, first_kept, first_joint;
+  std::vector<std::array<std::size_t, 3>> first;  // handle, kept one and joint of each node
   for (const Draft& draft : drafts) {
     PlanNode& node = nodes_.emplace_back(draft.node);
-    first_handle.push_back(handles_.size());
-    first_kept.push_back(kept_.size());
-    first_joint.push_back(joints_.size());
-    const std::size_t first = handles_.size();
+    first.push_back({handles_.size(), kept_.size(), joints_.size()});
     for (int child = 0; child < 2; ++child) {
       if (node.children[child] < 0) continue;
       int place = 0;
@@ -499,7 +484,7 @@ void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> dr
       }
       boundary[node.children[child]] = {};
     }
-    const std::span handles = std::span(handles_).subspan(first);
+    const std::span handles = std::span(handles_).subspan(first.back()[0]);
     const int width = handles[0].width;
     const auto alike = [&](const Handle& handle) {
       return handle.width == width && handle.is_body() == (width == dim);
@@ -539,14 +524,14 @@ void Plan::AddNodes(std::span<const PlanJoint> joints, std::span<const Draft> dr
     side.row = row_of[side.joint];
     side.joint = joints[side.joint].index;
   }
-  const auto cut = [](auto& all, const std::vector<std::size_t>& firsts, std::size_t n) {
-    const std::size_t end = n + 1 < firsts.size() ? firsts[n + 1] : all.size();
-    return std::span(all).subspan(firsts[n], end - firsts[n]);
-  };
+  first.push_back({handles_.size(), kept_.size(), joints_.size()});
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
-    nodes_[n].handles = cut(handles_, first_handle, n);
-    nodes_[n].kept = cut(kept_, first_kept, n);
-    nodes_[n].joints = cut(joints_, first_joint, n);
+    const auto part = [&](auto& all, int list) {
+      return std::span(all).subspan(first[n][list], first[n + 1][list] - first[n][list]);
+    };
+    nodes_[n].handles = part(handles_, 0);
+    nodes_[n].kept = part(kept_, 1);
+    nodes_[n].joints = part(joints_, 2);
   }
 }
 

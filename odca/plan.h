@@ -1,16 +1,10 @@
-// The symbolic half of O-DCA: the order in which bodies are joined into assemblies
-// (docs/decisions/004).
+// The symbolic half of O-DCA: the order in which bodies are joined into assemblies (README.md,
+// docs/decisions/004, docs/theory/order-of-joins.md).
 //
-// The assembly tree covers the graph of bodies and joints. Its leaves are bodies, or trees of
-// bodies on Ground. An inner node joins two assemblies, or one assembly with itself or with Ground,
-// through a list of joints. It keeps as boundary only the bodies of joints not yet closed. Ground
-// is an assembly with zero response and has no handle. A body of a boundary is one handle, with all
-// its directions, or a handle per open joint, with the rows of this joint (BoundaryBasis).
-//
-// Three rules build the tree; the cheapest result is used (join_order.h). A chain or ladder of n
-// bodies has depth O(log n) and boundaries of one to four bodies; a k x k grid boundaries of O(k),
-// hence O(n^1.5) multiply-adds. A hub takes its arms one by one, each finished before, in O(n)
-// multiply-adds and a depth of as many joins as it has arms.
+// The leaves of the assembly tree are bodies, or trees of bodies on Ground. An inner node joins two
+// assemblies, or one assembly with itself or with Ground, through a list of joints. It keeps as
+// boundary only the bodies of joints not yet closed: one handle with all directions of the body, or
+// a handle per open joint with the rows of this joint (BoundaryBasis). Ground has no handle.
 //
 // Properties: each body is in exactly one leaf, each joint with constraints in exactly one leaf or
 // node; children come before parents; the order is depth-first, so a node's children are recent

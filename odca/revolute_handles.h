@@ -144,21 +144,20 @@ LOOPBENCH_INLINE void Pass(const Passage<T>& next, Passage<T>& along) {
   if constexpr (kFollow != Follow::kSpeeds) along.R = next.R * along.R;
 }
 
-/// Accelerations of handles without forces. zeta_i3 is [angular x, y; linear x, y, z].
+/// Accelerations of handles without forces: [angular x, y; linear x, y, z; angular z].
 template <class T>
 struct Free {
-  T zeta13[kRows], zeta23[kRows];
-  T about1, about2;  ///< angular z
+  T zeta13[kAll], zeta23[kAll];
 };
 
 /// zeta_i3 of a body (1-4): with alpha = -I^-1 (w x I w), side i has the angular acceleration alpha
 /// and the linear one alpha x r_i + w x (w x r_i). Across the joint at side 1, A of this body less
 /// A of the one before is H udot + g, g = [w x z u; 0] (7), whichever of them is P; it is counted
 /// with zeta13. w is in axes 1.
-template <Sought kSought, class T>
+template <Unknowns kUnknowns, class T>
 LOOPBENCH_INLINE void FreeMotion(const Shape<T>& body, const Vector3<T>& w, const T& speed,
                                  Free<T>& free) {
-  if constexpr (kSought != Sought::kAccelerations) {
+  if constexpr (kUnknowns != Unknowns::kAccelerations) {
     free = Free<T>{};
     return;
   }
@@ -174,8 +173,8 @@ LOOPBENCH_INLINE void FreeMotion(const Shape<T>& body, const Vector3<T>& w, cons
     free.zeta13[2 + i] = a1[i];
     free.zeta23[2 + i] = a2[i];
   }
-  free.about1 = alpha[2];
-  free.about2 = alpha_2[2];
+  free.zeta13[kRows] = alpha[2];
+  free.zeta23[kRows] = alpha_2[2];
 }
 
 /// zeta of a body or an assembly: handle 1 is a revolute one, handle 2 has k rows.

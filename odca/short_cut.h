@@ -17,8 +17,8 @@
 
 namespace loopbench::odca {
 
-/// Quantity computed by a sweep.
-enum class Sought {
+/// Unknowns of a sweep, and how it finds them.
+enum class Unknowns {
   kAccelerations,  ///< from speeds as they are
   kCompleted,      ///< accelerations after kSpeeds: no cut joint has a relative velocity
   kSpeeds,         ///< the smallest change of speeds, in the metric of M, that closes the loops
@@ -54,10 +54,10 @@ class ShortCut {
                       std::span<T> udot) {
     const bool completes = speeds == SpeedsUsed::kCompleted && completes_speeds_;
     operations_ = 0;
-    TruthOf<T> good = Place(completes ? Sought::kSpeeds : Sought::kAccelerations, q, u);
+    TruthOf<T> good = Place(completes ? Unknowns::kSpeeds : Unknowns::kAccelerations, q, u);
     if (!Any(good)) return good;
     if (completes) {
-      good &= Find(Sought::kSpeeds);
+      good &= Find(Unknowns::kSpeeds);
       if (!Any(good)) return good;
       good &= AddChange(u, qdot);
       AddToSpeeds();
@@ -68,7 +68,7 @@ class ShortCut {
     }
     if (!Any(good)) return good;
     if (kinematics != nullptr) TakeForces(*kinematics, q, qdot);
-    good &= Find(completes ? Sought::kCompleted : Sought::kAccelerations);
+    good &= Find(completes ? Unknowns::kCompleted : Unknowns::kAccelerations);
     if (!Any(good)) return good;
     return good & AddChange({}, udot);
   }
@@ -81,22 +81,22 @@ class ShortCut {
     operations_ = 0;
     std::ranges::copy(q, moved_.begin());
     std::ranges::copy(u, speeds_.begin());
-    if (!Place(Sought::kPositions, moved_, speeds_)) return std::nullopt;
+    if (!Place(Unknowns::kPositions, moved_, speeds_)) return std::nullopt;
     Correction<double> now = LargestGap(), correction = now;
     for (int i = 0; i < kMaxProjections && size(now) > goal; ++i) {
-      if (!Find(Sought::kPositions)) return std::nullopt;
+      if (!Find(Unknowns::kPositions)) return std::nullopt;
       const double before = size(now);
       back_ = moved_;
       if (!AddChange(back_, moved_)) return std::nullopt;
-      if (!Place(Sought::kPositions, moved_, speeds_)) return std::nullopt;
+      if (!Place(Unknowns::kPositions, moved_, speeds_)) return std::nullopt;
       now = LargestGap();
       ++correction.iterations;
       if (size(now) < before) continue;
       moved_ = back_;  // round-off: as it was
       break;
     }
-    if (!Place(Sought::kSpeeds, moved_, speeds_)) return std::nullopt;
-    if (!Find(Sought::kSpeeds) || !AddChange(speeds_, speeds_)) return std::nullopt;
+    if (!Place(Unknowns::kSpeeds, moved_, speeds_)) return std::nullopt;
+    if (!Find(Unknowns::kSpeeds) || !AddChange(speeds_, speeds_)) return std::nullopt;
     std::ranges::copy(moved_, q.begin());
     std::ranges::copy(speeds_, u.begin());
     return correction;
@@ -124,13 +124,13 @@ class ShortCut {
       part(first, std::min(first + kPart, size));
     });
   }
-  /// Computes poses of bodies and violations of cut joints, of positions if these are sought.
+  /// Computes poses of bodies and violations of cut joints, of positions for Unknowns::kPositions.
   /// Returns false for angles beyond kLargestAngle.
-  virtual TruthOf<T> Place(Sought sought, std::span<const T> q, std::span<const T> u) = 0;
+  virtual TruthOf<T> Place(Unknowns unknowns, std::span<const T> q, std::span<const T> u) = 0;
   /// Returns the largest violations after Place() for positions.
   virtual Correction<double> LargestGap() const = 0;
   /// Finds accelerations or a change. Returns false near a degenerate position.
-  virtual TruthOf<T> Find(Sought sought) = 0;
+  virtual TruthOf<T> Find(Unknowns unknowns) = 0;
   /// sum := base (zero if empty) + what was found. Returns false if that is not finite.
   virtual TruthOf<T> AddChange(std::span<const T> base, std::span<T> sum) = 0;
   /// Adds the change to the speeds of bodies.
@@ -182,12 +182,12 @@ class PathLane {
                 std::span<double> qdot, std::span<double> udot);
 
  private:
+  struct Run;
   class All;
-  PathLane(SideBySide& beside, All& all, int lane) : beside_(beside), all_(all), lane_(lane) {}
+  PathLane(SideBySide& beside, Run& run) : beside_(beside), run_(run) {}
 
   SideBySide& beside_;
-  All& all_;
-  int lane_;
+  Run& run_;
 };
 
 /// Returns a sweep along `plan`; neither plan nor mechanism need outlive it. Null for other

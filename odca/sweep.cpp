@@ -93,7 +93,6 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       place.size = node.kept_numbers;
       y += node.rows * node.numbers;
       x += node.rows * node.rows;
-      largest_matrix_ = std::max(largest_matrix_, node.rows * node.rows);
       std::vector<int> rows;
       for (const NodeJoint& joint : node.joints) {
         rows.push_back(joint.rows);
@@ -107,7 +106,6 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
       }
     }
     z += place.size * place.size;
-    largest_matrix_ = std::max(largest_matrix_, place.size * place.size);
   }
   Z_.assign(z, S(0));
   Y_.assign(y, S(0));
@@ -130,28 +128,6 @@ Sweep<Space, S>::Sweep(const Mechanism<Space, S>& mechanism, const Plan& plan, S
 }
 
 template <class Space, class S>
-Acceleration<Space, S> Sweep<Space, S>::Hang(int n, const Acceleration<Space, S>* holder,
-                                             const Wrench<Space, S>& F,
-                                             const Components<Space, S>& c0,
-                                             const Acceleration<Space, S>* known,
-                                             Components<Space, S>& along) const {
-  const PlanSide& hold = plan_.leaves()[n].hold;
-  auto given = Acceleration<Space, S>::Zero();
-  if (holder != nullptr) given = ShiftMotion<Space, S>(*holder, bodies_[n].from_holder);
-  if (!mechanism_.joints()[hold.joint].in_tree()) {
-    const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[hold.joint];
-    for (int i = 0; i < hold.rows; ++i) given -= dual[i] * c0[i];
-  } else if (known != nullptr) {  // components along H do not matter
-    const auto part = ShiftMotion<Space, S>(*known, -bodies_[n].to_hold);
-    hold.at_Q ? given -= part : given += part;
-  }
-  WithPath(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
-    Repeat(size, [&](int k) { along[free[k].column] += free[k].h.dot(F) - free[k].Mh.dot(given); });
-  });
-  return given;
-}
-
-template <class Space, class S>
 Components<Space, S> Sweep<Space, S>::AlongTree(int n, const Wrench<Space, S>& F) const {
   auto along = Components<Space, S>::Zero();
   WithPath(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
@@ -169,14 +145,6 @@ Acceleration<Space, S> Sweep<Space, S>::HeldAcceleration(int n, const Accelerati
     Repeat(size, [&](int k) { A += free[k].h * x[free[k].column]; });
     return A;
   });
-}
-
-template <class Space, class S>
-Components<Space, S> Sweep<Space, S>::HoldingForce(int n, const Wrench<Space, S>& holding) const {
-  const PlanSide& hold = plan_.leaves()[n].hold;
-  auto phi = Components<Space, S>::Zero();
-  for (int i = 0; i < hold.rows; ++i) phi[i] = Mc_[c_offset_[hold.joint] + i].dot(holding);
-  return phi;
 }
 
 template <class Space, class S>
@@ -670,7 +638,10 @@ void Sweep<Space, S>::Solve(const Loads& loads, std::span<Acceleration<Space, S>
   Correct({.b = {}, .wrenches = {}, .c0 = residual_, .known = {}}, A);
 }
 
-/// The last leaf of a tree has the handles of all its bodies.
+/// The last leaf of a tree has the handles of all its bodies. The given part of a held body's
+/// acceleration has nothing along its free directions. It is the acceleration of the holder, moved
+/// to the body, with c0 of the hold; if the hold is a tree joint, `known` replaces c0. The
+/// generalised forces of F - M (given part) are added along the tree.
 template <class Space, class S>
 [[gnu::always_inline]] inline void Sweep<Space, S>::UpLeaf(int n, Piece& piece,
                                                            const Loads& loads) {
@@ -678,16 +649,32 @@ template <class Space, class S>
   std::fill_n(F_.data() + plan_.num_rows() + Space::kDim * n, Space::kDim, S(0));
   const bool is_held = leaf.end >= 0;
   Components<Space, S>& along = along_[is_held ? leaf.end : n];
+  Acceleration<Space, S>& given = start_[n];
   if (is_held) {
     const int joint = leaf.hold.joint;
-    if (leaf.holder < 0) along.setZero();
-    start_[n] = Hang(n, leaf.holder < 0 ? nullptr : &start_[leaf.holder], loads.WrenchOn(n),
-                     loads.c0[joint], loads.known.empty() ? nullptr : &loads.known[joint], along);
+    if (leaf.holder < 0) {
+      along.setZero();
+      given.setZero();
+    } else {
+      given = ShiftMotion<Space, S>(start_[leaf.holder], bodies_[n].from_holder);
+    }
+    if (!mechanism_.joints()[joint].in_tree()) {
+      const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[joint];
+      for (int i = 0; i < leaf.hold.rows; ++i) given -= dual[i] * loads.c0[joint][i];
+    } else if (!loads.known.empty()) {  // components along H do not matter
+      const auto part = ShiftMotion<Space, S>(loads.known[joint], -bodies_[n].to_hold);
+      leaf.hold.at_Q ? given -= part : given += part;
+    }
+    const Wrench<Space, S> F = loads.WrenchOn(n);
+    WithPath(n, [&](auto size, const FreeDirection* free) LOOPBENCH_INLINED {
+      Repeat(size,
+             [&](int k) { along[free[k].column] += free[k].h.dot(F) - free[k].Mh.dot(given); });
+    });
     piece.operations += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
     if (leaf.sides.empty()) return;
     ApplyTree(n, along);
   } else {
-    start_[n] = loads.b.empty() ? Acceleration<Space, S>::Zero() : loads.b[n + 1];
+    given = loads.b.empty() ? Acceleration<Space, S>::Zero() : loads.b[n + 1];
   }
   S* slot = b_.data() + leaf.slot;
   if (loads.b.empty() && !is_held) {
@@ -697,7 +684,7 @@ template <class Space, class S>
   if (leaf.is_body) {
     Components<Space, S> x = along;
     if (is_held) ApplyTreeTransposed(n, x);
-    const auto all = is_held ? HeldAcceleration(n, start_[n], x) : start_[n];
+    const auto all = is_held ? HeldAcceleration(n, given, x) : given;
     LOOPBENCH_UNROLL
     for (int d = 0; d < Space::kDim; ++d) slot[d] = all[d];
     return;
@@ -751,12 +738,16 @@ template <class Space, class S>
   }
   const Acceleration<Space, S> all = HeldAcceleration(n, start_[n], x);
   A[n + 1] += all;
-  const Wrench<Space, S> holding = HoldingWrench(n, all, F + loads.WrenchOn(n));
-  const Components<Space, S> phi = HoldingForce(n, holding);
-  for (int i = 0; i < leaf.hold.rows; ++i) phi_[leaf.hold.joint][i] += phi[i];
+  // the wrench of the hold on the body, its phi, and the opposite wrench at the holder
+  const Body& body = bodies_[n];
+  const Wrench<Space, S> holding =
+      Wrench<Space, S>(body.rotational * all.angular, all.linear * body.mass) -
+      (F + loads.WrenchOn(n));
+  const Acceleration<Space, S>* dual = Mc_.data() + c_offset_[leaf.hold.joint];
+  for (int i = 0; i < leaf.hold.rows; ++i) phi_[leaf.hold.joint][i] += dual[i].dot(holding);
   piece.operations += Space::kDim * (leaf.hold.rows + 2 * leaf.path);
   if (leaf.holder < 0) return;
-  const Wrench<Space, S> reaction = OnHolder(n, holding);
+  const Wrench<Space, S> reaction = -ShiftForce<Space, S>(holding, body.from_holder);
   LOOPBENCH_UNROLL
   for (int d = 0; d < Space::kDim; ++d) force_on(leaf.holder)[d] += reaction[d];
 }

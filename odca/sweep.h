@@ -1,45 +1,6 @@
-// The numeric half of O-DCA. Matrices depend on positions alone: Z of every assembly, T and V of
-// every join. Then vectors go up and down the assembly tree.
-//
-// Everything is in ground axes. Quantities of a body are taken at its centre of mass. Quantities of
-// a joint are taken at Mo, the origin of the frame fixed on its body Q. r_P and r_Q lead from the
-// two centres of mass to Mo. Equation numbers refer to the paper; README.md indexes them.
-//
-// An assembly with boundary bodies 1..h responds to the forces F of bodies outside by
-//
-//   A = Z F + b
-//
-// A joint from P to Q demands D^T (A_Q - A_P - g) = 0 at Mo and carries the force D phi on Q and
-// -D phi on P. On the centres of mass that is, with n = [0; w x (w x r)],
-//
-//   c_Q^T A_Q + c_P^T A_P + c0 = 0           the demand                        (12)
-//   c_Q phi on Q,  c_P phi on P              the force
-//
-//   c_Q =  S(r_Q)^T D,    c_P = -S(r_P)^T D,    c0 = D^T (n_Q - n_P - g)
-//
-// With C the rows c^T of all joints of a node, on the union of its children's boundaries:
-//
-//   Y   = C Z                                                                  (67)
-//   X   = Y C^T                                                                (16, 66)
-//   phi = -X^+ (C b + c0 + Y F)
-//   Z'  = Z - Y^T X^+ Y                                                        (26-28, 71)
-//   b'  = b - Y^T X^+ (C b + c0)
-//
-// X^+ is computed as T^T T (loop_solver.h). With V = T Y and s = T (C b + c0) the last three are
-//
-//   phi = -T^T (s + V F),      Z' = Z - V^T V,      b' = b - V^T s.
-//
-// V and T are kept for vectors: free accelerations go up, forces come down.
-//
-//   up     s   = T (C b + c0)             from the children's b                (21, 68)
-//          b'  = b - V^T s                to the parent                        (29-30, 72)
-//   down   phi = -T^T (s + V F)           from the forces outside              (17, 42, 64)
-//          F_body += C^T phi              on the bodies of the joints          (18, 39, 47-48, 65)
-//   leaf   A   = M^-1 F_body + b                                               (1-4, 45-46)
-//
-// The outside force on the side of an open joint is this joint's phi. On a body it is the sum over
-// its joints that close further up. Both are known when the downward pass reaches a node.
-// Accelerations of assemblies are never formed.
+// The numeric half of O-DCA: the equations and names are in README.md ("A joint", "A join", "Plan
+// and sweep"), with an index of the paper's equations. All quantities are in ground axes: a body's
+// at its centre of mass, a joint's at Mo.
 //
 // Joins close loops one after another. If constraints are dependent, one join may be much worse
 // conditioned than the simultaneous solution of all constraints, and round-off spoils the result.
@@ -49,7 +10,7 @@
 //
 // squares the error; a regularization weight w becomes 1 - (1 - w)^2.
 //
-// Construction allocates all memory; no matrix is larger than the largest join of the plan.
+// Construction allocates all memory, in the sizes of the plan.
 #pragma once
 
 #include <atomic>
@@ -158,70 +119,10 @@ class Sweep {
     }
     return {bodies_[n].rotational_inverse * F.angular, F.linear * bodies_[n].per_mass};
   }
-  /// Returns the given part of a held body's acceleration, without its free directions. It is the
-  /// acceleration of the holder (null on Ground), moved to the body, with c0 of the hold. If the
-  /// hold is a tree joint, `known` (null if zero) replaces c0. Adds the generalised forces of F - M
-  /// (given part) to `along`.
-  Acceleration<Space, S> Hang(int n, const Acceleration<Space, S>* holder,
-                              const Wrench<Space, S>& F, const Components<Space, S>& c0,
-                              const Acceleration<Space, S>* known,
-                              Components<Space, S>& along) const;
-  /// v := L^-1 v and v := L^-T v for N = L L^T of the tree of leaf n.
-  void ApplyTree(int n, Components<Space, S>& v) const {
-    WithTree(n, [&](auto size, const S* L) { SolveLower(L, size, &v[0]); });
-  }
-  void ApplyTreeTransposed(int n, Components<Space, S>& v) const {
-    WithTree(n, [&](auto size, const S* L) { SolveLowerTransposed(L, size, &v[0]); });
-  }
-  /// L^-1 H^T F
-  Components<Space, S> AlongTree(int n, const Wrench<Space, S>& F) const;
-  /// L^-1 H^T c of each row c of a side of a held leaf, in the first components.
-  const Acceleration<Space, S>* AlongTree(const PlanSide& side) const { return &Mc_[Offset(side)]; }
-  Acceleration<Space, S> HeldAcceleration(int n, const Acceleration<Space, S>& given,
-                                          const Components<Space, S>& x) const;
-  /// Returns the wrench of the hold on a held body. A: the body's acceleration; F: sum of the other
-  /// wrenches on it. Then phi of this wrench, and the opposite wrench at the holder.
-  Wrench<Space, S> HoldingWrench(int n, const Acceleration<Space, S>& A,
-                                 const Wrench<Space, S>& F) const {
-    return Wrench<Space, S>(bodies_[n].rotational * A.angular, A.linear * bodies_[n].mass) - F;
-  }
-  Components<Space, S> HoldingForce(int n, const Wrench<Space, S>& holding) const;
-  Wrench<Space, S> OnHolder(int n, const Wrench<Space, S>& holding) const {
-    return -ShiftForce<Space, S>(holding, bodies_[n].from_holder);
-  }
-  /// Rows c of a joint, at the centres of mass: the wrenches on P and Q that unit forces along D
-  /// make.
-  const Wrench<Space, S>* c(int joint, bool at_Q, int rows) const {
-    return &c_[c_offset_[joint] + (at_Q ? rows : 0)];
-  }
-  const Wrench<Space, S>* c_P(const NodeJoint& joint) const {
-    return c(joint.index, false, joint.rows);
-  }
-  const Wrench<Space, S>* c_Q(const NodeJoint& joint) const {
-    return c(joint.index, true, joint.rows);
-  }
   /// V of an inner node on one of its kept handles: row after row.
   const S* V(const PlanNode& node, int n, const Handle& handle) const {
     return &Y_[places_[n].y + handle.number * node.rows];
   }
-  /// v := T v for the rows of an inner node, and v := T^T v.
-  template <class Rows>
-  void Apply(const PlanNode& node, int n, Rows rows, S* v) const {
-    if (node.closes_loop) {
-      loops_[places_[n].loop].Apply(Eigen::Map<MatrixX<S>>(v, rows, 1));
-    } else {
-      SolveLower(&X_[places_[n].x], rows, v);
-    }
-  }
-  template <class Rows>
-  void ApplyTransposed(const PlanNode& node, int n, Rows rows, S* v) const {
-    if (node.closes_loop) {
-      loops_[places_[n].loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, rows));
-    } else {
-      SolveLowerTransposed(&X_[places_[n].x], rows, v);
-    }
-  }
-
   /// Returns true if Assemble() dropped or regularized a direction; solutions are then refined.
   bool regularized() const { return regularized_; }
   int dependent_rows() const { return dependent_rows_; }
@@ -232,8 +133,6 @@ class Sweep {
   /// eigen-decomposition as if it were a Cholesky factorisation). After a failure in a piece, later
   /// pieces do not count.
   long operations() const { return operations_; }
-  /// Returns the entries of the largest matrix stored for one join: X or one Z.
-  int largest_matrix() const { return largest_matrix_; }
 
  private:
   /// Storage of a node's numbers.
@@ -269,6 +168,49 @@ class Sweep {
     MatrixX<S> columns;
     long operations = 0;  ///< until AddOperations()
   };
+  /// v := L^-1 v and v := L^-T v for N = L L^T of the tree of leaf n.
+  void ApplyTree(int n, Components<Space, S>& v) const {
+    WithTree(n, [&](auto size, const S* L) { SolveLower(L, size, &v[0]); });
+  }
+  void ApplyTreeTransposed(int n, Components<Space, S>& v) const {
+    WithTree(n, [&](auto size, const S* L) { SolveLowerTransposed(L, size, &v[0]); });
+  }
+  /// L^-1 H^T F
+  Components<Space, S> AlongTree(int n, const Wrench<Space, S>& F) const;
+  /// L^-1 H^T c of each row c of a side of a held leaf, in the first components.
+  const Acceleration<Space, S>* AlongTree(const PlanSide& side) const { return &Mc_[Offset(side)]; }
+  /// `given` plus the acceleration along the free directions of a held body.
+  Acceleration<Space, S> HeldAcceleration(int n, const Acceleration<Space, S>& given,
+                                          const Components<Space, S>& x) const;
+  /// Rows c of a joint, at the centres of mass: the wrenches on P and Q that unit forces along D
+  /// make.
+  const Wrench<Space, S>* c(int joint, bool at_Q, int rows) const {
+    return &c_[c_offset_[joint] + (at_Q ? rows : 0)];
+  }
+  const Wrench<Space, S>* c_P(const NodeJoint& joint) const {
+    return c(joint.index, false, joint.rows);
+  }
+  const Wrench<Space, S>* c_Q(const NodeJoint& joint) const {
+    return c(joint.index, true, joint.rows);
+  }
+  /// v := T v for the rows of an inner node, and v := T^T v.
+  template <class Rows>
+  void Apply(const PlanNode& node, int n, Rows rows, S* v) const {
+    if (node.closes_loop) {
+      loops_[places_[n].loop].Apply(Eigen::Map<MatrixX<S>>(v, rows, 1));
+    } else {
+      SolveLower(&X_[places_[n].x], rows, v);
+    }
+  }
+  template <class Rows>
+  void ApplyTransposed(const PlanNode& node, int n, Rows rows, S* v) const {
+    if (node.closes_loop) {
+      loops_[places_[n].loop].ApplyTransposed(Eigen::Map<VectorX<S>>(v, rows));
+    } else {
+      SolveLowerTransposed(&X_[places_[n].x], rows, v);
+    }
+  }
+
   bool IsLeaf(int n) const { return n < plan_.num_leaves(); }
   const PlanNode& Node(int n) const { return plan_.nodes()[n - plan_.num_leaves()]; }
   enum class Pass { kPhysical, kGeometric, kRegularized };
@@ -355,7 +297,6 @@ class Sweep {
   std::vector<LoopSolver<S>> loops_;
   std::vector<int> loop_nodes_;  ///< their nodes
   std::vector<Piece> pieces_;
-  int largest_matrix_ = 0;
   bool regularized_ = false;
   int dependent_rows_ = 0, worst_joint_ = -1;
   S rcond_ = S(1), smallest_weight_ = S(1);

@@ -182,7 +182,7 @@ struct TwoHandle {
 /// negative, as Q comes before or after. In the same way A_Q - A_P is the motion of the body before
 /// it relative to this one, or the negative. In both cases that is 2 w_P x RelativeVelocity(),
 /// which zeta13 includes. Changes of speeds remove RelativeVelocity().
-template <Sought kSought, class T>
+template <Unknowns kUnknowns, class T>
 LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at, const T& speed) {
   const T m = link.mobility, a = at.alpha, w2 = speed * speed * link.radius;
   const Vector2<T>&r1 = at.r1, &r2 = at.r2;
@@ -190,14 +190,14 @@ LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at,
   leaf.zeta11 = {m + r1.y * r1.y, -(r1.x * r1.y), m + r1.x * r1.x};
   leaf.zeta22 = {m + r2.y * r2.y, -(r2.x * r2.y), m + r2.x * r2.x};
   leaf.zeta12 = {m + r1.y * r2.y, -(r1.y * r2.x), -(r1.x * r2.y), m + r1.x * r2.x};
-  if constexpr (kSought == Sought::kSpeeds) {
+  if constexpr (kUnknowns == Unknowns::kSpeeds) {
     leaf.zeta13 = -at.gap_v;
     leaf.zeta23 = {T{}, T{}};
   } else {
     leaf.zeta13 = {link.gx - a * r1.y - w2 * r1.x, link.gy + a * r1.x - w2 * r1.y};
     leaf.zeta23 = {link.gx - a * r2.y - w2 * r2.x, link.gy + a * r2.x - w2 * r2.y};
   }
-  if constexpr (kSought == Sought::kAccelerations) {
+  if constexpr (kUnknowns == Unknowns::kAccelerations) {
     leaf.zeta13 = leaf.zeta13 + Cross(at.gap_w + at.gap_w, at.gap_v);  // (7)
   }
   return leaf;
@@ -205,11 +205,11 @@ LOOPBENCH_INLINE TwoHandle<T> Leaf(const Link<T>& link, const TurnedLink<T>& at,
 
 /// sqrt(I) times angular acceleration, or change of speed, once the forces or impulses on both
 /// handles are known (1-4).
-template <Sought kSought, class T>
+template <Unknowns kUnknowns, class T>
 LOOPBENCH_INLINE T AngularAcceleration(const TurnedLink<T>& at, const Vector2<T>& F1,
                                        const Vector2<T>& F2) {
   const T moment = (at.r1.x * F1.y - at.r1.y * F1.x) + (at.r2.x * F2.y - at.r2.y * F2.x);
-  return kSought == Sought::kSpeeds ? moment : at.alpha + moment;
+  return kUnknowns == Unknowns::kSpeeds ? moment : at.alpha + moment;
 }
 
 /// X = L D L^T of (16), by D^-1 and the l below L's ones; times b it is the solution of X x = b.
@@ -300,8 +300,8 @@ LOOPBENCH_INLINE Vector2<T> ForceIn(const EndCut<T>& cut, const Vector2<T>& F2) 
 
 /// Multiplications and divisions of these functions, as tests/odca/path_sweep_test.cpp counts them.
 struct Operations {
-  static constexpr int Leaf(Sought sought) {
-    return sought == Sought::kSpeeds ? 12 : sought == Sought::kAccelerations ? 22 : 20;
+  static constexpr int Leaf(Unknowns unknowns) {
+    return unknowns == Unknowns::kSpeeds ? 12 : unknowns == Unknowns::kAccelerations ? 22 : 20;
   }
   static constexpr int kJoin = 57, kEndJoin = 31, kForceIn = 8, kForceInEnd = 4,
                        kAngularAcceleration = 4;

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
+
+#include "harness/exchange/model.h"
 
 namespace loopbench::peers {
 
@@ -33,5 +36,23 @@ class Program {
   virtual void State(double* q, double* u) const = 0;
   virtual Counts counts() const = 0;
 };
+
+/// Makes a program of Simbody: tree joints become mobilizers with the same coordinates and speeds,
+/// cut joints and couplings become constraints, rotors become flywheels, forces become Simbody's
+/// own elements. Throws Unsupported for a helical cut joint.
+///
+/// RungeKuttaMersonIntegrator runs with `accuracy` = tolerance (|W yerr|_RMS, its own weights) and
+/// a tenth of it as constraint tolerance, Simbody's default. Positions, speeds and the error
+/// estimate are projected if they violate it.
+std::unique_ptr<Program> MakeSimbodyProgram(const exchange::Model& model);
+
+/// Makes a program of MuJoCo from the document of harness/exchange/export_mjcf.h at zero, and
+/// corrects closures that do not hold there. Throws exchange::Unsupported for parts that MJCF does
+/// not have.
+///
+/// MuJoCo has no error control and no projection. The fixed step of its classical Runge-Kutta
+/// method is 0.1 s tolerance^(1/4): its error of order four is then proportional to the tolerance.
+/// Closures are as stiff as these steps allow.
+std::unique_ptr<Program> MakeMujocoProgram(const exchange::Model& model);
 
 }  // namespace loopbench::peers

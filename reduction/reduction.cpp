@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "mechanism/model/dense_memory.h"
+#include "mechanism/algebra/dense_memory.h"
 
 namespace loopbench::reduction {
 

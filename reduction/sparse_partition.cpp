@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "mechanism/algebra/dense_memory.h"
 #include "mechanism/loops/loop_speeds.h"
-#include "mechanism/model/dense_memory.h"
 
 namespace loopbench::reduction {
 

@@ -1,4 +1,4 @@
-// Draws the picture of a mechanism (harness/figures/picture.h, as JSON) on a canvas, for any poses of
+// Draws the picture of a mechanism (harness/figures/view.h, as JSON) on a canvas, for any poses of
 // its bodies. No page, no network, no library: pages are made with it (view.js is one).
 //
 //   const drawing = new LoopbenchScene.Drawing(canvas, picture);

@@ -2,8 +2,9 @@
 #include <locale.h>
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
-#include <clocale>
+#include <cstddef>
 #include <cstdint>
 #include <cwchar>
 #include <iterator>
@@ -72,17 +73,13 @@ std::string Escape(std::string_view text, bool keep_line_ends) {
   return shown;
 }
 
-bool IsNumber(std::string_view text) {
+bool IsFormula(std::string_view text) {
+  constexpr std::string_view kBegins = "=+-@";
+  if (text.empty() || kBegins.find(text[0]) == text.npos || text == "-") return false;
   double number = 0.0;
   text.remove_prefix(text.starts_with('+') ? 1 : 0);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc{} && end == text.data() + text.size();
-}
-
-bool IsFormula(std::string_view text) {
-  constexpr std::string_view kBegins = "=+-@";
-  return !text.empty() && kBegins.find(text[0]) != std::string_view::npos && text != "-" &&
-         !IsNumber(text);
+  return error != std::errc{} || end != text.data() + text.size();
 }
 
 // Returns true if the character at `i` could begin or end markup there.
@@ -118,6 +115,44 @@ constexpr Replacement kLatex[] = {{'\\', "\\textbackslash{}"},  {'~', "\\textasc
 std::string_view Replaced(std::span<const Replacement> table, char c) {
   const auto known = std::ranges::find(table, c, &Replacement::character);
   return known == table.end() ? "" : known->text;
+}
+
+/// Scope in which the thread's characters are UTF-8, independent of the environment.
+class Utf8 {
+ public:
+  Utf8() {
+    static const locale_t utf8 = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+    if (utf8 != nullptr) before_ = ::uselocale(utf8);
+  }
+  ~Utf8() {
+    if (before_ != nullptr) ::uselocale(before_);
+  }
+  Utf8(const Utf8&) = delete;
+  Utf8& operator=(const Utf8&) = delete;
+
+ private:
+  locale_t before_ = nullptr;
+};
+
+/// Returns the longest beginning of at most `width` cells, and its cells.
+std::pair<std::string_view, std::size_t> Measured(std::string_view text, std::size_t width) {
+  const Utf8 utf8;
+  std::size_t bytes = 0, cells = 0;
+  while (bytes < text.size()) {
+    const Character first = FirstOf(text.substr(bytes));
+    const int wide = first.length == 0 ? 1 : ::wcwidth(static_cast<wchar_t>(first.code));
+    const std::size_t more = wide < 0 ? 1 : static_cast<std::size_t>(wide);
+    if (cells + more > width) break;
+    cells += more;
+    bytes += std::max<std::size_t>(first.length, 1);
+  }
+  return {text.substr(0, bytes), cells};
+}
+
+std::string Lowered(std::string_view word) {
+  std::string lowered(word);
+  for (char& c : lowered) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return lowered;
 }
 
 }  // namespace
@@ -257,62 +292,12 @@ std::string FileName(std::string_view name) {
   slug.erase(slug.find_last_not_of(".-") + 1);
   return slug + (slug.empty() ? "" : "-") + Fnv1a(name).substr(0, kHashDigits);
 }
-namespace {
-
-/// Scope in which the thread's characters are UTF-8, independent of the environment.
-class Utf8 {
- public:
-  Utf8() {
-    static const locale_t utf8 = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
-    if (utf8 != nullptr) before_ = ::uselocale(utf8);
-  }
-  ~Utf8() {
-    if (before_ != nullptr) ::uselocale(before_);
-  }
-  Utf8(const Utf8&) = delete;
-  Utf8& operator=(const Utf8&) = delete;
-
- private:
-  locale_t before_ = nullptr;
-};
-
-struct Glyph {
-  std::size_t bytes = 1, cells = 1;
-};
-
-Glyph FirstGlyph(std::string_view text) {
-  wchar_t wide = 0;
-  std::mbstate_t state{};
-  const std::size_t bytes = std::mbrtowc(&wide, text.data(), text.size(), &state);
-  if (bytes == 0 || bytes > text.size()) return {};
-  const int cells = ::wcwidth(wide);
-  return {bytes, cells < 0 ? 1 : static_cast<std::size_t>(cells)};
-}
-
-}  // namespace
 
 std::string_view Beginning(std::string_view text, std::size_t width) {
-  const Utf8 utf8;
-  std::size_t bytes = 0;
-  for (std::size_t cells = 0; bytes < text.size();) {
-    const Glyph glyph = FirstGlyph(text.substr(bytes));
-    cells += glyph.cells;
-    if (cells > width) break;
-    bytes += glyph.bytes;
-  }
-  return text.substr(0, bytes);
+  return Measured(text, width).first;
 }
 
-std::size_t CellsOf(std::string_view text) {
-  const Utf8 utf8;
-  std::size_t cells = 0;
-  while (!text.empty()) {
-    const Glyph glyph = FirstGlyph(text);
-    cells += glyph.cells;
-    text.remove_prefix(glyph.bytes);
-  }
-  return cells;
-}
+std::size_t CellsOf(std::string_view text) { return Measured(text, text.npos).second; }
 
 std::vector<std::string> BrokenInto(std::string_view text, std::size_t width) {
   std::vector<std::string> lines;
@@ -327,6 +312,83 @@ std::vector<std::string> BrokenInto(std::string_view text, std::size_t width) {
   }
   lines.emplace_back(text);
   return lines;
+}
+
+std::size_t CountCharacters(std::string_view text) {
+  return text.size() -
+         static_cast<std::size_t>(std::count_if(text.begin(), text.end(), ContinuesCharacter));
+}
+
+std::string Abbreviated(const std::string& text, std::size_t most) {
+  if (text.size() <= most) return text;
+  while (most > 0 && ContinuesCharacter(text[most])) --most;
+  return text.substr(0, most) + "...";
+}
+
+std::string ListInWords(const std::vector<std::string>& words, std::string_view last) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) text += i + 1 == words.size() ? " " + std::string(last) + " " : ", ";
+    text += words[i];
+  }
+  return text;
+}
+
+std::string LetterOf(std::size_t index) {
+  constexpr std::size_t kLetters = 26;
+  const std::string letter(1, static_cast<char>('A' + index % kLetters));
+  return index < kLetters ? letter : letter + std::to_string(index / kLetters);
+}
+
+std::string WithCount(std::size_t count, const std::string& word) {
+  const std::string number = std::to_string(count) + " ";
+  if (count == 1) return number + word;
+  return number + (word.ends_with('y') ? word.substr(0, word.size() - 1) + "ies" : word + "s");
+}
+
+int EditDistance(std::string_view a, std::string_view b) {
+  // three rows of the usual table: a swap of neighbours uses the row before the last
+  std::vector<int> before(b.size() + 1), last(b.size() + 1), now(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) last[j] = static_cast<int>(j);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    now[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const int replaced = last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      now[j] = std::min({replaced, last[j] + 1, now[j - 1] + 1});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) now[j] = std::min(now[j], before[j - 2] + 1);
+    }
+    before.swap(last);
+    last.swap(now);
+  }
+  return last[b.size()];
+}
+
+std::string NearestSpelling(std::string_view given, const std::vector<std::string>& known) {
+  // longer words are no typing errors, and the table is quadratic in the length
+  constexpr std::size_t kLongestWord = 100;
+  if (given.empty() || given.size() > kLongestWord) return "";
+  const std::string lowered = Lowered(given);
+  int allowed = std::max(1, static_cast<int>(given.size()) / 3);
+  std::string nearest;
+  for (const std::string& word : known) {
+    if (word.empty() || word.size() > kLongestWord) continue;
+    const int distance = EditDistance(lowered, Lowered(word));
+    // a one-letter name would match every other letter
+    if (distance > allowed || distance >= static_cast<int>(word.size())) continue;
+    nearest = word;
+    allowed = distance - 1;
+  }
+  if (!nearest.empty()) return nearest;
+  // a shortened or a longer word: "cpu" for "cpu_s"
+  constexpr std::size_t kShortestStart = 3;
+  for (const std::string& word : known) {
+    const std::string whole = Lowered(word);
+    const std::string_view shorter = whole.size() < lowered.size() ? whole : lowered;
+    if (shorter.size() < kShortestStart) continue;
+    if (whole.starts_with(shorter) && lowered.starts_with(shorter)) return word;
+  }
+  return "";
 }
 
 }  // namespace loopbench::harness

@@ -28,96 +28,106 @@
 
 namespace loopbench::harness {
 
-/// Value type of a key, and its member in a T.
-template <class T>
+/// Value type of a key, and its member in a T. The context C, if any, is passed to readers and
+/// writers: names that the value refers to, for example.
+template <class T, class... C>
 struct FieldValue {
-  using Read = std::function<void(const JsonNode&, T&)>;
+  using Read = std::function<void(const JsonNode&, T&, C&...)>;
   using Show = std::function<Json(const T&)>;
+  using Write = std::function<Json(const T&, C&...)>;
 
   Json schema;
   Read read;  ///< null: read by other code
   Show show;  ///< value as in a file; null if there is no unique form
   /// Value for writing; null if the key is left out. Without `write`, `show` is used, and default
   /// values of optional keys are left out.
-  Show write;
+  Write write;
 
   FieldValue(Json what, Read reader = nullptr, Show shown = nullptr,  // NOLINT: a schema is one
-             Show written = nullptr)
+             Write written = nullptr)
       : schema(std::move(what)),
         read(std::move(reader)),
         show(std::move(shown)),
         write(std::move(written)) {}
-  /// Converts a field of a base class to a field of the derived struct.
+  /// Converts a field of a base class.
   template <class Base>
   requires(std::derived_from<T, Base> && !std::same_as<T, Base>)
-      FieldValue(const FieldValue<Base>& other)  // NOLINT: as a T is a Base
+      FieldValue(const FieldValue<Base, C...>& other)  // NOLINT: as a T is a Base
       : schema(other.schema), read(other.read), show(other.show), write(other.write) {}
+  /// Converts a field without context.
+  template <class Base>
+  requires(std::derived_from<T, Base> && sizeof...(C) > 0)
+      FieldValue(const FieldValue<Base>& other)  // NOLINT: as a T is a Base
+      : schema(other.schema), show(other.show) {
+    if (other.read) {
+      read = [by = other.read](const JsonNode& node, T& owner, C&...) { by(node, owner); };
+    }
+    if (other.write) write = [by = other.write](const T& owner, C&...) { return by(owner); };
+  }
 };
 
 /// Row of a list of fields. Without a name it is a rule for the whole object: `schema` states it,
 /// and `read` is called with the object after the previous rows.
-template <class T>
+template <class T, class... C>
 struct Field {
   std::string name;
-  FieldValue<T> value;
+  FieldValue<T, C...> value;
   std::string sentence = "";
   std::string missing = "";  ///< expected value, for the error if a required key is missing
   /// Returns true if the rows after it cannot be checked.
-  bool (*ends)(const T&) = nullptr;
+  bool (*ends)(const T&, C&...) = nullptr;
 };
 
-template <class T>
+template <class T, class... C>
 class Fields {
  public:
   /// `name` is the object's name in schemas and tables.
-  Fields(std::string name, std::string sentence, std::vector<Field<T>> rows)
+  Fields(std::string name, std::string sentence, std::vector<Field<T, C...>> rows)
       : name_(std::move(name)), sentence_(std::move(sentence)), rows_(std::move(rows)) {
-    for (const Field<T>& row : rows_) {
+    for (const auto& row : rows_) {
       if (!row.name.empty()) keys_.Add(row.name);
     }
   }
 
   /// Reads all rows into `result`. Returns false, and reads nothing, if `node` is not an object.
   /// Reports unknown keys first.
-  bool Read(const JsonNode& node, T* result) const {
+  bool Read(const JsonNode& node, T* result, C&... context) const {
     if (!node.ExpectObject(keys_)) return false;
-    ReadRows(node, result);
+    ReadRows(node, result, context...);
     return true;
   }
 
   /// Reads all rows of an object whose keys are already checked.
-  void ReadRows(const JsonNode& node, T* result) const {
-    for (const Field<T>& row : rows_) {
-      if (row.name.empty()) {
-        if (row.value.read) row.value.read(node, *result);
-        continue;
-      }
-      const auto member =
-          row.missing.empty() ? node.Optional(row.name) : node.Required(row.name, row.missing);
-      if (member && row.value.read) row.value.read(*member, *result);
-      if (row.ends && row.ends(*result)) return;
+  void ReadRows(const JsonNode& node, T* result, C&... context) const {
+    for (const auto& row : rows_) {
+      const auto member = row.name.empty()      ? std::optional(node)
+                          : row.missing.empty() ? node.Optional(row.name)
+                                                : node.Required(row.name, row.missing);
+      if (member && row.value.read) row.value.read(*member, *result, context...);
+      if (row.ends && row.ends(*result, context...)) return;
     }
   }
 
   /// Calls `put` with the key and plain value of each row, in order.
   template <class Put>
   void Show(const T& object, Put put) const {
-    for (const Field<T>& row : rows_) {
+    for (const auto& row : rows_) {
       if (row.value.show) put(row.name, row.value.show(object));
     }
   }
 
-  /// Returns the object as JSON, from all rows that can be written. Read() gives the same object.
-  Json Write(const T& object) const {
+  /// Returns the object as JSON, from all rows that can be written, without empty lists and objects
+  /// of optional keys. Read() gives the same object.
+  Json Write(const T& object, C&... context) const {
     const T standard{};
     Json written = Json::object();
-    for (const Field<T>& row : rows_) {
-      const auto& say = row.value.write ? row.value.write : row.value.show;
-      if (row.name.empty() || !say) continue;
-      Json value = say(object);
-      const bool may_lack = !row.value.write && row.missing.empty();
-      if (value.is_null() || (may_lack && value == say(standard))) continue;
-      written[row.name] = std::move(value);
+    for (const auto& [name, value, sentence, missing, ends] : rows_) {
+      if (name.empty() || !(value.write || value.show)) continue;
+      Json json = value.write ? value.write(object, context...) : value.show(object);
+      const bool is_standard =
+          value.write ? json.is_structured() && json.empty() : json == value.show(standard);
+      if (json.is_null() || (missing.empty() && is_standard)) continue;
+      written[name] = std::move(json);
     }
     return written;
   }
@@ -126,7 +136,7 @@ class Fields {
   Json OwnSchema() const {
     const T standard{};
     std::vector<FieldSchema> fields;
-    for (const Field<T>& row : rows_) {
+    for (const auto& row : rows_) {
       fields.push_back({row.name, row.value.schema, row.sentence, !row.missing.empty(),
                         row.value.show ? row.value.show(standard) : Json()});
     }
@@ -136,14 +146,14 @@ class Fields {
 
  private:
   std::string name_, sentence_;
-  std::vector<Field<T>> rows_;
+  std::vector<Field<T, C...>> rows_;
   NameList keys_;
 };
 
 /// Returns a value with its own reader, a function of the node and a T, and optionally a writer.
-template <class T>
-FieldValue<T> By(Json schema, void (*read)(const JsonNode&, T&),
-                 Json (*write)(const T&) = nullptr) {
+template <class T, class... C>
+FieldValue<T, C...> By(Json schema, void (*read)(const JsonNode&, T&, C&...),
+                       std::type_identity_t<Json (*)(const T&, C&...)> write = nullptr) {
   return {std::move(schema), read, nullptr, write};
 }
 
@@ -186,42 +196,53 @@ FieldValue<T> Text(std::string T::*member) {
           [=](const T& owner) { return (owner.*member).empty() ? Json() : Json(owner.*member); }};
 }
 
+/// Returns a chosen name, or the enum or bool value of its index.
+template <class Chosen>
+Chosen ChosenOf(const NameList& names, std::size_t index) {
+  if constexpr (std::same_as<Chosen, std::string>) {
+    return names.all()[index];
+  } else {
+    return static_cast<Chosen>(index);
+  }
+}
+
+/// Returns the name of a choice; null for an empty name.
+template <class Chosen>
+Json NameOf(const Chosen& chosen, const NameList& names) {
+  if constexpr (std::same_as<Chosen, std::string>) {
+    return chosen.empty() ? Json() : Json(chosen);
+  } else {
+    return names.all()[static_cast<std::size_t>(chosen)];
+  }
+}
+
 /// Returns a choice among names; `what` names the object. The member is the name, or an enum or
 /// bool with the name's index as its value.
 template <class T, class Chosen>
 FieldValue<T> Choice(Chosen T::*member, const NameList& names, std::string what) {
   return {ChoiceSchema(names.all()),
           [=](const JsonNode& node, T& owner) {
-            const auto index = node.Choice(names, what);
-            if (!index) return;
-            if constexpr (std::same_as<Chosen, std::string>) {
-              owner.*member = names.all()[static_cast<std::size_t>(*index)];
-            } else {
-              owner.*member = static_cast<Chosen>(*index);
+            if (const auto index = node.Choice(names, what)) {
+              owner.*member = ChosenOf<Chosen>(names, static_cast<std::size_t>(*index));
             }
           },
-          [=](const T& owner) {
-            if constexpr (std::same_as<Chosen, std::string>) {
-              return (owner.*member).empty() ? Json() : Json(owner.*member);
-            } else {
-              return Json(names.all()[static_cast<std::size_t>(owner.*member)]);
-            }
-          }};
+          [=](const T& owner) { return NameOf(owner.*member, names); }};
 }
 
-/// Returns one or several different names of enum values, which are the indices of the names.
-template <class T, class Enum>
-FieldValue<T> Choices(std::vector<Enum> T::*member, const NameList& names, std::string what) {
-  return {OneOrMoreSchema(ChoiceSchema(names.all()), true),
+/// Returns one or several different names, as in Choice(). `names()` returns the names at the time
+/// of reading.
+template <class T, class Chosen, class Names>
+FieldValue<T> Choices(std::vector<Chosen> T::*member, Names names, std::string what) {
+  return {OneOrMoreSchema(ChoiceSchema(NameList(names()).all()), true),
           [=](const JsonNode& node, T& owner) {
+            const NameList known = names();
             (owner.*member).clear();
-            for (const std::size_t index : node.Choices(names, what)) {
-              (owner.*member).push_back(static_cast<Enum>(index));
+            for (const std::size_t index : node.Choices(known, what)) {
+              (owner.*member).push_back(ChosenOf<Chosen>(known, index));
             }
           },
           [=](const T& owner) {
-            const bool one = (owner.*member).size() == 1;
-            return one ? Json(names.all()[static_cast<std::size_t>((owner.*member)[0])]) : Json();
+            return (owner.*member).size() == 1 ? NameOf((owner.*member)[0], names()) : Json();
           }};
 }
 
@@ -239,32 +260,58 @@ FieldValue<T> IntegerList(std::vector<std::int64_t> T::*member, std::int64_t min
           [=](const JsonNode& node, T& owner) { owner.*member = node.IntegerList(min, max); }};
 }
 
-template <class T, class Part>
-FieldValue<T> Object(Part T::*member, const Fields<Part>& fields) {
-  return {fields.Schema(), [member, &fields](const JsonNode& node, T& owner) {
-            fields.Read(node, &(owner.*member));
+template <class T, class Part, class... C>
+FieldValue<T, C...> Object(Part T::*member, const Fields<Part, C...>& fields) {
+  return {fields.Schema(),
+          [member, &fields](const JsonNode& node, T& owner, C&... context) {
+            fields.Read(node, &(owner.*member), context...);
+          },
+          nullptr,
+          [member, &fields](const T& owner, C&... context) {
+            return fields.Write(owner.*member, context...);
+          }};
+}
+
+/// Returns an object that may be absent.
+template <class T, class Part, class... C>
+FieldValue<T, C...> OptionalObject(std::optional<Part> T::*member,
+                                   const Fields<Part, C...>& fields) {
+  return {fields.Schema(),
+          [member, &fields](const JsonNode& node, T& owner, C&... context) {
+            fields.Read(node, &(owner.*member).emplace(), context...);
+          },
+          nullptr,
+          [member, &fields](const T& owner, C&... context) {
+            return owner.*member ? fields.Write(*(owner.*member), context...) : Json();
           }};
 }
 
 /// Returns an object whose fields are members of the same struct.
-template <class T>
-FieldValue<T> Section(const Fields<T>& fields) {
-  return {fields.Schema(), [&fields](const JsonNode& node, T& owner) { fields.Read(node, &owner); },
+template <class T, class... C>
+FieldValue<T, C...> Section(const Fields<T, C...>& fields) {
+  return {fields.Schema(),
+          [&fields](const JsonNode& node, T& owner, C&... context) {
+            fields.Read(node, &owner, context...);
+          },
           nullptr,
-          [&fields](const T& owner) {
-            Json section = fields.Write(owner);
-            return section.empty() ? Json() : section;
-          }};
+          [&fields](const T& owner, C&... context) { return fields.Write(owner, context...); }};
 }
 
 /// Returns an array of objects; `what` names them.
-template <class T, class Part>
-FieldValue<T> ObjectList(std::vector<Part> T::*member, const Fields<Part>& fields,
-                         std::string what) {
-  return {ArraySchema(fields.Schema()), [=, &fields](const JsonNode& node, T& owner) {
+template <class T, class Part, class... C>
+FieldValue<T, C...> ObjectList(std::vector<Part> T::*member, const Fields<Part, C...>& fields,
+                               std::string what) {
+  return {ArraySchema(fields.Schema()),
+          [=, &fields](const JsonNode& node, T& owner, C&... context) {
             for (const JsonNode& element : node.Elements(what)) {
-              fields.Read(element, &(owner.*member).emplace_back());
+              fields.Read(element, &(owner.*member).emplace_back(), context...);
             }
+          },
+          nullptr,
+          [=, &fields](const T& owner, C&... context) {
+            Json list = Json::array();
+            for (const Part& part : owner.*member) list.push_back(fields.Write(part, context...));
+            return list;
           }};
 }
 
@@ -279,9 +326,9 @@ FieldValue<T> ObjectList(std::vector<Part> T::*member, const Fields<Part>& field
 bool ExpectDocument(const JsonNode& root, FileKind kind);
 
 /// Returns the common rows of all kinds, followed by `own`.
-template <class T>
-std::vector<Field<T>> DocumentRows(std::vector<Field<T>> own) {
-  std::vector<Field<T>> rows = {
+template <class T, class... C>
+std::vector<Field<T, C...>> DocumentRows(std::vector<Field<T, C...>> own) {
+  std::vector<Field<T, C...>> rows = {
       {"$schema", TextSchema(), "Address of this schema, for editors."},
       {"format", IntegerSchema(kFileFormat, kFileFormat),
        "Version of the file format. Files of other versions are rejected."}};

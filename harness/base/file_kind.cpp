@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <string>
-#include <vector>
 
 #include "harness/base/fields.h"
 #include "harness/base/text.h"

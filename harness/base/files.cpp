@@ -1,6 +1,8 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,9 +15,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <fstream>
 #include <iterator>
 #include <mutex>
+#include <new>
 #include <set>
 #include <stdexcept>
 #include <system_error>
@@ -25,82 +29,6 @@
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
-
-void FailOn(std::string_view verb, const std::filesystem::path& path) {
-  throw SystemFault(fmt::format("cannot {} '{}': {}", verb, path.string(), std::strerror(errno)));
-}
-
-void MakeFolderOf(const std::filesystem::path& path) {
-  if (!path.has_parent_path()) return;
-  std::error_code error;
-  std::filesystem::create_directories(path.parent_path(), error);
-  if (!error) return;
-  std::string reason = error.message();
-  std::error_code ignored;
-  for (auto folder = path.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
-    const auto kind = std::filesystem::symlink_status(folder, ignored).type();
-    if (kind != std::filesystem::file_type::symlink || std::filesystem::exists(folder, ignored)) {
-      continue;
-    }
-    reason = fmt::format("'{}' is a symbolic link to '{}', which is not there", folder.string(),
-                         std::filesystem::read_symlink(folder, ignored).string());
-  }
-  throw std::runtime_error(
-      fmt::format("cannot make folder '{}': {}", path.parent_path().string(), reason));
-}
-
-void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
-  WriteFileAtomically(path, [text](const auto& write) { write(text); });
-}
-
-void WriteFileAtomically(
-    const std::filesystem::path& path,
-    const std::function<void(const std::function<void(std::string_view)>& write)>& fill) {
-  OutputFile file(path);
-  fill([&file](std::string_view text) { file.Write(text); });
-  file.Finish();
-}
-
-bool WriteNewFile(const std::filesystem::path& path, std::string_view text) {
-  if (std::filesystem::exists(std::filesystem::symlink_status(path))) return false;
-  OutputFile file(path);
-  file.Write(text);
-  return file.FinishIfNew();
-}
-
-void SyncFolderOf(const std::filesystem::path& path) {
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
-void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& path) {
-  while (!text.empty()) {
-    const ssize_t written = ::write(descriptor, text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) FailOn("write", path);
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-}
-
-std::string ReadFile(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    throw std::runtime_error(fmt::format(
-        "cannot read '{}': found {}, expected a regular file", path.string(),
-        std::filesystem::is_directory(status) ? "a folder" : "a device, a pipe or a socket"));
-  }
-  NoteInput(path);
-  errno = 0;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) FailOn("read", path);
-  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  if (in.bad()) FailOn("read", path);
-  return text;
-}
 namespace {
 
 /// Paths to remove, readable by a signal handler. Paths that do not fit are removed only by their
@@ -131,27 +59,6 @@ extern "C" void RemoveAndEnd(int signal) {
   std::raise(signal);
 }
 
-void HearSignals() {
-  struct sigaction end = {}, before = {};
-  end.sa_handler = &RemoveAndEnd;
-  end.sa_flags = SA_RESTART;
-  const auto signals = {SIGHUP, SIGINT, SIGTERM, kRemoveAndEnd};
-  for (const int signal : signals) ::sigaddset(&end.sa_mask, signal);
-  for (const int signal : signals) {
-    ::sigaction(signal, nullptr, &before);
-    if (before.sa_handler == SIG_DFL) ::sigaction(signal, &end, nullptr);
-  }
-}
-
-std::filesystem::path FolderOfTemporaries() {
-  std::error_code error;
-  std::filesystem::path folder = std::filesystem::temp_directory_path(error);
-  if (!error) return folder;
-  const char* named = std::getenv("TMPDIR");
-  throw ConfigError(fmt::format("TMPDIR: found '{}', expected a folder for temporary files: {}",
-                                named == nullptr ? "/tmp" : named, error.message()));
-}
-
 /// Returns a locked descriptor of the folder; -1 if another process has the lock or removed it.
 int LockFolder(const std::filesystem::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
@@ -180,43 +87,6 @@ void RemoveAbandoned(const std::filesystem::path& folder, const std::string& beg
     ::close(lock);
   }
 }
-
-}  // namespace
-
-Unfinished::Unfinished(const std::filesystem::path& path)
-    : path_(std::filesystem::absolute(path).string()) {
-  for (Registered& one : registered) {
-    const char* none = nullptr;
-    if (!one.path.compare_exchange_strong(none, path_.c_str())) continue;
-    one.owner = ::getpid();
-    break;
-  }
-  HearSignals();
-}
-
-Unfinished::~Unfinished() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-  for (Registered& one : registered) {
-    if (one.path == path_.c_str()) one.path = nullptr;
-  }
-}
-
-TemporaryFolder::TemporaryFolder(const std::string& name) {
-  const std::filesystem::path folder = FolderOfTemporaries();
-  const std::string begin = name + ".tmp-";
-  RemoveAbandoned(folder, begin);
-  // another process may treat an unlocked folder as abandoned; some file systems have no locks
-  for (int i = 0; i < 10 && lock_ < 0; ++i) {
-    std::string made = (folder / (begin + "XXXXXX")).string();
-    if (::mkdtemp(made.data()) == nullptr) FailOn("make", made);
-    unfinished_.emplace(made);
-    lock_ = LockFolder(made);
-  }
-}
-
-TemporaryFolder::~TemporaryFolder() { ::close(lock_); }
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -293,7 +163,145 @@ bool IsOfEndedProcess(const std::string& name) {
          ::kill(pid, 0) != 0 && errno == ESRCH;
 }
 
+std::atomic<pid_t> under_way = 0;
+
+int exit_code = 2;
+std::string_view message_without_memory;
+std::terminate_handler previous_handler = nullptr;
+
+void Terminate() {
+  if (std::current_exception() != nullptr) {
+    try {
+      throw;
+    } catch (const std::bad_alloc&) {
+      [[maybe_unused]] const auto written =
+          ::write(STDERR_FILENO, message_without_memory.data(), message_without_memory.size());
+      ::_exit(exit_code);
+    } catch (...) {  // as before
+    }
+  }
+  previous_handler();
+}
+
 }  // namespace
+
+void FailOn(std::string_view verb, const std::filesystem::path& path) {
+  throw SystemFault(fmt::format("cannot {} '{}': {}", verb, path.string(), std::strerror(errno)));
+}
+
+void MakeFolderOf(const std::filesystem::path& path) {
+  if (!path.has_parent_path()) return;
+  std::error_code error;
+  std::filesystem::create_directories(path.parent_path(), error);
+  if (!error) return;
+  std::string reason = error.message();
+  std::error_code ignored;
+  for (auto folder = path.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
+    const auto kind = std::filesystem::symlink_status(folder, ignored).type();
+    if (kind != std::filesystem::file_type::symlink || std::filesystem::exists(folder, ignored)) {
+      continue;
+    }
+    reason = fmt::format("'{}' is a symbolic link to '{}', which is not there", folder.string(),
+                         std::filesystem::read_symlink(folder, ignored).string());
+  }
+  throw std::runtime_error(
+      fmt::format("cannot make folder '{}': {}", path.parent_path().string(), reason));
+}
+
+void WriteFileAtomically(const std::filesystem::path& path, std::string_view text) {
+  OutputFile file(path);
+  file.Write(text);
+  file.Finish();
+}
+
+bool WriteNewFile(const std::filesystem::path& path, std::string_view text) {
+  if (std::filesystem::exists(std::filesystem::symlink_status(path))) return false;
+  OutputFile file(path);
+  file.Write(text);
+  return file.FinishIfNew();
+}
+
+void SyncFolderOf(const std::filesystem::path& path) {
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+void WriteAll(int descriptor, std::string_view text, const std::filesystem::path& path) {
+  while (!text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) FailOn("write", path);
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+std::string ReadFile(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw std::runtime_error(fmt::format(
+        "cannot read '{}': found {}, expected a regular file", path.string(),
+        std::filesystem::is_directory(status) ? "a folder" : "a device, a pipe or a socket"));
+  }
+  NoteInput(path);
+  errno = 0;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) FailOn("read", path);
+  std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  if (in.bad()) FailOn("read", path);
+  return text;
+}
+
+Unfinished::Unfinished(const std::filesystem::path& path)
+    : path_(std::filesystem::absolute(path).string()) {
+  for (Registered& one : registered) {
+    const char* none = nullptr;
+    if (!one.path.compare_exchange_strong(none, path_.c_str())) continue;
+    one.owner = ::getpid();
+    break;
+  }
+  struct sigaction end = {}, before = {};
+  end.sa_handler = &RemoveAndEnd;
+  end.sa_flags = SA_RESTART;
+  const auto signals = {SIGHUP, SIGINT, SIGTERM, kRemoveAndEnd};
+  for (const int signal : signals) ::sigaddset(&end.sa_mask, signal);
+  for (const int signal : signals) {
+    ::sigaction(signal, nullptr, &before);
+    if (before.sa_handler == SIG_DFL) ::sigaction(signal, &end, nullptr);
+  }
+}
+
+Unfinished::~Unfinished() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+  for (Registered& one : registered) {
+    if (one.path == path_.c_str()) one.path = nullptr;
+  }
+}
+
+TemporaryFolder::TemporaryFolder(const std::string& name) {
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (error) {
+    const char* named = std::getenv("TMPDIR");
+    throw ConfigError(fmt::format("TMPDIR: found '{}', expected a folder for temporary files: {}",
+                                  named == nullptr ? "/tmp" : named, error.message()));
+  }
+  const std::string begin = name + ".tmp-";
+  RemoveAbandoned(folder, begin);
+  // another process may treat an unlocked folder as abandoned; some file systems have no locks
+  for (int i = 0; i < 10 && lock_ < 0; ++i) {
+    std::string made = (folder / (begin + "XXXXXX")).string();
+    if (::mkdtemp(made.data()) == nullptr) FailOn("make", made);
+    unfinished_.emplace(made);
+    lock_ = LockFolder(made);
+  }
+}
+
+TemporaryFolder::~TemporaryFolder() { ::close(lock_); }
 
 CommandInputs::CommandInputs() { inputs.are_noted = true; }
 
@@ -390,6 +398,81 @@ bool OutputFile::FinishIfNew() {
   SyncFolderOf(path_);
   Close();
   return failure == 0;
+}
+
+MemoryFile::MemoryFile(const char* what) : descriptor_(::memfd_create(what, MFD_CLOEXEC)) {
+  if (descriptor_ < 0) FailOn("make in memory", what);
+}
+
+MemoryFile::~MemoryFile() { ::close(descriptor_); }
+
+std::string MemoryFile::Text() const {
+  std::string text;
+  std::array<char, 1 << 16> buffer{};
+  for (off_t at = 0;;) {
+    const ssize_t count = ::pread(descriptor_, buffer.data(), buffer.size(), at);
+    if (count <= 0) return text;
+    text.append(buffer.data(), static_cast<std::size_t>(count));
+    at += count;
+  }
+}
+
+std::string ProgramResult::Failure(const std::string& name) const {
+  if (error == ENOENT) return fmt::format("'{}' not found", name);
+  if (error != 0) return fmt::format("cannot start '{}': {}", name, std::strerror(error));
+  if (status == 0) return "";
+  if (status > 128) return fmt::format("{} was ended by signal {}", name, status - 128);
+  return fmt::format("{} failed with exit code {}: {}", name, status, messages);
+}
+
+ProgramResult RunProgram(std::vector<std::string> words, const std::string& input) {
+  const MemoryFile in("input"), out("output"), messages("messages");
+  WriteAll(in.descriptor(), input, "input of " + words.front());
+  ::lseek(in.descriptor(), 0, SEEK_SET);
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  const MemoryFile fault("errno of exec");
+  ProgramResult result;
+  const pid_t parent = ::getpid(), child = ::fork();
+  if (child == 0) {
+    std::signal(SIGTERM, SIG_DFL);  // processes of cases ignore it
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != parent) ::_exit(EXIT_FAILURE);  // the parent died before the line above
+    ::dup2(in.descriptor(), STDIN_FILENO);
+    ::dup2(out.descriptor(), STDOUT_FILENO);
+    ::dup2(messages.descriptor(), STDERR_FILENO);
+    ::execvp(arguments[0], arguments.data());
+    const int number = errno;
+    ::_exit(::write(fault.descriptor(), &number, sizeof number) < 0 ? 126 : 127);
+  }
+  if (child < 0) result.error = errno;
+  if (child < 0) return result;
+  under_way = child;
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  under_way = 0;
+  if (::pread(fault.descriptor(), &result.error, sizeof result.error, 0) > 0) return result;
+  result.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.output = out.Text();
+  result.messages = messages.Text();
+  return result;
+}
+
+void EndProgram() {
+  const pid_t child = under_way;
+  if (child <= 0) return;
+  ::kill(child, SIGTERM);
+  while (::waitpid(child, nullptr, 0) < 0 && errno == EINTR) {
+  }
+}
+
+void ExitWithoutMemory(int code, std::string_view message) {
+  exit_code = code;
+  message_without_memory = message;
+  const std::terminate_handler known = std::set_terminate(&Terminate);
+  if (known != &Terminate) previous_handler = known;
 }
 
 }  // namespace loopbench::harness

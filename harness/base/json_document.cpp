@@ -3,16 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstddef>
 #include <fstream>
 #include <ranges>
 #include <set>
-#include <string>
-#include <string_view>
 #include <system_error>
 #include <unordered_set>
 #include <utility>
-#include <vector>
 
 #include "harness/base/text.h"
 
@@ -164,6 +160,115 @@ class Builder final : public nlohmann::json_sax<Json> {
   std::map<std::string, std::size_t> lines_;
 };
 
+// EncodingFault: detects text in encodings other than UTF-8.
+
+constexpr std::string_view kExpected = "expected UTF-8 text";
+
+/// Returns the encoding from a byte order mark or zero bytes at the start, or "".
+std::string_view WideEncoding(std::string_view text) {
+  using namespace std::string_view_literals;
+  // longer marks first: the UTF-32 mark begins like the UTF-16 mark
+  if (text.starts_with("\xFF\xFE\0\0"sv) || text.starts_with("\0\0\xFE\xFF"sv)) return "UTF-32";
+  if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv)) return "UTF-16";
+  if (text.size() < 2 || (text[0] == '\0') == (text[1] == '\0')) return "";
+  return text.size() >= 4 && text[1] == '\0' && text[2] == '\0' ? "UTF-32" : "UTF-16";
+}
+
+/// Returns the bytes of the first UTF-8 character, or 0 if it is invalid.
+std::size_t CharacterLength(std::string_view text) {
+  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned first = byte(0);
+  if (first < 0x80) return 1;
+  const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  if (first < 0xC2 || first > 0xF4 || text.size() < length) return 0;
+  if (!std::ranges::all_of(text.substr(1, length - 1), ContinuesCharacter)) return 0;
+  // overlong forms, surrogates, beyond U+10FFFF
+  const unsigned second = byte(1);
+  const bool refused = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+                       (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
+  return refused ? 0 : length;
+}
+
+bool IsWordCharacter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' ||
+         c == '-' || c == '.' || c == '_';
+}
+
+/// Returns the number or bare word that was read last, or otherwise the last character.
+std::string_view LastWord(std::string_view text, std::size_t position) {
+  if (position == 0 || text.empty()) return "";
+  std::size_t begin = std::min(position, text.size()) - 1;
+  if (!IsWordCharacter(text[begin]) && begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
+  std::size_t end = begin + 1;
+  if (!IsWordCharacter(text[begin])) {
+    while (end < text.size() && ContinuesCharacter(text[end])) ++end;
+    return text.substr(begin, end - begin);  // a whole character, of several bytes perhaps
+  }
+  while (begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
+  while (end < text.size() && IsWordCharacter(text[end])) ++end;
+  return text.substr(begin, end - begin);
+}
+
+/// Returns a hint from the characters around a syntax error, as " (...)" or "".
+std::string Hint(std::string_view text, std::size_t position, std::string_view word) {
+  if (position == 0 || position > text.size() || word.empty()) return "";
+  const std::size_t at = position - 1;
+  const char offending = text[at];
+  if (offending == '/' || offending == '#') return " (comments are not allowed)";
+  if (offending == '\'') return " (strings need double quotes)";
+  const std::string_view number = word.substr(word[0] == '-' || word[0] == '+' ? 1 : 0);
+  const auto begins = [number](auto... starts) { return (number.starts_with(starts) || ...); };
+  if (begins("NaN", "nan", "Inf", "inf")) return " (NaN and Infinity are not allowed)";
+  if (word[0] == '+') return " (numbers have no leading +)";
+  if (number.starts_with('.')) return " (numbers have a digit before the point)";
+  if (begins("0x", "0X")) return " (numbers are decimal)";
+  const bool after_zero =
+      number.size() > 1 && number[0] == '0' && number[1] >= '0' && number[1] <= '9';
+  if (after_zero) return " (numbers have no leading zeros)";
+  if (word == "True" || word == "False") return " (true and false are written small)";
+  if (word == "None") return " (no value is written null, or left out)";
+  if (offending != ']' && offending != '}') return "";
+  const std::size_t last = text.substr(0, at).find_last_not_of(" \t\r\n");
+  const bool trailing_comma = last != text.npos && text[last] == ',';
+  return trailing_comma ? " (remove the comma before the closing bracket)" : "";
+}
+
+/// Returns the text after `start`, up to `end` or the end of the message; "" without `start`.
+std::string Between(const std::string& message, std::string_view start, std::string_view end) {
+  const std::size_t at = message.find(start);
+  if (at == std::string::npos) return "";
+  const std::size_t from = at + start.size();
+  const std::size_t to = end.empty() ? std::string::npos : message.find(end, from);
+  return message.substr(from, to == std::string::npos ? to : to - from);
+}
+
+/// Returns readable expectations: the parser omits "," where it expects a closing bracket.
+std::string Expected(const std::string& parsers, bool in_key) {
+  if (parsers == "'}'") return "',' or '}'";
+  if (parsers == "']'") return "',' or ']'";
+  if (parsers == "end of input") return "the end of the file";
+  if (parsers.starts_with("digit")) return "a digit" + parsers.substr(5);
+  if (in_key || parsers == "string literal") return "a key in double quotes";
+  return parsers.starts_with("'[', '{'") || parsers.empty() ? "a value" : parsers;
+}
+
+constexpr std::size_t kWidth = 100;  ///< characters of a line
+
+/// Returns one line if it fits after `used` characters, otherwise one element per line.
+std::string Written(const Json& value, std::size_t indent, std::size_t used) {
+  const std::string flat = FlatText(value);
+  if (used + flat.size() < kWidth || !value.is_structured() || value.empty()) return flat;
+  const std::string margin(indent + 2, ' ');
+  std::string text;
+  for (auto child = value.begin(); child != value.end(); ++child) {
+    const std::string key = value.is_object() ? Json(child.key()).dump() + ": " : "";
+    text += (text.empty() ? "\n" : ",\n") + margin + key +
+            Written(*child, indent + 2, margin.size() + key.size());
+  }
+  text += "\n" + std::string(indent, ' ');
+  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
+}
+
 }  // namespace
 
 std::string ReadTextFile(const std::filesystem::path& path) {
@@ -221,11 +326,8 @@ std::string Printable(const std::string& text) {
   std::string printable;
   for (const char c : text) {
     const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x20 && byte != 0x7F) {
-      printable += c;
-    } else {
-      printable += fmt::format("\\u{:04x}", byte);
-    }
+    const bool is_control = byte < 0x20 || byte == 0x7F;
+    printable += is_control ? fmt::format("\\u{:04x}", byte) : std::string(1, c);
   }
   return printable;
 }
@@ -233,49 +335,10 @@ std::string Printable(const std::string& text) {
 std::string PointerToken(std::string_view key) {
   std::string token;
   for (const char c : key) {
-    if (c == '~') {
-      token += "~0";
-    } else if (c == '/') {
-      token += "~1";
-    } else {
-      token += c;
-    }
+    token += c == '~' ? "~0" : c == '/' ? "~1" : std::string_view(&c, 1);
   }
   return token;
 }
-
-// EncodingFault: detects text in encodings other than UTF-8.
-
-namespace {
-
-constexpr std::string_view kExpected = "expected UTF-8 text";
-
-/// Returns the encoding from a byte order mark or zero bytes at the start, or "".
-std::string_view WideEncoding(std::string_view text) {
-  using namespace std::string_view_literals;
-  // longer marks first: the UTF-32 mark begins like the UTF-16 mark
-  if (text.starts_with("\xFF\xFE\0\0"sv) || text.starts_with("\0\0\xFE\xFF"sv)) return "UTF-32";
-  if (text.starts_with("\xFF\xFE"sv) || text.starts_with("\xFE\xFF"sv)) return "UTF-16";
-  if (text.size() < 2 || (text[0] == '\0') == (text[1] == '\0')) return "";
-  return text.size() >= 4 && text[1] == '\0' && text[2] == '\0' ? "UTF-32" : "UTF-16";
-}
-
-/// Returns the bytes of the first UTF-8 character, or 0 if it is invalid.
-std::size_t CharacterLength(std::string_view text) {
-  const auto byte = [text](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-  if (first < 0xC2 || first > 0xF4 || text.size() < length) return 0;
-  if (!std::ranges::all_of(text.substr(1, length - 1), ContinuesCharacter)) return 0;
-  // overlong forms, surrogates, beyond U+10FFFF
-  const unsigned second = byte(1);
-  const bool refused = (first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
-                       (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F);
-  return refused ? 0 : length;
-}
-
-}  // namespace
 
 std::string EncodingFault(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) {
@@ -304,78 +367,6 @@ std::map<std::string, std::size_t> LinesOf(std::string_view text,
                                            const std::vector<std::string>& pointers) {
   return Builder(text, "", pointers).lines();
 }
-
-namespace {
-
-bool IsWordCharacter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '+' ||
-         c == '-' || c == '.' || c == '_';
-}
-
-/// Returns the number or bare word that was read last, or otherwise the last character.
-std::string_view LastWord(std::string_view text, std::size_t position) {
-  if (position == 0 || text.empty()) return "";
-  std::size_t begin = std::min(position, text.size()) - 1;
-  if (!IsWordCharacter(text[begin]) && begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
-  std::size_t end = begin + 1;
-  if (!IsWordCharacter(text[begin])) {
-    while (end < text.size() && ContinuesCharacter(text[end])) ++end;
-    return text.substr(begin, end - begin);  // a whole character, of several bytes perhaps
-  }
-  while (begin > 0 && IsWordCharacter(text[begin - 1])) --begin;
-  while (end < text.size() && IsWordCharacter(text[end])) ++end;
-  return text.substr(begin, end - begin);
-}
-
-/// Returns a hint from the characters around a syntax error, as " (...)" or "".
-std::string Hint(std::string_view text, std::size_t position, std::string_view word) {
-  if (position == 0 || position > text.size() || word.empty()) return "";
-  std::size_t at = position - 1;
-  const char offending = text[at];
-  if (offending == '/' || offending == '#') return " (comments are not allowed)";
-  if (offending == '\'') return " (strings need double quotes)";
-  const std::string_view number = word.substr(word[0] == '-' || word[0] == '+' ? 1 : 0);
-  if (number.starts_with("NaN") || number.starts_with("nan") || number.starts_with("Inf") ||
-      number.starts_with("inf")) {
-    return " (NaN and Infinity are not allowed)";
-  }
-  if (word[0] == '+') return " (numbers have no leading +)";
-  if (number.starts_with('.')) return " (numbers have a digit before the point)";
-  if (number.starts_with("0x") || number.starts_with("0X")) return " (numbers are decimal)";
-  const bool after_zero =
-      number.size() > 1 && number[0] == '0' && number[1] >= '0' && number[1] <= '9';
-  if (after_zero) return " (numbers have no leading zeros)";
-  if (word == "True" || word == "False") return " (true and false are written small)";
-  if (word == "None") return " (no value is written null, or left out)";
-  if (offending != ']' && offending != '}') return "";
-  while (at > 0 && (text[at - 1] == ' ' || text[at - 1] == '\t' || text[at - 1] == '\n' ||
-                    text[at - 1] == '\r')) {
-    --at;
-  }
-  const bool trailing_comma = at > 0 && text[at - 1] == ',';
-  return trailing_comma ? " (remove the comma before the closing bracket)" : "";
-}
-
-/// Returns the text after `start`, up to `end` or the end of the message; "" without `start`.
-std::string Between(const std::string& message, std::string_view start, std::string_view end) {
-  const std::size_t at = message.find(start);
-  if (at == std::string::npos) return "";
-  const std::size_t from = at + start.size();
-  const std::size_t to = end.empty() ? std::string::npos : message.find(end, from);
-  return message.substr(from, to == std::string::npos ? to : to - from);
-}
-
-/// Returns readable expectations: the parser omits "," where it expects a closing bracket.
-std::string Expected(const std::string& parsers, bool in_key) {
-  if (parsers == "'}'") return "',' or '}'";
-  if (parsers == "']'") return "',' or ']'";
-  if (parsers == "end of input") return "the end of the file";
-  if (parsers.starts_with("digit")) return "a digit" + parsers.substr(5);
-  if (in_key || parsers == "string literal") return "a key in double quotes";
-  return parsers.starts_with("'[', '{'") || parsers.empty() ? "a value" : parsers;
-}
-
-}  // namespace
 
 std::string ShortToken(const std::string& token) {
   constexpr std::size_t kLongest = 40;
@@ -413,27 +404,6 @@ std::string SyntaxMessage(const std::string& message, std::string_view text, std
   }
   return fmt::format("found {}, expected {}{}", found, expected, Hint(text, position, word));
 }
-
-namespace {
-
-constexpr std::size_t kWidth = 100;  ///< characters of a line
-
-/// Returns one line if it fits after `used` characters, otherwise one element per line.
-std::string Written(const Json& value, std::size_t indent, std::size_t used) {
-  const std::string flat = FlatText(value);
-  if (used + flat.size() < kWidth || !value.is_structured() || value.empty()) return flat;
-  const std::string margin(indent + 2, ' ');
-  std::string text;
-  for (auto child = value.begin(); child != value.end(); ++child) {
-    const std::string key = value.is_object() ? Json(child.key()).dump() + ": " : "";
-    text += (text.empty() ? "\n" : ",\n") + margin + key +
-            Written(*child, indent + 2, margin.size() + key.size());
-  }
-  text += "\n" + std::string(indent, ' ');
-  return value.is_object() ? "{" + text + "}" : "[" + text + "]";
-}
-
-}  // namespace
 
 std::string FlatText(const Json& value) {
   if (!value.is_structured()) return value.dump();

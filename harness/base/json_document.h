@@ -61,18 +61,12 @@ std::string Printable(const std::string& text);
 /// found ..., expected ...".
 std::string EncodingFault(std::string_view text);
 
-// Messages for syntax errors, in the form of the other messages.
-//
-// Internal to harness/config.
-
 /// Returns "found ..., expected ... (hint)" from the parser's message about `text`. `position` is
 /// the number of characters read, so that the offending token ends just before it.
 std::string SyntaxMessage(const std::string& message, std::string_view text, std::size_t position);
 
 /// Returns the last characters of a token, which may be megabytes long.
 std::string ShortToken(const std::string& token);
-
-// Readable JSON text, for schemas and for mechanisms and experiments written by commands.
 
 /// Returns the value on one line, with a space after each comma and colon.
 std::string FlatText(const Json& value);

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstddef>
-#include <map>
 #include <set>
 
 #include "harness/base/text.h"
@@ -27,6 +25,18 @@ std::string Shown(const Json& value) {
   return Abbreviated(text, kLongestShown);
 }
 
+using LineNumbers = std::map<std::string, std::size_t>;
+
+/// Returns "FILE:LINE: POINTERtext (note)".
+std::string Located(const Origins::Place& place, const LineNumbers& lines,
+                    const std::string& text) {
+  const auto line = lines.find(place.line_pointer);
+  return fmt::format("{}{}: {}{}{}", place.file,
+                     line == lines.end() ? "" : fmt::format(":{}", line->second),
+                     Printable(ShownPointer(place.pointer)), text,
+                     place.note.empty() ? "" : " (" + place.note + ")");
+}
+
 /// Returns "a", "b", "c" without empty names.
 std::string Listed(const std::vector<std::string>& names) {
   std::vector<std::string> quoted;
@@ -39,6 +49,33 @@ std::string Listed(const std::vector<std::string>& names) {
     quoted.push_back('"' + Abbreviated(name) + '"');
   }
   return quoted.empty() ? "there is none" : fmt::format("{}", fmt::join(quoted, ", "));
+}
+
+// Lists of numbers in a file: one, several, or a range.
+
+/// Returns the short decimal number if only round-off separates it from `value`: 1e-08 for the
+/// 1.0000000000000002e-08 that a power gives.
+double Clean(double value) {
+  const std::string text = fmt::format("{:.13g}", value);
+  double rounded = value;
+  std::from_chars(text.data(), text.data() + text.size(), rounded);
+  constexpr double kRoundOff = 1e-15;  // some ulps: of lerp, log10 and pow
+  return std::abs(rounded - value) <= kRoundOff * std::abs(value) ? rounded : value;
+}
+
+std::vector<double> Spread(double from, double to, int count, bool logarithmic) {
+  std::vector<double> numbers(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const double t = static_cast<double>(i) / (count - 1);
+    numbers[i] = logarithmic ? std::copysign(std::pow(10.0, std::lerp(std::log10(std::abs(from)),
+                                                                      std::log10(std::abs(to)), t)),
+                                             from)
+                             : std::lerp(from, to, t);
+  }
+  for (double& number : numbers) number = Clean(number);
+  numbers.front() = from;
+  numbers.back() = to;
+  return numbers;
 }
 
 }  // namespace
@@ -77,13 +114,8 @@ void ErrorList::AddText(const std::string& text) {
 
 std::string ErrorList::PlaceOf(const std::string& pointer) const {
   const Origins::Place place = origins_.Find(pointer);
-  std::string line;
-  if (!place.text.empty()) {
-    const auto lines = LinesOf(place.text, {place.line_pointer});
-    if (!lines.empty()) line = fmt::format(":{}", lines.begin()->second);
-  }
-  return fmt::format("{}{}: {}{}", place.file, line, Printable(ShownPointer(place.pointer)),
-                     place.note.empty() ? "" : " (" + place.note + ")");
+  const auto lines = place.text.empty() ? LineNumbers() : LinesOf(place.text, {place.line_pointer});
+  return Located(place, lines, "");
 }
 
 void ErrorList::ThrowIfAny(const std::string& ending) const {
@@ -95,24 +127,17 @@ void ErrorList::ThrowIfAny(const std::string& ending) const {
     places.push_back(origins_.Find(message.pointer));
     if (!message.finished) wanted[places.back().text].push_back(places.back().line_pointer);
   }
-  std::map<std::string_view, std::map<std::string, std::size_t>> lines;
+  std::map<std::string_view, LineNumbers> lines;
   for (const auto& [text, pointers] : wanted) {
     if (!text.empty()) lines[text] = LinesOf(text, pointers);
   }
   std::vector<std::string> all;
   for (std::size_t i = 0; i < messages_.size(); ++i) {
-    if (messages_[i].finished) {
-      all.push_back(messages_[i].text);
-      continue;
-    }
-    const Origins::Place& place = places[i];
-    const auto& known = lines[place.text];
-    const auto line = known.find(place.line_pointer);
-    all.push_back(fmt::format("{}{}: {}: {}{}", place.file,
-                              line == known.end() ? "" : fmt::format(":{}", line->second),
-                              Printable(ShownPointer(place.pointer)), messages_[i].text,
-                              place.note.empty() ? "" : " (" + place.note + ")"));
-    if (const Message& message = messages_[i]; message.others > 0) {
+    const Message& message = messages_[i];
+    all.push_back(message.finished
+                      ? message.text
+                      : Located(places[i], lines[places[i].text], ": " + message.text));
+    if (message.others > 0) {
       all.back() += fmt::format("; the same cure for {} more: {}{}", message.others,
                                 Printable(fmt::format("{}", fmt::join(message.also, ", "))),
                                 message.others > message.also.size() ? ", ..." : "");
@@ -290,37 +315,6 @@ std::vector<std::size_t> JsonNode::Choices(const NameList& known, std::string_vi
   }
   return indices;
 }
-
-// Lists of numbers in a file: one, several, or a range.
-
-namespace {
-
-/// Returns the short decimal number if only round-off separates it from `value`: 1e-08 for the
-/// 1.0000000000000002e-08 that a power gives.
-double Clean(double value) {
-  const std::string text = fmt::format("{:.13g}", value);
-  double rounded = value;
-  std::from_chars(text.data(), text.data() + text.size(), rounded);
-  constexpr double kRoundOff = 1e-15;  // some ulps: of lerp, log10 and pow
-  return std::abs(rounded - value) <= kRoundOff * std::abs(value) ? rounded : value;
-}
-
-std::vector<double> Spread(double from, double to, int count, bool logarithmic) {
-  std::vector<double> numbers(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i) {
-    const double t = static_cast<double>(i) / (count - 1);
-    numbers[i] = logarithmic ? std::copysign(std::pow(10.0, std::lerp(std::log10(std::abs(from)),
-                                                                      std::log10(std::abs(to)), t)),
-                                             from)
-                             : std::lerp(from, to, t);
-  }
-  for (double& number : numbers) number = Clean(number);
-  numbers.front() = from;
-  numbers.back() = to;
-  return numbers;
-}
-
-}  // namespace
 
 std::vector<double> JsonNode::Spaced(const Range& range) const {
   if (!ExpectObject({"lin", "log"})) return {};

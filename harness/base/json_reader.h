@@ -16,12 +16,9 @@
 
 namespace loopbench::harness {
 
-// Origin of the values of a document: its file, included files, and settings.
-//
-// A sweep and --set change a document after it was parsed, and a pointer through the path of a
-// mechanism includes that file. Messages must still name the file and line to edit. Internal to
-// harness/config.
-
+/// Origin of the values of a document: its file, included files, and settings. A sweep and --set
+/// change a document after it was parsed, and a pointer through the path of a mechanism includes
+/// that file. Messages must still name the file and line to edit.
 class Origins {
  public:
   /// Origin in document `file` with this text, which must outlive the object. If the text is "",
@@ -76,15 +73,10 @@ class Origins {
   std::vector<Part> parts_;
 };
 
-// Cursor over a JSON document whose getters report invalid values.
-//
-// After an error, reading continues with a placeholder value, so that all errors of a file are
-// reported:
-//   FILE:LINE: /json/pointer: found VALUE, expected WHAT (did you mean "x"?)
-// The caller ends with ErrorList::ThrowIfAny(); values read before are not used if it throws. For
-// harness/config and harness/base (see json_document.h).
-
 /// Errors of one file, in the order of detection. Errors beyond kMaxMessages are only counted.
+/// After an error, reading continues with a placeholder value, so that all errors are reported:
+///   FILE:LINE: /json/pointer: found VALUE, expected WHAT (did you mean "x"?)
+/// The caller ends with ThrowIfAny(); values read before are not used if it throws.
 class ErrorList {
  public:
   /// `text` is the file's text, for line numbers; it must outlive the list.

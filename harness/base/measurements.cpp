@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
 #include <set>
 
 #include "harness/base/json_reader.h"
-#include "harness/base/record.h"
 #include "harness/base/store.h"
 #include "harness/base/text.h"
 

@@ -1,7 +1,6 @@
 #include <algorithm>
-#include <deque>
+#include <iterator>
 #include <map>
-#include <string>
 
 #include "harness/base/record.h"
 #include "mechanism/description/registration.h"
@@ -314,13 +313,7 @@ constexpr Measure kMeasures[] = {
     {"real_ns"},
 };
 
-}  // namespace
-
-std::span<const Measure> BuiltInMeasures() { return kMeasures; }
-
 // Table of measures: the built-in rows (measures.cpp), and rows that programs add.
-
-namespace {
 
 using enum ValueType;
 
@@ -382,6 +375,8 @@ void RequireMeasure(std::span<const Measure> fresh, std::size_t index) {
 }
 
 }  // namespace
+
+std::span<const Measure> BuiltInMeasures() { return kMeasures; }
 
 const std::deque<Measure>& Measures() { return AllMeasures().rows; }
 

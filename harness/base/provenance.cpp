@@ -8,9 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <string_view>
 #include <thread>
-#include <vector>
 
 #include "harness/base/record.h"
 #include "harness/base/text.h"

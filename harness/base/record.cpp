@@ -5,16 +5,44 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <type_traits>
-#include <utility>
-#include <vector>
 
 #include "harness/base/json_document.h"
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
+namespace {
+
+Json FromNumber(double number) { return std::isfinite(number) ? Json(number) : Json(nullptr); }
+
+Json FromValue(const Value& value) {
+  const auto convert = [](const auto& held) -> Json {
+    using Held = std::decay_t<decltype(held)>;
+    if constexpr (std::is_same_v<Held, std::monostate>) {
+      return nullptr;
+    } else if constexpr (std::is_same_v<Held, double>) {
+      return FromNumber(held);
+    } else if constexpr (std::is_same_v<Held, std::vector<double>>) {
+      return Mapped<Json>(held, FromNumber);
+    } else {
+      return held;
+    }
+  };
+  return std::visit(convert, value);
+}
+
+std::string Dumped(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+constexpr std::string_view kKey = "\"checksum\":\"";
+constexpr std::size_t kDigits = 16, kSuffix = kKey.size() + kDigits + 2;  // with "}
+
+/// Returns a value as JSON.
+std::string ValueText(const Value& value) { return Dumped(FromValue(value)); }
+
+}  // namespace
 
 void Record::Set(std::string_view key, Value value) {
   const auto it = std::ranges::find(items_, key, &std::pair<std::string, Value>::first);
@@ -61,42 +89,12 @@ const std::vector<double>& Record::Numbers(std::string_view key) const {
   const auto* series = std::get_if<std::vector<double>>(value);
   return series == nullptr ? kEmpty : *series;
 }
-namespace {
 
-template <typename Json>
-Json FromNumber(double number) {
-  return std::isfinite(number) ? Json(number) : Json(nullptr);
-}
-
-template <typename Json>
-Json FromValue(const Value& value) {
-  const auto convert = [](const auto& held) -> Json {
-    using Held = std::decay_t<decltype(held)>;
-    if constexpr (std::is_same_v<Held, std::monostate>) {
-      return nullptr;
-    } else if constexpr (std::is_same_v<Held, double>) {
-      return FromNumber<Json>(held);
-    } else if constexpr (std::is_same_v<Held, std::vector<double>>) {
-      Json series = Json::array();
-      for (const double number : held) series.push_back(FromNumber<Json>(number));
-      return series;
-    } else {
-      return held;
-    }
-  };
-  return std::visit(convert, value);
-}
-
-template <typename Json>
-std::string Dump(const Record& record) {
+std::string ToJsonObject(const Record& record) {
   Json object = Json::object();
-  for (const auto& [key, value] : record.items()) object[key] = FromValue<Json>(value);
-  return object.dump(-1, ' ', false, Json::error_handler_t::replace);
+  for (const auto& [key, value] : record.items()) object[key] = FromValue(value);
+  return Dumped(object);
 }
-
-}  // namespace
-
-std::string ToJsonObject(const Record& record) { return Dump<nlohmann::ordered_json>(record); }
 
 std::string ToJsonLine(const Record& record) {
   std::string object = ToJsonObject(record);
@@ -106,15 +104,12 @@ std::string ToJsonLine(const Record& record) {
 }
 
 std::string CaseId(const Record& canonical_keys) {
-  // nlohmann::json sorts its keys
-  return Fnv1a(Dump<nlohmann::json>(canonical_keys));
+  auto items = canonical_keys.items();
+  std::ranges::sort(items, {}, &std::pair<std::string, Value>::first);
+  Record sorted;
+  for (auto& [key, value] : items) sorted.Append(std::move(key), std::move(value));
+  return Fnv1a(ToJsonObject(sorted));
 }
-namespace {
-
-constexpr std::string_view kKey = "\"checksum\":\"";
-constexpr std::size_t kDigits = 16, kSuffix = kKey.size() + kDigits + 2;  // with "}
-
-}  // namespace
 
 std::string WithChecksum(std::string object) {
   object.pop_back();
@@ -159,18 +154,6 @@ std::string Excerpt(std::string_view text) {
   }
   return shown;
 }
-namespace {
-
-/// Returns a value as JSON: the text after the key of an object with one member.
-std::string ValueText(Value value) {
-  Record record;
-  record.Set("", std::move(value));
-  constexpr std::string_view kBefore = "{\"\":", kBehind = "}";
-  const std::string text = ToJsonObject(record);
-  return text.substr(kBefore.size(), text.size() - kBefore.size() - kBehind.size());
-}
-
-}  // namespace
 
 JsonObject::JsonObject(const Record& record) {
   for (const auto& [key, value] : record.items()) Add(key, value);

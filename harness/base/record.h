@@ -114,8 +114,6 @@ ValueType TypeOf(std::string_view key);
 /// True if a run may write a value of this name to a record: no parameter of a sweep may have it.
 bool IsReserved(std::string_view name);
 
-// Checks if the machine is quiet enough to compare times: three criteria with thresholds.
-
 /// State of the machine during timing.
 struct MachineState {
   double load1 = 0;    ///< load average of the last minute: processes that run or are ready to run
@@ -164,10 +162,6 @@ std::vector<std::size_t> QuietRounds(const std::vector<double>& slowest, double 
 /// (quiet: up to 2 %)"; "" if it counts as quiet. NaN is no reason: the value was not measured.
 std::string NoiseReasons(const MachineState& machine, double aa_spread_rhs, double aa_spread_wall,
                          const NoiseThresholds& thresholds = {});
-
-// Records: ordered keys and values, and their JSON with its checksum.
-
-// Result of one case as named values, for the store, tables, plots and claims.
 
 /// A value of a record. `monostate` is "not measured"; it prints as an empty cell, never as zero.
 ///
@@ -221,17 +215,13 @@ class Record {
   std::vector<std::pair<std::string, Value>> items_;
 };
 
-// Conversion of a Record to one line of JSON and back.
-
 /// Returns the record as one JSON object without line breaks: "format" (text.h), keys in the
 /// record's order, then its checksum.
 ///
-/// JSON has no NaN and no infinity. A non-finite double is written as null, which reads back as
-/// monostate ("not measured"), or as NaN inside a series. All other values keep their type and bits
-/// (doubles in shortest round-trip form, "1.0" never "1"). Bytes that are not UTF-8 become U+FFFD.
-///
-/// The line ends with ,"checksum":"16 hexadecimal digits"}: FNV-1a (64 bit) of all bytes before. It
-/// detects accidental changes of a line, single flipped bits with certainty; it is no signature.
+/// A non-finite double is written as null, which reads back as monostate ("not measured"), or as
+/// NaN inside a series. All other values keep their type and bits ("1.0" never "1"). Bytes that are
+/// not UTF-8 become U+FFFD. The line ends with ,"checksum":"16 hexadecimal digits"}: FNV-1a (64
+/// bit) of all bytes before. It detects accidental changes; it is no signature.
 std::string ToJsonLine(const Record& record);
 /// Returns the object without format and checksum: a row of a table, not of a store.
 std::string ToJsonObject(const Record& record);
@@ -248,12 +238,9 @@ Record FromJsonLine(std::string_view line, bool* is_sealed = nullptr);
 /// after a crash.
 bool IsTornRecord(std::string_view line);
 
-/// Returns 16 hexadecimal digits that identify a case: FNV-1a (64 bit) of the canonical JSON of its
-/// keys. The canonical form has sorted keys and no spaces, so the order of setting keys has no
-/// effect. The hash finds equal cases; it gives no security.
+/// Returns 16 hexadecimal digits that identify a case: FNV-1a (64 bit) of the JSON of its keys,
+/// sorted and without spaces. It finds equal cases; it gives no security.
 std::string CaseId(const Record& canonical_keys);
-
-// Checksum at the end of a record's line.
 
 /// Returns `object`, a JSON object in one line, with its checksum as last key.
 std::string WithChecksum(std::string object);
@@ -266,16 +253,12 @@ inline constexpr const char* kWithoutChecksum =
 /// found and expected if it ends with another one, or with its own under a damaged key.
 bool VerifyChecksum(std::string_view line);
 
-// Excerpts of stores in messages.
-
 /// Returns the beginning of `text`, any bytes, as valid UTF-8 without control characters: about 80
 /// bytes at most, other bytes as \xNN.
 std::string Excerpt(std::string_view text);
 
-// JSON documents for programs, made of values, records and other documents.
-
-/// JSON object with keys in the order of adding. Invalid UTF-8, NaN and infinity are converted as
-/// in records.
+/// JSON object for programs, with keys in the order of adding. Invalid UTF-8, NaN and infinity are
+/// converted as in records.
 class JsonObject {
  public:
   JsonObject() = default;
@@ -302,13 +285,8 @@ inline Value Count(std::size_t number) { return static_cast<std::int64_t>(number
 /// Returns "[...]", one object per line.
 std::string JsonList(const std::vector<JsonObject>& objects);
 
-// Origin of records and tables: program, machine, commit, command.
-
-// Machine, compiler, flags, mathematical library and commit that produced a record.
-//
-// Every record contains them because they limit comparisons: times need one machine, bits one
-// arithmetic.
-
+/// Origin of a record. Every record contains it because it limits comparisons: times need one
+/// machine, bits one arithmetic.
 struct Origin {
   std::string machine;   ///< processor model and number of logical processors
   std::string compiler;  ///< name and version
@@ -331,9 +309,8 @@ void Stamp(Record& record);
 /// Returns the origin from the keys set by Stamp(); unknown parts are empty.
 Origin OriginOf(const Record& record);
 
-// Provenance below every table: command, machine, compiler, versions, commit.
-
-/// Returns one fact per line, "command: ...". `command` is the typed command.
+/// Returns the lines below every table: command, machine, compiler, versions, commit, one fact per
+/// line, "command: ...". `command` is the typed command.
 std::vector<std::string> Provenance(const std::string& command);
 
 /// Returns the output of `loopbench --version`: the version, and facts independent of the command.

@@ -5,101 +5,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
-#include <string>
-#include <string_view>
-#include <unordered_map>
 #include <unordered_set>
-#include <utility>
-#include <vector>
 
 #include "harness/base/json_document.h"
-#include "harness/base/record.h"
 #include "harness/base/store.h"
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
-
-LineReader::LineReader(std::filesystem::path file, Take take, Wanted wanted, int lines_before)
-    : file_(std::move(file)),
-      take_(std::move(take)),
-      wanted_(std::move(wanted)),
-      number_(lines_before) {}
-
-void LineReader::Feed(std::string_view text) {
-  for (std::size_t end; (end = text.find('\n')) != std::string_view::npos;
-       text.remove_prefix(end + 1)) {
-    std::string_view line = text.substr(0, end);
-    if (!rest_.empty()) line = rest_.append(line);
-    TakeLine(line);
-    offset_ += line.size() + 1;
-    rest_.clear();
-  }
-  rest_ += text;
-}
-
-void LineReader::End() {
-  is_ended_ = rest_.empty();
-  if (is_ended_) return;
-  TakeLine(rest_);
-  if (warning_.empty()) offset_ += rest_.size();
-}
-
-void LineReader::TakeLine(std::string_view line) {
-  ++number_;
-  const LinePlace place{offset_, line.size()};
-  if (line.empty() || line == "\r" || (wanted_ && !wanted_(line, place))) return;
-  Record record;
-  bool is_sealed = false;
-  try {
-    record = FromJsonLine(line, &is_sealed);
-  } catch (const std::runtime_error& error) {
-    const std::string message =
-        fmt::format("{}:{}: {}: '{}'", file_.string(), number_, error.what(), Excerpt(line));
-    if (is_ended_ || !IsTornRecord(line)) throw std::runtime_error(message);
-    warning_ = message + " (torn last line, skipped)";
-    return;
-  }
-  has_sealed_ = has_sealed_ || is_sealed;
-  if (!is_sealed && first_bare_ == 0) first_bare_ = number_;
-  if (has_sealed_ && first_bare_ > 0) {
-    throw std::runtime_error(fmt::format("{}:{}: {} (other lines have one)", file_.string(),
-                                         first_bare_, kWithoutChecksum));
-  }
-  if (record.items().empty()) {
-    throw std::runtime_error(fmt::format("{}:{}: found a record without values, expected some",
-                                         file_.string(), number_));
-  }
-  take_(std::move(record), place);
-}
-
-void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
-                   std::vector<std::string>* warnings, const LineReader::Wanted& wanted) {
-  const std::filesystem::path file = StoreFile(path);
-  LineReader reader(file, take, wanted);
-  if (!IsLarge(file)) {
-    reader.Feed(ReadFile(file));
-  } else {
-    NoteInput(file);
-    std::ifstream in(file, std::ios::binary);
-    std::string block(std::size_t{4} << 20, '\0');
-    while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
-      reader.Feed(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
-    }
-    if (!in.eof()) FailOn("read", file);
-  }
-  reader.End();
-  if (warnings != nullptr && !reader.warning().empty()) warnings->push_back(reader.warning());
-}
+namespace {
 
 // FromJsonLine: parses a flat object value by value. Nothing nests, so the cost is linear in the
 // length of a line, at any depth.
-
-namespace {
 
 using LineJson = nlohmann::ordered_json;
 
@@ -229,7 +148,136 @@ class RecordReader final : public nlohmann::json_sax<LineJson> {
   std::vector<double> series_;
 };
 
+constexpr std::size_t kAtOnce = 4096;  ///< records, and the rest of their last problem
+
+/// Outcomes of runs that were ended from outside.
+constexpr std::array<std::string_view, 5> kCutShort = {"time-limit", "process-time-limit",
+                                                       "memory-limit", "crashed", "invalid-result"};
+
+/// True if the run, a member of its ensemble or the reference of its ladder ended so.
+bool WasCutShort(const Record& record) {
+  const std::string member = record.Text("ensemble_first_failed");
+  const bool has_reference =
+      record.Find("error_final") == nullptr || !std::isnan(record.Number("error_final"));
+  return !has_reference || std::ranges::any_of(kCutShort, [&](std::string_view ending) {
+    return record.Text("outcome") == ending || member.find(ending) != std::string::npos;
+  });
+}
+
+bool MayDiffer(std::string_view key) {
+  const Measure* measure = FindMeasure(key);
+  return measure != nullptr && measure->repeats == Repeats::kNever;
+}
+
+std::string Shown(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  if (value == nullptr) return "nothing";
+  if (std::holds_alternative<std::vector<double>>(*value)) return "another series";
+  return record.Text(key).empty() ? "null" : record.Text(key);
+}
+
+/// Returns a key in which the records differ although they must not, or "".
+std::string Difference(const Record& one, const Record& other) {
+  for (const auto& [first, second] : {std::pair(&one, &other), std::pair(&other, &one)}) {
+    for (const auto& [key, value] : first->items()) {
+      if (MayDiffer(key)) continue;
+      const Value* found = second->Find(key);
+      // compare as lines of a store, where NaN is null
+      Record a, b;
+      a.Set(key, value);
+      if (found != nullptr) b.Set(key, *found);
+      if (found == nullptr || ToJsonLine(a) != ToJsonLine(b)) return key;
+    }
+  }
+  return "";
+}
+
+void RequireEqual(const Record& known, const std::filesystem::path& known_file, const Record& fresh,
+                  const std::filesystem::path& fresh_file) {
+  const std::string key = Difference(known, fresh);
+  if (key.empty()) return;
+  const bool other_library = known.Text("libm") != fresh.Text("libm");
+  throw std::runtime_error(fmt::format(
+      "{} and {}: case {} ({} {}) has {} {} in the first and {} in the second; {}",
+      known_file.string(), fresh_file.string(), known.Text("id"), known.Text("mechanism"),
+      known.Text("formulation"), key, Shown(known, key), Shown(fresh, key),
+      other_library ? "they come from two mathematical libraries: merge one of them"
+                    : "one of the stores is inconsistent"));
+}
+
 }  // namespace
+
+LineReader::LineReader(std::filesystem::path file, Take take, Wanted wanted, int lines_before)
+    : file_(std::move(file)),
+      take_(std::move(take)),
+      wanted_(std::move(wanted)),
+      number_(lines_before) {}
+
+void LineReader::Feed(std::string_view text) {
+  for (std::size_t end; (end = text.find('\n')) != std::string_view::npos;
+       text.remove_prefix(end + 1)) {
+    std::string_view line = text.substr(0, end);
+    if (!rest_.empty()) line = rest_.append(line);
+    TakeLine(line);
+    offset_ += line.size() + 1;
+    rest_.clear();
+  }
+  rest_ += text;
+}
+
+void LineReader::End() {
+  is_ended_ = rest_.empty();
+  if (is_ended_) return;
+  TakeLine(rest_);
+  if (warning_.empty()) offset_ += rest_.size();
+}
+
+void LineReader::TakeLine(std::string_view line) {
+  ++number_;
+  const LinePlace place{offset_, line.size()};
+  if (line.empty() || line == "\r" || (wanted_ && !wanted_(line, place))) return;
+  Record record;
+  bool is_sealed = false;
+  try {
+    record = FromJsonLine(line, &is_sealed);
+  } catch (const std::runtime_error& error) {
+    const std::string message =
+        fmt::format("{}:{}: {}: '{}'", file_.string(), number_, error.what(), Excerpt(line));
+    if (is_ended_ || !IsTornRecord(line)) throw std::runtime_error(message);
+    warning_ = message + " (torn last line, skipped)";
+    return;
+  }
+  has_sealed_ = has_sealed_ || is_sealed;
+  if (!is_sealed && first_bare_ == 0) first_bare_ = number_;
+  if (has_sealed_ && first_bare_ > 0) {
+    throw std::runtime_error(fmt::format("{}:{}: {} (other lines have one)", file_.string(),
+                                         first_bare_, kWithoutChecksum));
+  }
+  if (record.items().empty()) {
+    throw std::runtime_error(fmt::format("{}:{}: found a record without values, expected some",
+                                         file_.string(), number_));
+  }
+  take_(std::move(record), place);
+}
+
+void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
+                   std::vector<std::string>* warnings, const LineReader::Wanted& wanted) {
+  const std::filesystem::path file = StoreFile(path);
+  LineReader reader(file, take, wanted);
+  if (!IsLarge(file)) {
+    reader.Feed(ReadFile(file));
+  } else {
+    NoteInput(file);
+    std::ifstream in(file, std::ios::binary);
+    std::string block(std::size_t{4} << 20, '\0');
+    while (in.read(block.data(), static_cast<std::streamsize>(block.size())) || in.gcount() > 0) {
+      reader.Feed(std::string_view(block).substr(0, static_cast<std::size_t>(in.gcount())));
+    }
+    if (!in.eof()) FailOn("read", file);
+  }
+  reader.End();
+  if (warnings != nullptr && !reader.warning().empty()) warnings->push_back(reader.warning());
+}
 
 Record FromJsonLine(std::string_view line, bool* is_sealed) {
   if (line.ends_with('\r')) line.remove_suffix(1);
@@ -255,11 +303,6 @@ bool IsTornRecord(std::string_view line) {
   });
   return begins && RecordReader(line).ends_early();
 }
-namespace {
-
-constexpr std::size_t kAtOnce = 4096;  ///< records, and the rest of their last problem
-
-}  // namespace
 
 std::string KeysOfLine(std::string_view line) {
   std::string keys;
@@ -329,64 +372,6 @@ void ProblemReader::ForEach(const std::function<void(std::vector<Record>)>& take
     take(std::exchange(records, {}));
   }
 }
-namespace {
-
-/// Outcomes of runs that were ended from outside.
-constexpr std::array<std::string_view, 5> kCutShort = {"time-limit", "process-time-limit",
-                                                       "memory-limit", "crashed", "invalid-result"};
-
-/// True if the run, a member of its ensemble or the reference of its ladder ended so.
-bool WasCutShort(const Record& record) {
-  const std::string member = record.Text("ensemble_first_failed");
-  const bool has_reference =
-      record.Find("error_final") == nullptr || !std::isnan(record.Number("error_final"));
-  return !has_reference || std::ranges::any_of(kCutShort, [&](std::string_view ending) {
-    return record.Text("outcome") == ending || member.find(ending) != std::string::npos;
-  });
-}
-
-bool MayDiffer(std::string_view key) {
-  const Measure* measure = FindMeasure(key);
-  return measure != nullptr && measure->repeats == Repeats::kNever;
-}
-
-std::string Shown(const Record& record, const std::string& key) {
-  const Value* value = record.Find(key);
-  if (value == nullptr) return "nothing";
-  if (std::holds_alternative<std::vector<double>>(*value)) return "another series";
-  return record.Text(key).empty() ? "null" : record.Text(key);
-}
-
-/// Returns a key in which the records differ although they must not, or "".
-std::string Difference(const Record& one, const Record& other) {
-  for (const auto& [first, second] : {std::pair(&one, &other), std::pair(&other, &one)}) {
-    for (const auto& [key, value] : first->items()) {
-      if (MayDiffer(key)) continue;
-      const Value* found = second->Find(key);
-      // compare as lines of a store, where NaN is null
-      Record a, b;
-      a.Set(key, value);
-      if (found != nullptr) b.Set(key, *found);
-      if (found == nullptr || ToJsonLine(a) != ToJsonLine(b)) return key;
-    }
-  }
-  return "";
-}
-
-void RequireEqual(const Record& known, const std::filesystem::path& known_file, const Record& fresh,
-                  const std::filesystem::path& fresh_file) {
-  const std::string key = Difference(known, fresh);
-  if (key.empty()) return;
-  const bool other_library = known.Text("libm") != fresh.Text("libm");
-  throw std::runtime_error(fmt::format(
-      "{} and {}: case {} ({} {}) has {} {} in the first and {} in the second; {}",
-      known_file.string(), fresh_file.string(), known.Text("id"), known.Text("mechanism"),
-      known.Text("formulation"), key, Shown(known, key), Shown(fresh, key),
-      other_library ? "they come from two mathematical libraries: merge one of them"
-                    : "one of the stores is inconsistent"));
-}
-
-}  // namespace
 
 MergedStores::~MergedStores() {
   for (const auto& [part, descriptor] : open_) ::close(descriptor);

@@ -8,9 +8,7 @@
 #include <map>
 #include <set>
 #include <stdexcept>
-#include <string_view>
 
-#include "harness/base/record.h"
 #include "harness/base/store.h"
 #include "harness/base/text.h"
 
@@ -101,6 +99,81 @@ void MendLastLine(const std::filesystem::path& file, int descriptor) {
   }
 }
 
+/// Returns conditions on parameters, each with the text before its value in a line.
+std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& where) {
+  std::vector<std::pair<std::string, Condition>> conditions;
+  for (const Condition& condition : where) {
+    const bool is_plain = condition.key.find_first_of("\"\\") == std::string::npos;
+    if (FindMeasure(condition.key) != nullptr || !is_plain) continue;
+    conditions.push_back({"\"" + condition.key + "\":", condition});
+  }
+  return conditions;
+}
+
+/// Key of a condition that no record so far has.
+struct MissingKey {
+  std::string name, before;  ///< before: the text before its value in a line
+  bool is_ordered;           ///< true if a number is required
+
+  bool MayBeIn(std::string_view line) const {
+    const std::size_t at = line.find(before);
+    return at != line.npos && !(is_ordered && line.substr(at + before.size()).starts_with("null"));
+  }
+  bool IsIn(const Record& record) const {
+    return is_ordered ? !std::isnan(record.Number(name)) : record.Find(name) != nullptr;
+  }
+};
+
+/// Returns true if a number among the case keys excludes the record.
+bool IsExcluded(std::string_view line,
+                const std::vector<std::pair<std::string, Condition>>& conditions) {
+  const std::string_view keys = line.substr(0, line.find("\"case_id\":"));
+  for (const auto& [before, condition] : conditions) {
+    const std::size_t at = keys.find(before);
+    if (at == std::string_view::npos) continue;
+    double value = 0.0;
+    const char* begin = keys.data() + at + before.size();
+    const auto [end, fault] = std::from_chars(begin, keys.data() + keys.size(), value);
+    if (fault != std::errc() || end == keys.data() + keys.size() || *end != ',') continue;
+    Record record;
+    record.Set(condition.key, value);
+    if (!Matches(record, {condition})) return true;
+  }
+  return false;
+}
+
+/// Returns the keys of a case: all keys before its case_id.
+Record KeysBeforeId(const Record& record) {
+  Record keys;
+  for (const auto& [key, value] : record.items()) {
+    if (key == "case_id") break;
+    keys.Set(key, value);
+  }
+  return keys;
+}
+
+/// Cases with equal keys.
+struct Namesakes {
+  std::set<std::string> case_ids;
+  bool has_set = false;
+};
+
+Record ToldApart(const Record& record, const Namesakes& namesakes) {
+  Record told = KeysBeforeId(record);
+  told.Set("config_hash", record.Text("config_hash"));
+  if (namesakes.has_set) told.Set("set", record.Text("set"));
+  for (const auto& [key, value] : record.items()) told.Set(key, value);
+  return told;
+}
+
+/// Converts the sixteen digits to a number.
+std::optional<std::uint64_t> NumberOfId(std::string_view id) {
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number, 16);
+  const bool is_whole = error == std::errc() && end == id.data() + id.size() && id.size() == 16;
+  return is_whole ? std::optional(number) : std::nullopt;
+}
+
 }  // namespace
 
 std::filesystem::path StoreFile(const std::filesystem::path& path) {
@@ -171,73 +244,6 @@ std::vector<Record> LatestRecords(const std::vector<Record>& records, std::strin
   return WithContents(std::move(latest));
 }
 
-namespace {
-
-/// Returns conditions on parameters, each with the text before its value in a line.
-std::vector<std::pair<std::string, Condition>> OnParameters(const Selection& where) {
-  std::vector<std::pair<std::string, Condition>> conditions;
-  for (const Condition& condition : where) {
-    const bool is_plain = condition.key.find_first_of("\"\\") == std::string::npos;
-    if (FindMeasure(condition.key) != nullptr || !is_plain) continue;
-    conditions.push_back({"\"" + condition.key + "\":", condition});
-  }
-  return conditions;
-}
-
-/// Keys of conditions that no record so far has, in the form that conditions use.
-class Missing {
- public:
-  explicit Missing(const Selection& where) {
-    for (const Condition& condition : where) {
-      const bool is_ordered =
-          condition.op != Operator::kEqual && condition.op != Operator::kUnequal;
-      keys_.push_back({condition.key, "\"" + condition.key + "\":", is_ordered});
-    }
-  }
-
-  bool MayBeIn(std::string_view line) const {
-    return std::ranges::any_of(keys_, [line](const Key& key) {
-      const std::size_t at = line.find(key.before);
-      return at != std::string_view::npos &&
-             !(key.is_ordered && line.substr(at + key.before.size()).starts_with("null"));
-    });
-  }
-
-  void Look(const Record& record) {
-    std::erase_if(keys_, [&record](const Key& key) {
-      return key.is_ordered ? !std::isnan(record.Number(key.name))
-                            : record.Find(key.name) != nullptr;
-    });
-  }
-
- private:
-  struct Key {
-    std::string name, before;
-    bool is_ordered;  ///< true if a number is required
-  };
-  std::vector<Key> keys_;
-};
-
-/// Returns true if a number among the case keys excludes the record.
-bool IsExcluded(std::string_view line,
-                const std::vector<std::pair<std::string, Condition>>& conditions) {
-  const std::string_view keys = line.substr(0, line.find("\"case_id\":"));
-  for (const auto& [before, condition] : conditions) {
-    const std::size_t at = keys.find(before);
-    if (at == std::string_view::npos) continue;
-    double value = 0.0;
-    const char* begin = keys.data() + at + before.size();
-    const auto [end, fault] = std::from_chars(begin, keys.data() + keys.size(), value);
-    if (fault != std::errc() || end == keys.data() + keys.size() || *end != ',') continue;
-    Record record;
-    record.Set(condition.key, value);
-    if (!Matches(record, {condition})) return true;
-  }
-  return false;
-}
-
-}  // namespace
-
 bool ChoosesLines(const Selection& where) { return !OnParameters(where).empty(); }
 
 LineReader::Wanted LinesThatMayMatch(const Selection& where) {
@@ -252,18 +258,23 @@ std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selecti
   const LineReader::Wanted may_match = LinesThatMayMatch(where);
   std::vector<Record> records;
   std::uint64_t bytes = 0;
-  Missing missing(where);
+  std::vector<MissingKey> missing;
+  for (const auto& [key, values, op] : where) {
+    const bool is_ordered = op != Operator::kEqual && op != Operator::kUnequal;
+    missing.push_back({key, "\"" + key + "\":", is_ordered});
+  }
   ForEachRecord(
       path,
       [&](Record record, const LinePlace& place) {
-        missing.Look(record);
+        std::erase_if(missing, [&](const MissingKey& key) { return key.IsIn(record); });
         records.push_back(std::move(record));
         bytes += place.length;
         if (watch) watch(records.size(), bytes);
       },
       warnings,
       [&](std::string_view line, const LinePlace& place) {
-        return records.empty() || may_match(line, place) || missing.MayBeIn(line);
+        return records.empty() || may_match(line, place) ||
+               std::ranges::any_of(missing, [&](const auto& key) { return key.MayBeIn(line); });
       });
   return records;
 }
@@ -276,33 +287,6 @@ std::vector<Record> ReadRecords(const std::filesystem::path& path,
       warnings);
   return records;
 }
-namespace {
-
-/// Returns the keys of a case: all keys before its case_id.
-Record KeysBeforeId(const Record& record) {
-  Record keys;
-  for (const auto& [key, value] : record.items()) {
-    if (key == "case_id") break;
-    keys.Set(key, value);
-  }
-  return keys;
-}
-
-/// Cases with equal keys.
-struct Namesakes {
-  std::set<std::string> case_ids;
-  bool has_set = false;
-};
-
-Record ToldApart(const Record& record, const Namesakes& namesakes) {
-  Record told = KeysBeforeId(record);
-  told.Set("config_hash", record.Text("config_hash"));
-  if (namesakes.has_set) told.Set("set", record.Text("set"));
-  for (const auto& [key, value] : record.items()) told.Set(key, value);
-  return told;
-}
-
-}  // namespace
 
 std::vector<Record> WithContents(std::vector<Record> records) {
   std::map<std::string, Namesakes> all;
@@ -356,17 +340,6 @@ void RequireOneContent(const std::vector<Record>& records, const std::filesystem
       "expected each case once: run them into stores of their own (--out)",
       store.string(), told->Text("mechanism"), told->Text("formulation"), command));
 }
-namespace {
-
-/// Converts the sixteen digits to a number.
-std::optional<std::uint64_t> NumberOfId(std::string_view id) {
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(id.data(), id.data() + id.size(), number, 16);
-  const bool is_whole = error == std::errc() && end == id.data() + id.size() && id.size() == 16;
-  return is_whole ? std::optional(number) : std::nullopt;
-}
-
-}  // namespace
 
 std::string_view TextUnder(std::string_view quoted_key, std::string_view line) {
   const std::size_t key = line.find(quoted_key);
@@ -384,23 +357,20 @@ std::optional<bool> FinishedRuns::Find(const std::string& id) {
 }
 
 void FinishedRuns::Read() {
-  const std::filesystem::path file = StoreFile(path_);
-  if (!IsLarge(file)) {
-    for (const Record& record : ReadRecords(path_)) {
-      if (const auto id = NumberOfId(record.Text("id"))) {
-        finished_[*id] = record.Text("outcome") == "finished";
-      }
-    }
-    return;
-  }
-  std::ifstream lines(file, std::ios::binary);
-  std::string line;
-  while (std::getline(lines, line)) {
-    if (const auto id = NumberOfId(TextUnder("\"id\":\"", line))) {
-      finished_[*id] = TextUnder("\"outcome\":\"", line) == "finished";
-    }
-  }
-  if (lines.bad()) FailOn("read", file);
+  const bool is_large = IsLarge(StoreFile(path_));
+  const auto keep = [this](std::string_view id, bool is_finished) {
+    if (const auto number = NumberOfId(id)) finished_[*number] = is_finished;
+  };
+  const auto take = [&](const Record& record, const LinePlace&) {
+    keep(record.Text("id"), record.Text("outcome") == "finished");
+  };
+  // lines of a large store are not parsed
+  const auto look = [&](std::string_view line, const LinePlace&) {
+    if (!is_large) return true;
+    keep(TextUnder("\"id\":\"", line), TextUnder("\"outcome\":\"", line) == "finished");
+    return false;
+  };
+  ForEachRecord(path_, take, nullptr, look);
 }
 
 }  // namespace loopbench::harness

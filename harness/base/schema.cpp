@@ -6,8 +6,6 @@
 #include <cmath>
 #include <set>
 
-#include "harness/base/json_document.h"
-
 namespace loopbench::harness {
 namespace {
 
@@ -39,6 +37,67 @@ std::string Plural(std::string words) {
     if (words.starts_with(one)) words.insert(one.size(), "s");
   }
   return words;
+}
+
+// Schema as a file for editors, and as tables for the documentation.
+
+/// Returns the name of a schema from Named().
+std::string NameOf(const Json& reference) {
+  const std::string path = reference["$ref"];
+  return path.substr(path.rfind('/') + 1);
+}
+
+/// Removes keys that are not in draft 07: the schemas from Named(), moved to `definitions` in the
+/// order of first use, and the words.
+void TakeOwn(Json* node, Json* definitions) {
+  if (!node->is_structured()) return;
+  if (node->is_object() && node->contains("$ref") && node->contains("schema")) {
+    Json named = std::move((*node)["schema"]);
+    node->erase("schema");
+    const std::string name = NameOf(*node);
+    if (!definitions->contains(name)) {
+      (*definitions)[name] = nullptr;  // reserves its position before the schemas that it refers to
+      TakeOwn(&named, definitions);
+      (*definitions)[name] = std::move(named);
+    }
+  }
+  if (node->is_object() && node->contains("words") && (*node)["words"].is_string()) {
+    node->erase("words");
+  }
+  for (Json& child : *node) TakeOwn(&child, definitions);
+}
+
+/// Returns the text as a table cell.
+std::string Cell(const std::string& text) {
+  std::string cell;
+  for (const char c : text) cell += (c == '|' || c == '<' ? "\\" : "") + std::string(1, c);
+  return cell;
+}
+
+std::string Table(const std::string& heading, const Json& object) {
+  std::string text = fmt::format("{}\n\n{}\n\n", heading, object.value("description", ""));
+  text += "| key | value | default | meaning |\n|---|---|---|---|\n";
+  const Json required = object.value("required", Json::array());
+  for (const auto& [key, field] : object["properties"].items()) {
+    if (key == "$schema") continue;
+    std::string standard = field.contains("default") ? '`' + FlatText(field["default"]) + '`' : "";
+    std::erase(standard, '"');
+    if (std::ranges::find(required, Json(key)) != required.end()) standard = "required";
+    text += fmt::format("| `{}` | {} | {} | {} |\n", key, field.value("words", ""), standard,
+                        Cell(field.value("description", "")));
+  }
+  return text + '\n';
+}
+
+/// Adds tables of the contained objects in the order of first use, except objects in `done`.
+void AddTables(const Json& node, std::set<std::string>* done, std::string* text) {
+  if (!node.is_structured()) return;
+  const bool is_named = node.is_object() && node.contains("$ref") && node.contains("schema");
+  const std::string name = is_named ? NameOf(node) : "";
+  const bool has_table = is_named && node["schema"].contains("properties");
+  if (has_table && !done->insert(name).second) return;
+  if (has_table) *text += Table("### " + name, node["schema"]);
+  for (const Json& child : node) AddTables(child, done, text);
 }
 
 }  // namespace
@@ -179,71 +238,6 @@ Json ObjectSchema(const std::string& sentence, const std::vector<FieldSchema>& f
   object["properties"] = properties;
   return object;
 }
-
-// Schema as a file for editors, and as tables for the documentation.
-
-namespace {
-
-/// Returns the name of a schema from Named().
-std::string NameOf(const Json& reference) {
-  const std::string path = reference["$ref"];
-  return path.substr(path.rfind('/') + 1);
-}
-
-/// Removes keys that are not in draft 07: the schemas from Named(), moved to `definitions` in the
-/// order of first use, and the words.
-void TakeOwn(Json* node, Json* definitions) {
-  if (!node->is_structured()) return;
-  if (node->is_object() && node->contains("$ref") && node->contains("schema")) {
-    Json named = std::move((*node)["schema"]);
-    node->erase("schema");
-    const std::string name = NameOf(*node);
-    if (!definitions->contains(name)) {
-      (*definitions)[name] = nullptr;  // reserves its position before the schemas that it refers to
-      TakeOwn(&named, definitions);
-      (*definitions)[name] = std::move(named);
-    }
-  }
-  if (node->is_object() && node->contains("words") && (*node)["words"].is_string()) {
-    node->erase("words");
-  }
-  for (Json& child : *node) TakeOwn(&child, definitions);
-}
-
-/// Returns the text as a table cell.
-std::string Cell(const std::string& text) {
-  std::string cell;
-  for (const char c : text) cell += (c == '|' || c == '<' ? "\\" : "") + std::string(1, c);
-  return cell;
-}
-
-std::string Table(const std::string& heading, const Json& object) {
-  std::string text = fmt::format("{}\n\n{}\n\n", heading, object.value("description", ""));
-  text += "| key | value | default | meaning |\n|---|---|---|---|\n";
-  const Json required = object.value("required", Json::array());
-  for (const auto& [key, field] : object["properties"].items()) {
-    if (key == "$schema") continue;
-    std::string standard = field.contains("default") ? '`' + FlatText(field["default"]) + '`' : "";
-    std::erase(standard, '"');
-    if (std::ranges::find(required, Json(key)) != required.end()) standard = "required";
-    text += fmt::format("| `{}` | {} | {} | {} |\n", key, field.value("words", ""), standard,
-                        Cell(field.value("description", "")));
-  }
-  return text + '\n';
-}
-
-/// Adds tables of the contained objects in the order of first use, except objects in `done`.
-void AddTables(const Json& node, std::set<std::string>* done, std::string* text) {
-  if (!node.is_structured()) return;
-  const bool is_named = node.is_object() && node.contains("$ref") && node.contains("schema");
-  const std::string name = is_named ? NameOf(node) : "";
-  const bool has_table = is_named && node["schema"].contains("properties");
-  if (has_table && !done->insert(name).second) return;
-  if (has_table) *text += Table("### " + name, node["schema"]);
-  for (const Json& child : node) AddTables(child, done, text);
-}
-
-}  // namespace
 
 std::string SchemaText(const std::string& title, const Json& object) {
   Json schema = {{"$schema", "http://json-schema.org/draft-07/schema#"}, {"title", title}};

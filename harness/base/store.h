@@ -18,8 +18,6 @@
 
 namespace loopbench::harness {
 
-// Measurements from any source as records: a result store, or the JSON of Google Benchmark.
-
 /// Returns the records of a folder with results.jsonl, of a .jsonl file, or of any other file as
 /// JSON of Google Benchmark. A case with several records in the store (equal "case_id") is returned
 /// once, with its last record. Throws std::runtime_error with the file and its error. Benchmark
@@ -35,10 +33,6 @@ std::vector<Record> ReadMeasurements(const std::filesystem::path& path,
 /// `file` is for messages. Throws ConfigError with all deviations from the library's format, each
 /// with line, pointer and value, such as a null number or an unknown unit.
 std::vector<Record> ParseBenchmarkJson(std::string_view text, const std::string& file);
-
-// Lines of a store: written, read back, and read problem by problem if memory is scarce.
-
-// Reads the records of a store one at a time, for stores of a million records.
 
 /// Position of a line in a file, without its line end.
 struct LinePlace {
@@ -92,9 +86,8 @@ class LineReader {
 void ForEachRecord(const std::filesystem::path& path, const LineReader::Take& take,
                    std::vector<std::string>* warnings, const LineReader::Wanted& wanted = {});
 
-// Reads a store too large for memory, problem by problem: warnings compare only records of one
-// problem.
-
+/// Reads a store too large for memory, problem by problem: warnings compare only records of one
+/// problem.
 class ProblemReader {
  public:
   /// Scans the lines and keeps 16 bytes of each, and about 60 bytes of each problem.
@@ -130,11 +123,10 @@ class ProblemReader {
 /// Returns the key names of a flat JSON object, each after a '"': they identify kinds of lines.
 std::string KeysOfLine(std::string_view line);
 
-// Merges several stores of one experiment into one: every case once.
-
-/// One record per "id", at the position of its first; records without an id all stay. If a case was
-/// run more than once, the last record counts. But a record that the clock or the machine ended
-/// (time-limit, crashed, ...) never replaces a complete one.
+/// Several stores of one experiment as one: one record per "id", at the position of its first;
+/// records without an id all stay. If a case was run more than once, the last record counts. But a
+/// record that the clock or the machine ended (time-limit, crashed, ...) never replaces a complete
+/// one.
 ///
 /// Keeps the position of each record, about 280 bytes with its id: 280 MB for a million records.
 class MergedStores {
@@ -181,10 +173,6 @@ class MergedStores {
   std::size_t read_ = 0;
 };
 
-// Store of records: a run appends to it, readers read it, finished runs are found in it.
-
-// Append-only store of results: one JSON object per line.
-
 /// Returns a store's file: `path` itself if it ends in ".jsonl", else results.jsonl in that folder.
 std::filesystem::path StoreFile(const std::filesystem::path& path);
 
@@ -193,10 +181,8 @@ std::filesystem::path StoreFile(const std::filesystem::path& path);
 bool IsLarge(const std::filesystem::path& file);
 
 /// Appends records to a file of JSON Lines. Lines are never changed, and a record is on disk when
-/// Append() returns: a crash or a power failure loses at most the current line.
-///
-/// One process at a time: the file itself is locked, under any name, and the lock ends with the
-/// process, however it ends.
+/// Append() returns. One process at a time: the file itself is locked, under any name, and the lock
+/// ends with the process.
 class ResultStore {
  public:
   /// Opens `path` for appending and makes missing folders. A path that ends in ".jsonl" is the file
@@ -265,8 +251,6 @@ using ReadWatch = std::function<void(std::size_t records, std::uint64_t bytes)>;
 std::vector<Record> ReadRecords(const std::filesystem::path& path, const Selection& where,
                                 std::vector<std::string>* warnings, const ReadWatch& watch = {});
 
-// Cases with equal keys and different contents are distinguished in all readers.
-
 /// Returns the records with additional keys if other case_ids share all their keys (those before
 /// "case_id"). "content" and, if one of them has it, "set" (changes by --set) then move before
 /// "case_id". Tables show both as columns, labels contain them. Records without a case_id stay
@@ -280,8 +264,6 @@ void ShareContents(std::vector<Record>* one, std::vector<Record>* other);
 /// together, and a rule cannot apply to two mechanisms at once.
 void RequireOneContent(const std::vector<Record>& records, const std::filesystem::path& store,
                        std::string_view command);
-
-// Runs in a store and their completion: the data needed to resume it.
 
 /// Returns the text under a key of a record's line without parsing the rest: it is a flat object,
 /// and quotes in its texts are escaped. "" if there is none.
@@ -305,10 +287,6 @@ class FinishedRuns {
   std::unordered_map<std::uint64_t, bool> finished_;  ///< by the sixteen digits of the id
 };
 
-// Exclusive writer lock of a store, and new stores.
-
-// Opens a store for one writer at a time.
-
 /// Returns a descriptor of the regular file `file` for reading and appending; makes the file if it
 /// is missing. The exclusive lock is on the file itself, so it also applies through symbolic and
 /// hard links. It ends when all copies of the descriptor are closed, also in forked children.
@@ -324,17 +302,15 @@ bool IsLocked(const std::filesystem::path& file);
 /// True if `file` still names the open file of the descriptor: it was not deleted or replaced.
 bool IsStillNamed(int descriptor, const std::filesystem::path& file);
 
-// Store that is written once and appears only when it is complete.
-
-/// Returns the file of the records until the store is complete, next to the store's file.
+/// Returns the file of the records of a NewStore until the store is complete, next to the store's
+/// file.
 std::filesystem::path UnderWay(const std::filesystem::path& store_file);
 
 /// True if the store has a record. An empty file remains after a run without records.
 bool HasRecords(const std::filesystem::path& store_file);
 
-/// Writes records to UnderWay(), which is renamed to the store's file when complete: readers never
-/// find a partial store. One process at a time; the next one overwrites the remains of a killed
-/// one.
+/// Store that appears only when it is complete: records go to UnderWay(), which is then renamed.
+/// One process at a time; the next one overwrites the remains of a killed one.
 class NewStore {
  public:
   /// `path` as for ResultStore; makes missing folders. Throws std::runtime_error if there are

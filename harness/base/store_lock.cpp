@@ -9,10 +9,8 @@
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
-#include <string>
 #include <thread>
 
-#include "harness/base/record.h"
 #include "harness/base/store.h"
 #include "harness/base/text.h"
 
@@ -50,6 +48,31 @@ bool TryLock(int descriptor, const std::filesystem::path& file, bool waits) {
     std::this_thread::sleep_for(kBetweenTries);
   }
   return false;
+}
+
+namespace fs = std::filesystem;
+
+/// Returns the topmost missing folder above `file`, or "".
+fs::path FirstMissingAbove(const fs::path& file) {
+  fs::path missing;
+  for (fs::path folder = file.parent_path(); !folder.empty() && !fs::exists(folder);
+       folder = folder.parent_path()) {
+    missing = folder;
+  }
+  return missing;
+}
+
+/// Throws if it is a circular link, or a link into a missing folder: its disk may be missing, so no
+/// folder is made.
+void RequireTarget(const fs::path& file) {
+  if (!fs::is_symlink(fs::symlink_status(file))) return;
+  const fs::path target = BehindLinks(file);
+  const bool is_circle = fs::is_symlink(fs::symlink_status(target));
+  if (!is_circle && fs::is_directory(fs::absolute(target).parent_path())) return;
+  throw std::runtime_error(
+      fmt::format("{}: found a symbolic link {}, expected a file or a new name", file.string(),
+                  is_circle ? "in a circle of them"
+                            : fmt::format("to {}, whose folder is not there", target.string())));
 }
 
 }  // namespace
@@ -96,34 +119,6 @@ bool IsStillNamed(int descriptor, const std::filesystem::path& file) {
   return ::fstat(descriptor, &opened) == 0 && ::stat(file.c_str(), &named) == 0 &&
          opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
 }
-namespace {
-
-namespace fs = std::filesystem;
-
-/// Returns the topmost missing folder above `file`, or "".
-fs::path FirstMissingAbove(const fs::path& file) {
-  fs::path missing;
-  for (fs::path folder = file.parent_path(); !folder.empty() && !fs::exists(folder);
-       folder = folder.parent_path()) {
-    missing = folder;
-  }
-  return missing;
-}
-
-/// Throws if it is a circular link, or a link into a missing folder: its disk may be missing, so no
-/// folder is made.
-void RequireTarget(const fs::path& file) {
-  if (!fs::is_symlink(fs::symlink_status(file))) return;
-  const fs::path target = BehindLinks(file);
-  const bool is_circle = fs::is_symlink(fs::symlink_status(target));
-  if (!is_circle && fs::is_directory(fs::absolute(target).parent_path())) return;
-  throw std::runtime_error(
-      fmt::format("{}: found a symbolic link {}, expected a file or a new name", file.string(),
-                  is_circle ? "in a circle of them"
-                            : fmt::format("to {}, whose folder is not there", target.string())));
-}
-
-}  // namespace
 
 fs::path UnderWay(const fs::path& store_file) {
   fs::path part = BehindLinks(store_file);

@@ -40,6 +40,9 @@ Screen ScreenOf(int descriptor) {
   return {WidthOf(descriptor), colour, true};
 }
 
+int first_failure = 0;  ///< errno of the first failed write to standard output, or 0
+bool output_is_file = false;
+
 }  // namespace
 
 Screen OutputScreen() { return output_screen; }
@@ -47,18 +50,6 @@ Screen OutputScreen() { return output_screen; }
 Screen ErrorScreen() { return ScreenOf(STDERR_FILENO); }
 
 void ShowWide() { output_screen.width = 0; }
-
-namespace {
-
-int first_failure = 0;  ///< errno of the first failed write to standard output, or 0
-bool output_is_file = false;
-
-bool ReaderIsGone() {
-  pollfd output = {STDOUT_FILENO, POLLOUT, 0};
-  return ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
-}
-
-}  // namespace
 
 void PrepareStreams() {
   for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
@@ -91,7 +82,9 @@ int FinishOutput(int code) {
   errno = 0;
   if (std::fflush(stdout) != 0 && first_failure == 0) first_failure = errno;
   if (first_failure == 0 && std::ferror(stdout) == 0) return code;
-  if (!ReaderIsGone()) {
+  pollfd output = {STDOUT_FILENO, POLLOUT, 0};
+  const bool reader_is_gone = ::poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
+  if (!reader_is_gone) {
     PrintError("cannot write to standard output{}{}\n", first_failure == 0 ? "" : ": ",
                first_failure == 0 ? "" : std::strerror(first_failure));
   }

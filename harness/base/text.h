@@ -24,10 +24,7 @@
 
 namespace loopbench::harness {
 
-// Times of a run: wall and CPU time of its own work, and a limit on the latter.
-//
-// Limits measure the case, not the machine: waiting for a processor or being stopped uses wall
-// time, but no CPU time.
+// Times of a run. Limits are CPU time: waiting for a processor uses none.
 
 /// CPU time that the calling thread has used since it began [s].
 inline double ThreadCpuSeconds() {
@@ -65,12 +62,9 @@ class ForeignWork {
   double wall_begin_ = WallSeconds(), cpu_begin_ = ThreadCpuSeconds();
 };
 
-/// CPU time limit of the run that creates and queries it.
-///
-/// Reading the CPU clock is a system call, ten times as expensive as reading the wall clock. CPU
-/// time never exceeds wall time. The CPU clock is therefore read only after as much wall time as
-/// was left at the last reading: hardly ever on an idle machine. Runs that take turns on one thread
-/// read the wall clock at each turn, and share the CPU time in proportion.
+/// CPU time limit of the run that creates and queries it. The CPU clock, ten times as expensive as
+/// the wall clock, is read only after as much wall time as was left at the last reading. Runs that
+/// take turns on one thread share the CPU time in proportion to their wall times.
 class CpuLimit {
  public:
   explicit CpuLimit(double limit_s) : limit_s_(limit_s), look_s_(limit_s) {}
@@ -100,13 +94,9 @@ class CpuLimit {
   double others_start_ = foreign_time.others_s;
 };
 
-// Escaping of user texts for a terminal, a figure, a table or a file name, and their width.
-
-// Escaping of names and other user texts for a terminal, a figure, a table or a file name.
-//
-// Files with such texts may come from any source. Every writer passes them through the function of
-// its medium, so that they are shown and never act as instructions. Only JSON needs none: its
-// writer (harness/base/record.h) keeps every character.
+// Names and other user texts may come from any source. Every writer passes them through the
+// function of its medium, so that they are shown and never act as instructions. Only JSON needs
+// none: its writer (harness/base/record.h) keeps every character.
 
 /// Returns the text with every active character shown, such as "\n", "\x1b" or "\u202e". Active
 /// are control characters (also U+0080 to U+009F), marks of writing direction, line separators and
@@ -133,8 +123,7 @@ std::string EscapeLatex(std::string_view text);
 /// letters.
 std::string BreakableLatex(std::string_view text);
 
-/// Escapes text of SVG and HTML, in an element or an attribute: no character is markup, and control
-/// characters are shown, as by EscapeTerminal().
+/// Escapes text of SVG and HTML, in an element or an attribute.
 std::string EscapeXml(std::string_view text);
 
 /// Writes a CSV field, quoted if RFC 4180 (or a reader with "#" comments) needs it. A text that a
@@ -153,12 +142,9 @@ std::string QuoteGnuplotTick(std::string_view text);
 /// hash of the whole name, so that two names never share a file.
 std::string FileName(std::string_view name);
 
-// Width of a text on a terminal. A letter takes one cell, a character of Chinese, Japanese or
-// Korean two, a combining accent none.
-
-/// Returns the cells of a UTF-8 text without control characters (EscapeTerminal), by the C
-/// library's table. Unknown characters and invalid bytes count as one. Terminals agree except for
-/// characters made of several, such as some emoji.
+/// Returns the cells of a UTF-8 text on a terminal, by the C library's table: two for a Chinese
+/// character, none for a combining accent. Unknown characters and invalid bytes count as one. The
+/// text has no control characters (EscapeTerminal).
 std::size_t CellsOf(std::string_view text);
 
 /// Returns the longest beginning of at most `width` cells, and combining marks of its last letter.
@@ -170,17 +156,13 @@ std::vector<std::string> BrokenInto(std::string_view text, std::size_t width);
 
 // Whole files, read and written at once, and their errors.
 
-// Exception for input that the user can correct.
-
-/// Bad input. what() is the complete message: for each mistake the file, the JSON Pointer, the
-/// value found and the value expected. The command line turns it into exit code 2. Numerical
-/// failures are not such errors; they are outcomes of a run.
+/// Bad input that the user can correct. what() is the complete message: for each mistake the file,
+/// the JSON Pointer, the value found and the value expected. The command line turns it into exit
+/// code 2. Numerical failures are not such errors; they are outcomes of a run.
 class ConfigError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
-
-// Whole files, read and written at once.
 
 /// A failed operation of the system: a full disk, a limit, a missing file. Runs make
 /// no record then, because a method did not cause it (processes.h).
@@ -189,24 +171,17 @@ class SystemFault : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Writes `text` to `path` by the output rules above: a reader of a regular file finds the old
+/// Writes `text` to `path` by the rules below: a reader of a regular file finds the old
 /// contents or the new ones, never a part. Makes missing parent folders. Throws std::runtime_error
 /// with the path and the system's reason.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view text);
 
-/// Writes a text that comes in parts: `fill` passes each part to its argument.
-void WriteFileAtomically(
-    const std::filesystem::path& path,
-    const std::function<void(const std::function<void(std::string_view)>& write)>& fill);
-
 /// Writes `text` to `path` if no file exists there; else returns false and changes nothing. If
 /// several processes try at once, one succeeds. If a process is killed, the file is complete or
-/// absent, because a temporary file gets its second name by link(2). Throws as WriteFileAtomically
-/// does.
+/// absent. Throws as WriteFileAtomically does.
 bool WriteNewFile(const std::filesystem::path& path, std::string_view text);
 
-/// Makes the folder of `path` and its parents. Throws std::runtime_error with the folder and the
-/// system's reason.
+/// Makes the folder of `path` and its parents. Throws std::runtime_error with folder and reason.
 void MakeFolderOf(const std::filesystem::path& path);
 
 /// Throws SystemFault: "cannot VERB 'PATH': " and the reason in errno.
@@ -335,9 +310,8 @@ inline constexpr int kRecordFormat = 2;
 /// Expected format in messages.
 inline constexpr const char* kExpectedFormat = "{}, the format that this version reads";
 
-// Hash function for short names of states, cases and versions.
-
-/// FNV-1a (64 bit) of bytes that come in parts. For finding equal data, not for security.
+/// FNV-1a (64 bit) of bytes that come in parts: short names of states, cases and versions. For
+/// finding equal data, not for security.
 class FnvHash {
  public:
   void Add(std::string_view bytes) {
@@ -360,10 +334,8 @@ inline std::string Fnv1a(std::string_view bytes) {
 
 // External programs, files in memory, and the end of a process without memory.
 
-// File in memory for the output of a child process; it is readable however the child ends.
-
-/// File without a name that disappears however this process ends. Programs started by exec do not
-/// inherit it, children made by fork do.
+/// File without a name, for the output of a child process made by fork; it is readable however the
+/// child ends. Programs started by exec do not inherit it.
 class MemoryFile {
  public:
   /// @param what  purpose of the file, for messages
@@ -381,8 +353,6 @@ class MemoryFile {
   int descriptor_;
 };
 
-// External programs, started without a shell.
-
 struct ProgramResult {
   int status = 0;  ///< exit status; 128 + the signal number after a signal, as in shells
   int error = 0;   ///< errno if the program could not be started, else 0
@@ -392,24 +362,22 @@ struct ProgramResult {
   std::string Failure(const std::string& name) const;
 };
 
-/// Runs `words`, the program (searched in PATH) and its arguments, with `input` on its standard
-/// input, and waits for it. The program receives SIGTERM if this process ends before. Throws
-/// std::runtime_error only if no memory file can be made.
+/// Runs `words`, the program (searched in PATH) and its arguments, without a shell, with `input` on
+/// its standard input, and waits for it. The program receives SIGTERM if this process ends before.
+/// Throws std::runtime_error only if no memory file can be made.
 ProgramResult RunProgram(std::vector<std::string> words, const std::string& input = "");
 
 /// Ends the program for which RunProgram() waits, if there is one. Async-signal-safe.
 void EndProgram();
 
-// Handling of memory exhaustion in code from which no exception may leave: destructors (JSON
-// documents allocate there), noexcept library functions, threads.
-
-/// Makes such a process exit with `code` after `message` on standard error, instead of SIGABRT.
-/// Other uncaught errors end it as before. `message` must stay valid.
+/// Makes a process that lacks memory where no exception may leave (destructors, threads) exit with
+/// `code` after `message` on standard error, instead of SIGABRT. Other uncaught errors end it as
+/// before. `message` must stay valid.
 void ExitWithoutMemory(int code, std::string_view message);
 
-// Standard output and error, and the properties of their terminals.
-
-// Width and colour of standard output and standard error (docs/decisions/024).
+// Standard output and error, and their terminals (docs/decisions/024). All output goes through
+// here: text that cannot be written gives an error with its reason, and never a signal or a line in
+// an unrelated file.
 
 struct Screen {
   std::size_t width = 0;  ///< [cells]; 0: unlimited, for files and pipes
@@ -428,9 +396,6 @@ Screen ErrorScreen();
 
 /// Makes the width of standard output unlimited: --wide.
 void ShowWide();
-
-// Standard streams of the programs. All output goes through here: text that cannot be written gives
-// an error with its reason, and never a signal or a line in an unrelated file.
 
 /// Opens closed descriptors among 0, 1 and 2; call it first in main(). Otherwise the next file, for
 /// example a store, would get their numbers and all printed text. Closed streams still cannot be
@@ -499,9 +464,7 @@ void PrintError(fmt::format_string<internal::PrintedAs<Values>...> format,
 /// `| head` does by design.
 int FinishOutput(int code);
 
-// Words in messages: characters of UTF-8, lists, counts, the nearest spelling of a mistyped word.
-
-// Lists made of other lists.
+// Lists, and words in messages: counts, the nearest spelling of a mistyped word.
 
 /// Returns a T of f(element) for each element; `f` may be a member.
 template <class T, class Range, class Function>

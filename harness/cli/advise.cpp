@@ -5,7 +5,6 @@
 #include "harness/config/formulations.h"
 #include "harness/judge/analysis.h"
 #include "harness/run/run.h"
-#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
 namespace {
@@ -71,10 +70,8 @@ Table TableOf(const std::vector<Trial>& trials, const Trial& best) {
                   "formulation, enforcement, coordinates=coords, integrator, rtol:scientific, "
                   "step=step [s]:scientific, outcome, error_position_max=error [m]:scientific, "
                   "wall_s=wall [s]:seconds, ratio:exponent")};
-  bool adaptive = false, fixed = false;
   for (const Trial& trial : trials) {
     const auto& [method, integrator, rtol, step] = trial.choice;
-    (step > 0.0 ? fixed : adaptive) = true;
     Record& row = AddRow({method.formulation, method.enforcement, method.coordinates, integrator,
                           step > 0.0 ? Value() : Value(rtol), step > 0.0 ? Value(step) : Value(),
                           trial.outcome, std::isfinite(trial.error) ? Value(trial.error) : Value(),
@@ -82,13 +79,10 @@ Table TableOf(const std::vector<Trial>& trials, const Trial& best) {
                          &table);
     row.Set("warnings", trial.warnings);  // marks the outcome
   }
-  std::erase_if(table.columns, [&](const TableColumn& column) {
-    return (column.key == "rtol" && !adaptive) || (column.key == "step" && !fixed);
-  });
+  EraseEmptyColumns({"rtol", "step"}, &table);
   return table;
 }
 
-/// Returns the experiment that runs one choice and times it.
 std::string ExperimentOf(const AdviseCommand& command, const Choice& choice, double horizon,
                          ReferenceOptions reference) {
   reference.cpu_s *= 2;  // reaches the same time on a machine with more load
@@ -161,12 +155,11 @@ void RequireMotion(const AdviseCommand& command, const MechanismDescription& use
 }
 
 std::string WhatWasTried(const Advice& advice) {
-  std::string text =
-      fmt::format("{} in {:.3g} s", WithCount(advice.trials, "method"), advice.pilot_s);
-  if (advice.untried > 0) {
-    text += fmt::format(", {} not tried: time limit reached (--cpu-limit)", advice.untried);
-  }
-  return text;
+  return fmt::format(
+      "{} in {:.3g} s{}", WithCount(advice.trials, "method"), advice.pilot_s,
+      advice.untried == 0
+          ? ""
+          : fmt::format(", {} not tried: time limit reached (--cpu-limit)", advice.untried));
 }
 
 void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Reference& reference,
@@ -212,16 +205,13 @@ void PrintAdvice(const AdviseCommand& command, const Advice& advice, const Refer
     if (std::isfinite(trial.error)) {
       finished.push_back(trial);
     } else {
-      const std::string name =
-          fmt::format("{} ({})", trial.choice.integrator, ToString(trial.outcome));
-      if (std::ranges::find(cut_off, name) == cut_off.end()) cut_off.push_back(name);
+      AddOnce(cut_off, fmt::format("{} ({})", trial.choice.integrator, ToString(trial.outcome)));
     }
   }
   Print("\nThe best of each integrator and level (pilot runs)\n\n");
   PrintText(ToScreen(TableOf(finished, best)));
   if (!cut_off.empty()) {
-    Print("\nfailed, or stopped because slower than the best: {}\n",
-          fmt::format("{}", fmt::join(cut_off, ", ")));
+    Print("\nfailed, or stopped because slower than the best: {}\n", fmt::join(cut_off, ", "));
   }
   Print(
       "\nreference: {} ({}), certified to {:.1e} m until {:g} s\n"
@@ -234,22 +224,6 @@ CertainMotion CertainFor(const AdviseCommand& command, const MechanismDescriptio
                          double horizon) {
   return MakeCertainMotion(user, horizon, kWitnessShare * command.limits.cpu_s,
                            command.mechanism.string() + ": advice");
-}
-
-/// Runs generated code of all formulations with the integrator, level and tolerance of `best`.
-std::optional<Trial> FastestGenerated(TrialBench& bench, const Trial& best) {
-  std::optional<Trial> fastest;
-  for (const std::string& formulation : FormulationNamesWithoutPeers()) {
-    Choice choice = best.choice;
-    choice.method.formulation = formulation;
-    choice.method.execution = Execution::kGenerated;
-    constexpr double kCpu_s = 60.0;
-    Trial trial = bench.Try(choice, kCpu_s);
-    if (!std::isfinite(trial.error)) continue;
-    bench.Settle(&trial);
-    if (!fastest || trial.wall_s < fastest->wall_s) fastest = trial;
-  }
-  return fastest;
 }
 
 Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
@@ -265,8 +239,16 @@ Advice AdviceFor(const AdviseCommand& command, const MechanismFile& file,
       find(request, *bench, certain.horizon, LinkLength(file.description), [&](Trial& trial) {
         Examine(file, certain.horizon, certain.reference, points.empty(), trial);
       });
-  if (command.generated && !advice.finalists.empty()) {
-    advice.generated = FastestGenerated(*bench, advice.finalists.front());
+  if (!command.generated || advice.finalists.empty()) return advice;
+  for (const std::string& formulation : FormulationNamesWithoutPeers()) {
+    Choice choice = advice.finalists.front().choice;
+    choice.method.formulation = formulation;
+    choice.method.execution = Execution::kGenerated;
+    constexpr double kCpu_s = 60.0;
+    Trial trial = bench->Try(choice, kCpu_s);
+    if (!std::isfinite(trial.error)) continue;
+    bench->Settle(&trial);
+    if (!advice.generated || trial.wall_s < advice.generated->wall_s) advice.generated = trial;
   }
   return advice;
 }
@@ -342,19 +324,16 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
                                certain.reference.message);
   }
   RequireMotion(command, user, certain, points);
-  std::string shorter;
+  std::vector<std::string> shorter;
   if (certain.horizon < command.horizon) {
-    shorter = fmt::format("The motion is certified until {:g} s only. Advice is for that.",
-                          certain.horizon);
+    AddNote(shorter, "The motion is certified until {:g} s only. Advice is for that.",
+            certain.horizon);
   }
-  if (!shorter.empty() && command.format == "text") Print("{}\n", shorter);
+  if (!shorter.empty() && command.format == "text") Print("{}\n", shorter.front());
   AdviceRequest request;
-  if (command.budget > 0.0) {
-    request.budget = command.budget;
-  } else {
-    request.error = command.error;
-  }
   request.cpu_s = kPilotShare * command.limits.cpu_s;
+  (command.budget > 0.0 ? request.budget : request.error) =
+      command.budget > 0.0 ? command.budget : command.error;
   const Advice advice = AdviceFor(command, file, certain, points, request);
   if (advice.finalists.empty()) {
     Reject<std::runtime_error>("{}: no way of running it finished", name);
@@ -365,8 +344,8 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
     if (command.simplify) PrintModels(command, file, certain, best.wall_s);
   } else {
     Table table = TableOf(advice.finalists, best);
-    table.notes = {WhatWasTried(advice)};
-    if (!shorter.empty()) table.notes.push_back(shorter);
+    table.notes = shorter;
+    table.notes.insert(table.notes.begin(), WhatWasTried(advice));
     PrintText(Render(table, command.format));
   }
   if (!command.out.empty()) {
@@ -377,8 +356,7 @@ int AdviseInChild(const AdviseCommand& command, const MechanismFile& file) {
   return advice.reached ? 0 : 1;
 }
 
-/// Prints the cheapest way to run the mechanism within the error, or the most accurate one within
-/// the budget, and its basis. Returns 1 if no method met the requirement.
+/// Returns 1 if no method met the requirement.
 int GiveAdvice(AdviseCommand& command, const Typed&) {
   constexpr double kUsualError = 1e-6;
   if (command.error == 0.0 && command.budget == 0.0) command.error = kUsualError;

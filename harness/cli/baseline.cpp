@@ -1,9 +1,6 @@
 // baseline: a repository's own baseline, measured again and compared with the committed one.
-#include "harness/base/store.h"
-#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/run/run.h"
-#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
 namespace {
@@ -29,7 +26,7 @@ struct BaselineCommand {
 
 constexpr const char* kResults = "results.jsonl";
 
-/// Requires a separate folder for kept measurements, because files in it are overwritten.
+/// Requires a new folder for kept measurements.
 void RequireNewFolder(const std::filesystem::path& kept, const std::filesystem::path& baseline) {
   const auto plain = [](const std::filesystem::path& path) {
     const auto whole = std::filesystem::weakly_canonical(path);
@@ -67,7 +64,6 @@ void RequirePrograms(const BaselineCommand& command) {
   }
 }
 
-/// Runs a program for its output files. Throws with its messages if it fails.
 void MustRun(std::vector<std::string> words, const std::string& name) {
   const ProgramResult result = RunProgram(std::move(words));
   if (const std::string failure = result.Failure(name); !failure.empty()) {
@@ -134,44 +130,29 @@ std::vector<Record> Load(const std::filesystem::path& path) {
   return ReadMeasurements(path, &warnings);
 }
 
-/// Change of measured values that the comparison must detect.
+/// Returns the changed value of a record's measure, which the comparison must detect; null if the
+/// record stays unchanged.
+using PlantedValue = Value (*)(const Record& record, const CompareOptions& options);
+
 struct Plant {
-  std::string what, measure;
-  /// Returns true if the record has the value and it was changed.
-  std::function<bool(Record*)> change;
+  const char *what, *measure;
+  PlantedValue value;
 };
-
-bool Scale(Record* record, std::string_view key, double factor, double floor) {
-  if (record->Find(key) == nullptr || !(record->Number(key) > floor)) return false;
-  record->Set(std::string(key), factor * record->Number(key));
-  return true;
-}
-
-std::vector<Plant> Plants(const CompareOptions& options) {
-  const auto add_one = [](const char* key) {
-    return [key](Record* record) {
-      if (record->Find(key) == nullptr) return false;
-      record->Set(key, static_cast<std::int64_t>(record->Number(key)) + 1);
-      return true;
-    };
-  };
-  return {{"3 times the drift", "drift_position_max",
-           [&options](Record* record) {
-             return Scale(record, "drift_position_max", 3.0, options.error_floor);
-           }},
-          {"one step more", "steps", add_one("steps")},
-          {"a bit of a final state", "state_hash",
-           [](Record* record) {
-             if (record->Find("state_hash") == nullptr) return false;
-             record->Set("state_hash", std::string("0000000000000000"));
-             return true;
-           }},
-          {"a run that fails", "outcome", [](Record* record) {
-             if (record->Text("outcome") != "finished") return false;
-             record->Set("outcome", std::string("failed"));
-             return true;
-           }}};
-}
+constexpr Plant kPlants[] = {
+    {"3 times the drift", "drift_position_max",
+     [](const Record& record, const CompareOptions& options) {
+       const double drift = record.Number("drift_position_max");
+       return drift > options.error_floor ? Value(3.0 * drift) : Value();
+     }},
+    {"one step more", "steps",
+     [](const Record& record, const CompareOptions&) {
+       return Value(static_cast<std::int64_t>(record.Number("steps")) + 1);
+     }},
+    {"a bit of a final state", "state_hash",
+     [](const Record&, const CompareOptions&) { return Value("0000000000000000"); }},
+    {"a run that fails", "outcome", [](const Record& record, const CompareOptions&) {
+       return record.Text("outcome") == "finished" ? Value("failed") : Value();
+     }}};
 
 bool IsCaught(const ComparisonReport& report, const CompareOptions& options,
               const std::string& measure) {
@@ -183,7 +164,7 @@ bool IsCaught(const ComparisonReport& report, const CompareOptions& options,
          });
 }
 
-/// Plants each change into one record of the measurements; returns 1 if one is not detected.
+/// Returns 1 if a planted change is not detected.
 int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) {
   const CompareOptions options;
   const std::vector<Record> base = Load(work / kResults);
@@ -195,13 +176,18 @@ int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) 
   const bool is_same = Compare(base, base, options).ExitCode(options) == 0;
   Print("{}: measurements held against themselves\n", is_same ? "same" : "NOT THE SAME");
   missed += !is_same;
-  for (const Plant& plant : Plants(options)) {
+  for (const auto& [what, measure, value] : kPlants) {
     std::vector<Record> changed = base;
-    if (std::ranges::none_of(changed, [&](Record& one) { return plant.change(&one); })) {
-      Print("not planted: {}: no run has such a {}\n", plant.what, plant.measure);
+    const auto change = [&](Record& one) {
+      const Value planted = one.Find(measure) == nullptr ? Value() : value(one, options);
+      if (planted != Value()) one.Set(measure, planted);
+      return planted != Value();
+    };
+    if (std::ranges::none_of(changed, change)) {
+      Print("not planted: {}: no run has such a {}\n", what, measure);
       continue;
     }
-    tell(plant.what, IsCaught(Compare(base, changed, options), options, plant.measure));
+    tell(what, IsCaught(Compare(base, changed, options), options, measure));
   }
   const std::vector<Record> fewer(base.begin(), base.end() - 1);
   tell("a case that is gone", Compare(base, fewer, options).ExitCode(options) == 2);
@@ -215,10 +201,6 @@ int SelfTest(const BaselineCommand& command, const std::filesystem::path& work) 
   return missed == 0 ? 0 : 1;
 }
 
-/// check: returns 0 for equal or better, 1 for worse, 2 if it could not measure. renew: writes
-/// dir/results.jsonl, returns 0. selftest: returns 0 if each planted change was detected, else 1.
-/// @throws ConfigError before any measurement if valgrind or loopbench_count are required but
-/// missing
 int Baseline(const BaselineCommand& command, const Typed& typed) {
   if (!command.keep.empty()) RequireNewFolder(command.keep, command.dir);
   const auto baseline = command.dir / kResults;
@@ -236,9 +218,7 @@ int Baseline(const BaselineCommand& command, const Typed& typed) {
   if (const int code = MeasureAll(command, work); code != 0) return code;
   RemoveAbandoned(command.dir);
   if (command.action == "selftest") return SelfTest(command, work);
-  if (command.action == "check") {
-    return PrintComparison(command.dir, work / kResults, typed);
-  }
+  if (command.action == "check") return PrintComparison(command.dir, work / kResults, typed);
   WriteFileAtomically(baseline, ReadFile(work / kResults));
   Print("renewed {}: {}\n", baseline.string(), WithCount(Load(baseline).size(), "record"));
   return 0;

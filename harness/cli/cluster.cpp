@@ -4,10 +4,6 @@
 #include <fmt/chrono.h>
 #include <fmt/ranges.h>
 
-#include <chrono>
-#include <set>
-
-#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 #include "harness/run/run.h"
 
@@ -18,7 +14,7 @@ struct SubmitCommand {
   ClusterRun run;
   std::filesystem::path folder;
   bool again = false, no_queue = false, dry_run = false, no_timing = false;
-  std::string time, partition;  ///< further options of sbatch
+  std::string time, partition;
 
   std::vector<Option> Options() {
     return {
@@ -42,20 +38,22 @@ struct SubmitCommand {
   }
 };
 
-/// Options of the commands on the folder of submit.
+Option FolderArgument(std::filesystem::path* folder) {
+  return {"folder", "Folder created by submit", folder, kRequired};
+}
+
 struct CollectCommand {
   std::filesystem::path folder;
 
-  std::vector<Option> Options() {
-    return {{"folder", "Folder created by submit", &folder, kRequired}};
-  }
+  std::vector<Option> Options() { return {FolderArgument(&folder)}; }
 };
 
-struct StatusCommand : CollectCommand {
+struct StatusCommand {
+  std::filesystem::path folder;
   bool json = false;
 
   std::vector<Option> Options() {
-    return {CollectCommand::Options().front(), JsonOption(&json), WideOption()};
+    return {FolderArgument(&folder), JsonOption(&json), WideOption()};
   }
 };
 
@@ -76,7 +74,6 @@ std::string SubmitAgainLine(const std::filesystem::path& folder) {
   return ShellLine({"loopbench", "submit", "--resubmit", "--out", folder.string()});
 }
 
-/// Submits the array of `parts` and the dependent job, and stores their numbers.
 void Queue(const std::vector<int>& parts, const std::filesystem::path& folder, ClusterRun* run) {
   WriteFileAtomically(folder / "array.sh", ArrayScript(*run, folder, parts));
   run->array_job = SubmitJob(folder / "array.sh", {});
@@ -105,12 +102,10 @@ int SubmitAgain(const SubmitCommand& command) {
   std::vector<int> parts = PartsNotDone(run, command.folder);
   if (!command.dry_run) WriteScripts(run, command.folder);
   if (command.no_queue) {
-    if (parts.empty()) {
-      Print("{}: every part is done\n", command.folder.string());
-    } else {
-      Print("{}: {} of {} parts are not done: {}\n", command.folder.string(), parts.size(),
-            run.parts, fmt::join(parts, ", "));
-    }
+    Print("{}: {}\n", command.folder.string(),
+          parts.empty() ? "every part is done"
+                        : fmt::format("{} of {} parts are not done: {}", parts.size(), run.parts,
+                                      fmt::join(parts, ", ")));
     PrintHowToRun(command.folder);
     return 0;
   }
@@ -136,97 +131,108 @@ int SubmitAgain(const SubmitCommand& command) {
   return 0;
 }
 
-/// Returns the "id"s of the accuracy cases, in the order of the experiments.
-std::vector<std::string> OrderOfCases(const ClusterRun& run) {
-  const ExperimentFiles files = FilesOf(run);
-  Workload workload(files);
-  std::vector<std::string> ids;
-  std::set<std::string> known;  // a case in two files counts once
-  for (std::size_t group = 0; group < workload.groups(); ++group) {
-    for (const Experiment& experiment : workload.Read(group).experiments) {
-      for (const Case& one : SelectCases(experiment, files.filter)) {
-        const std::string id = RunId(Identified(experiment, one).keys);
-        if (known.insert(id).second) ids.push_back(id);
-      }
-    }
-  }
-  return ids;
-}
-
 double Now() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+/// Returns all parts as one; its state counts theirs.
+PartProgress SumOf(const ClusterRun& run, const std::vector<PartProgress>& parts) {
+  PartProgress all;
+  all.cases = static_cast<double>(run.all_cases);
+  std::map<std::string, int> states;
+  for (const PartProgress& part : parts) {
+    ++states[part.state];
+    all.done += part.done;
+    all.failed += part.failed;
+  }
+  all.state = Joined(states, ", ", [](const auto& state) {
+    return fmt::format("{} {}", state.second, state.first);
+  });
+  return all;
 }
 
 Table StatusTable(const ClusterRun& run, const std::vector<PartProgress>& parts) {
   Table table{.title = fmt::format("{} in {} parts", run.name, run.parts),
               .columns = Columns(
                   "part, state, cases:integer, done:integer, failed:integer, to_do=to do:integer")};
-  std::size_t done = 0, failed = 0;
-  const auto add = [&table](const std::string& name, const std::string& state, double cases,
-                            std::size_t finished, std::size_t other) {
-    const double left = cases - static_cast<double>(finished + other);
+  const auto add = [&table](const std::string& name, const PartProgress& part) {
     const auto number = [](double value) {
       return std::isfinite(value) ? Value(static_cast<std::int64_t>(value)) : Value();
     };
-    AddRow({name, state, number(cases), finished, other, number(left)}, &table);
+    AddRow({name, part.state, number(part.cases), part.done, part.failed,
+            number(part.cases - static_cast<double>(part.done + part.failed))},
+           &table);
   };
-  for (const PartProgress& part : parts) {
-    add(std::to_string(part.part), part.state, part.cases, part.done, part.failed);
-    done += part.done;
-    failed += part.failed;
-  }
-  std::map<std::string, int> states;
-  for (const PartProgress& part : parts) ++states[part.state];
-  std::vector<std::string> words;
-  for (const auto& [state, number] : states) words.push_back(fmt::format("{} {}", number, state));
-  add("all", fmt::format("{}", fmt::join(words, ", ")), static_cast<double>(run.all_cases), done,
-      failed);
+  for (const PartProgress& part : parts) add(std::to_string(part.part), part);
+  add("all", SumOf(run, parts));
   return table;
 }
 
 JsonObject StatusDocument(const ClusterRun& run, const std::vector<PartProgress>& parts,
                           double seconds_left) {
-  std::vector<JsonObject> rows;
-  std::size_t done = 0, failed = 0, running = 0;
-  for (const PartProgress& part : parts) {
-    rows.push_back(JsonOf("part", part.part, "state", part.state, "cases", part.cases, "done",
-                          part.done, "failed", part.failed));
-    done += part.done;
-    failed += part.failed;
-    running += part.state == "running";
-  }
-  return JsonOf("name", run.name, "cases", run.all_cases, "done", done, "failed", failed, "to_do",
-                run.all_cases - static_cast<std::int64_t>(done + failed), "running_parts", running,
+  std::vector<JsonObject> rows = Mapped<JsonObject>(parts, [](const PartProgress& part) {
+    return JsonOf("part", part.part, "state", part.state, "cases", part.cases, "done", part.done,
+                  "failed", part.failed);
+  });
+  const PartProgress all = SumOf(run, parts);
+  return JsonOf("name", run.name, "cases", run.all_cases, "done", all.done, "failed", all.failed,
+                "to_do", run.all_cases - static_cast<std::int64_t>(all.done + all.failed),
+                "running_parts", std::ranges::count(parts, "running", &PartProgress::state),
                 "array_job", run.array_job, "collect_job", run.collect_job, "seconds_left",
                 seconds_left, "parts", rows);
 }
 
-/// Rejects line ends: Slurm reads its options from comment lines of the script.
-void RequireOneLine(const std::string& option, const std::string& text) {
-  if (text.find_first_of("\n\r") == std::string::npos) return;
-  Reject("{}: found a line end in '{}', expected a text of one line", option, text);
+/// Checks that the options go together and that no text has a line end: Slurm reads its options
+/// from comment lines of the script.
+void RequireOptions(const SubmitCommand& command, const Typed& typed) {
+  const ClusterRun& run = command.run;
+  if (command.again != run.experiments.empty()) {
+    throw ConfigError(command.again
+                          ? "--resubmit: found experiments beside it, expected none: the folder "
+                            "contains them"
+                          : "submit: found no experiment, expected at least one, or --resubmit");
+  }
+  for (const std::string& option : typed.given) {
+    if (!command.again ||
+        Contains(std::array{"--resubmit", "--out", "--no-queue", "--dry-run"}, option)) {
+      continue;
+    }
+    Reject("--resubmit: found {} beside it, expected none: the folder contains the options",
+           option);
+  }
+  for (const std::string& option : run.batch_options) {
+    if (option.starts_with("--")) continue;
+    throw ConfigError("--sbatch: found '" + option + "', expected an option that begins with --");
+  }
+  std::vector<std::string> experiments;
+  for (const auto& path : run.experiments) experiments.push_back(path.string());
+  for (const auto& [option, texts] : {std::pair{"--out", std::vector{command.folder.string()}},
+                                      {"experiment", experiments},
+                                      {"--set", run.settings},
+                                      {"--filter", run.conditions},
+                                      {"--time, --partition or --sbatch", run.batch_options}}) {
+    for (const std::string& text : texts) {
+      if (text.find_first_of("\n\r") == std::string::npos) continue;
+      Reject("{}: found a line end in '{}', expected a text of one line", option, text);
+    }
+  }
 }
 
-int Submit(SubmitCommand command) {
-  command.folder = std::filesystem::absolute(command.folder).lexically_normal();
-  if (!command.folder.has_filename()) command.folder = command.folder.parent_path();
-  RequireOneLine("--out", command.folder.string());
-  for (const auto& path : command.run.experiments) RequireOneLine("experiment", path.string());
-  for (const auto& [option, texts] :
-       {std::pair{"--set", command.run.settings},
-        {"--filter", command.run.conditions},
-        {"--time, --partition or --sbatch", command.run.batch_options}}) {
-    for (const std::string& text : texts) RequireOneLine(option, text);
-  }
-  if (command.again) return SubmitAgain(command);
-  ClusterRun& run = command.run;
+int Submit(SubmitCommand& command, const Typed& typed) {
+  auto& [run, folder, again, no_queue, dry_run, no_timing, time, partition] = command;
+  if (!time.empty()) run.batch_options.push_back("--time=" + time);
+  if (!partition.empty()) run.batch_options.push_back("--partition=" + partition);
+  run.timing = !no_timing;
+  folder = std::filesystem::absolute(folder).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  RequireOptions(command, typed);
+  if (again) return SubmitAgain(command);
   for (auto& path : run.experiments) path = std::filesystem::absolute(path).lexically_normal();
   run.program = std::filesystem::read_symlink("/proc/self/exe").string();
   CountCases(&run);
   std::vector<int> parts;
   for (int part = 1; part <= run.parts; ++part) parts.push_back(part);
-  const auto& folder = command.folder;
-  if (command.dry_run) {
+  if (dry_run) {
     for (const auto& [name, text] : {std::pair{"part.sh", PartScript(run, folder)},
                                      {"array.sh", ArrayScript(run, folder, parts)},
                                      {"collect.sh", CollectScript(run, folder)}}) {
@@ -243,15 +249,10 @@ int Submit(SubmitCommand command) {
   WriteScripts(run, folder);
   Print("{} in {} in {}\n", WithCount(run.all_cases, "case"), WithCount(run.parts, "part"),
         folder.string());
-  if (!command.no_queue) {
-    Queue(parts, folder, &run);
-  } else {
-    PrintHowToRun(folder);
-  }
+  no_queue ? PrintHowToRun(folder) : Queue(parts, folder, &run);
   return 0;
 }
 
-/// Returns 0, or 2 if the folder is no cluster run.
 int PrintStatus(const StatusCommand& command, const Typed&) {
   const std::filesystem::path& folder = command.folder;
   const ClusterRun run = ReadClusterRun(folder);
@@ -304,44 +305,25 @@ int Collect(const CollectCommand& command, const Typed&) {
   }
   MergeCommand merge;
   merge.out = WholeFile(folder).parent_path();
-  merge.order = OrderOfCases(run);
+  const ExperimentFiles files = FilesOf(run);
+  Workload workload(files);
+  std::set<std::string> known;  // a case in two files counts once
+  for (std::size_t group = 0; group < workload.groups(); ++group) {
+    for (const Experiment& experiment : workload.Read(group).experiments) {
+      for (const Case& one : SelectCases(experiment, files.filter)) {
+        const std::string id = RunId(Identified(experiment, one).keys);
+        if (known.insert(id).second) merge.order.push_back(id);
+      }
+    }
+  }
   for (int part = 1; part <= run.parts; ++part) merge.stores.push_back(PartFolder(folder, part));
   return Merge(merge);
-}
-
-/// Rejects further options: the folder contains all options of the first submission.
-void RequireNothingElse(const std::vector<std::string>& given) {
-  const std::set<std::string> may_stand = {"--resubmit", "--out", "--no-queue", "--dry-run"};
-  for (const std::string& option : given) {
-    if (may_stand.contains(option)) continue;
-    Reject("--resubmit: found {} beside it, expected none: the folder contains the options",
-           option);
-  }
-}
-
-int SubmitAsTyped(SubmitCommand& submit, const Typed& typed) {
-  ClusterRun& run = submit.run;
-  if (submit.again != run.experiments.empty()) {
-    throw ConfigError(submit.again
-                          ? "--resubmit: found experiments beside it, expected none: the folder "
-                            "contains them"
-                          : "submit: found no experiment, expected at least one, or --resubmit");
-  }
-  if (submit.again) RequireNothingElse(typed.given);
-  if (!submit.time.empty()) run.batch_options.push_back("--time=" + submit.time);
-  if (!submit.partition.empty()) run.batch_options.push_back("--partition=" + submit.partition);
-  for (const std::string& option : run.batch_options) {
-    if (option.starts_with("--")) continue;
-    throw ConfigError("--sbatch: found '" + option + "', expected an option that begins with --");
-  }
-  run.timing = !submit.no_timing;
-  return Submit(submit);
 }
 
 }  // namespace
 
 void AddCluster(Commands& commands) {
-  commands.Add("submit", "Run experiments in parts on a cluster (Slurm)", SubmitAsTyped);
+  commands.Add("submit", "Run experiments in parts on a cluster (Slurm)", Submit);
   commands.Add("status", "Show the progress of a submitted run", PrintStatus);
   commands.Add("collect", "Merge the parts of a submitted run", Collect);
 }

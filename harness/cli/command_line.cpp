@@ -5,14 +5,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <array>
-#include <stdexcept>
-#include <type_traits>
+#include <sstream>
 
 #include "harness/base/numeric_option.h"
-#include "harness/base/record.h"
-#include "harness/base/text.h"
+#include "harness/exchange/export_names.h"
 
 namespace loopbench::harness {
 
@@ -66,18 +63,7 @@ std::vector<const CLI::Option*> AllOptions(const CLI::App& command) {
   return all;
 }
 
-std::string Joined(const std::vector<std::string>& words) {
-  return fmt::format("{}", fmt::join(words, " "));
-}
-
-/// Returns "unknown option '--fromat'; did you mean '--format'?".
-std::string Unknown(const std::string& word, const std::vector<std::string>& known) {
-  const std::string nearest = NearestSpelling(word, known);
-  return fmt::format("unknown {} '{}'{}", word.starts_with('-') ? "option" : "command", word,
-                     nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
-}
-
-/// Returns the accepted words of an option with a list: CLI11 shows it as "TEXT:{a,b}".
+/// Returns the accepted words of an option, which CLI11 shows as "TEXT:{a,b}".
 std::vector<std::string> ValuesOf(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   const std::size_t begin = type.find('{'), end = type.rfind('}');
@@ -148,13 +134,13 @@ std::string Quoted(const std::string& text) {  // for fish and zsh, between sing
   return quoted + "'";
 }
 
-/// Words that may follow a command: commands within it, or values of its first argument.
-std::vector<std::string> WordsAfter(const CLI::App& command) {
+/// Returns words that may follow a command: commands within it, or values of its first argument.
+std::string WordsAfter(const CLI::App& command) {
   std::vector<std::string> words = CommandNames(command);
   for (const CLI::Option* option : command.get_options()) {
     if (words.empty() && option->get_positional()) words = ValuesOf(*option);
   }
-  return words;
+  return Joined(words, " ");
 }
 
 std::string AllOptionNames(const CLI::App& command) {
@@ -162,80 +148,34 @@ std::string AllOptionNames(const CLI::App& command) {
   for (const CLI::Option* option : AllOptions(command)) {
     for (const std::string& name : option->get_lnames()) AddOnce(names, "--" + name);
   }
-  return Joined(names);
+  return Joined(names, " ");
 }
 
-/// Returns the arms of "case $command-$before": words that may follow a command, or an option with
-/// a list of values, formatted by `line`.
-template <class Line>
-std::string ValueArms(const CLI::App& app, Line line) {
-  std::string arms;
+/// Returns the script for bash or zsh. Its arms of "case $command-$before" have the words that may
+/// follow a command, or an option with a list of values.
+std::string CompletionScript(const CLI::App& app, const std::string& shell) {
+  const auto offer = [&shell](const std::string& words) {
+    return shell == "zsh" ? fmt::format("compadd -- {}; return", words)
+                          : fmt::format("words='{}'", words);
+  };
+  std::string values, options;
   for (const CLI::App* command : Subcommands(app)) {
-    const std::string& name = command->get_name();
-    if (const auto words = WordsAfter(*command); !words.empty()) {
-      arms += fmt::format("    '{0} {0}') {1} ;;\n", name,
-                          line(Joined(words) + " " + AllOptionNames(*command)));
+    const std::string &name = command->get_name(), all = AllOptionNames(*command);
+    options += fmt::format("    '{} '*) {} ;;\n", name, offer(all));
+    if (const std::string words = WordsAfter(*command); !words.empty()) {
+      values += fmt::format("    '{0} {0}') {1} ;;\n", name, offer(words + " " + all));
     }
     for (const CLI::Option* option : AllOptions(*command)) {
-      const std::vector<std::string> values = ValuesOf(*option);
-      if (values.empty() || option->get_lnames().empty()) continue;
-      arms += fmt::format("    '{} --{}') {} ;;\n", name, option->get_lnames().front(),
-                          line(Joined(values)));
+      const std::vector<std::string> words = ValuesOf(*option);
+      if (words.empty() || option->get_lnames().empty()) continue;
+      values += fmt::format("    '{} --{}') {} ;;\n", name, option->get_lnames().front(),
+                            offer(Joined(words, " ")));
     }
   }
-  return arms;
-}
-
-template <class Line>
-std::string OptionArms(const CLI::App& app, Line line) {
-  std::string arms;
-  for (const CLI::App* command : Subcommands(app)) {
-    arms += fmt::format("    '{} '*) {} ;;\n", command->get_name(), line(AllOptionNames(*command)));
-  }
-  return arms;
-}
-
-std::string BashScript(const CLI::App& app) {
-  const auto words = [](const std::string& list) { return fmt::format("words='{}'", list); };
-  return fmt::format(R"(# bash completion of loopbench
-_loopbench() {{
-  local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} words=
-  if [ "$word" = = ]; then word=; elif [ "$before" = = ]; then before=${{COMP_WORDS[COMP_CWORD-2]}}; fi
-  if [ "$COMP_CWORD" -eq 1 ]; then
-    words='{} {}'
-  else
-    case "${{COMP_WORDS[1]}} $before" in
-{}    *) case "$word" in -*) case "${{COMP_WORDS[1]}} " in
-{}    esac ;; esac ;;
-    esac
-  fi
-  COMPREPLY=($(compgen -W "$words" -- "$word"))
-}}
-complete -o default -F _loopbench loopbench
-)",
-                     fmt::join(CommandNames(app), " "), fmt::join(OptionNames(app), " "),
-                     ValueArms(app, words), OptionArms(app, words));
-}
-
-std::string ZshScript(const CLI::App& app) {
-  const auto add = [](const std::string& list) {
-    return fmt::format("compadd -- {}; return", list);
-  };
-  return fmt::format(R"(#compdef loopbench
-_loopbench() {{
-  if (( CURRENT == 2 )); then compadd -- {} {}; return; fi
-  case "${{words[2]}} ${{words[CURRENT-1]}}" in
-{}  esac
-  if [[ ${{words[CURRENT]}} == -* ]]; then
-    case "${{words[2]}} " in
-{}    esac
-  fi
-  _files
-}}
-_loopbench "$@"
-)",
-                     fmt::join(CommandNames(app), " "), fmt::join(OptionNames(app), " "),
-                     ValueArms(app, add), OptionArms(app, add));
+  return exchange::Filled("completion." + shell, {{"FIRST", Joined(CommandNames(app), " ") + " " +
+                                                                Joined(OptionNames(app), " ")},
+                                                  {"VALUES", values},
+                                                  {"OPTIONS", options}});
 }
 
 std::string FishScript(const CLI::App& app) {
@@ -244,10 +184,9 @@ std::string FishScript(const CLI::App& app) {
     const std::string& name = command->get_name();
     script += fmt::format("complete -c loopbench -n __fish_use_subcommand -f -a {} -d {}\n", name,
                           Quoted(command->get_description()));
-    if (const auto words = WordsAfter(*command); !words.empty()) {
-      script +=
-          fmt::format("complete -c loopbench -n '__fish_seen_subcommand_from {}' -f -a '{}'\n",
-                      name, Joined(words));
+    if (const std::string words = WordsAfter(*command); !words.empty()) {
+      script += fmt::format(
+          "complete -c loopbench -n '__fish_seen_subcommand_from {}' -f -a '{}'\n", name, words);
     }
     for (const CLI::Option* option : AllOptions(*command)) {
       if (option->get_lnames().empty()) continue;
@@ -269,13 +208,7 @@ std::string Roff(std::string_view text) {
   bool begins_line = true;
   for (const char c : text) {
     if (begins_line && (c == '.' || c == '\'')) roff += "\\&";
-    if (c == '\\') {
-      roff += "\\e";
-    } else if (c == '-') {
-      roff += "\\-";
-    } else {
-      roff += c;
-    }
+    roff += c == '\\' ? "\\e" : c == '-' ? "\\-" : std::string(1, c);
     begins_line = c == '\n';
   }
   return roff;
@@ -286,14 +219,6 @@ std::string Block(std::string_view text) {
   return text.empty() ? "" : fmt::format(".PP\n.nf\n{}\n.fi\n", Roff(text));
 }
 
-std::string OptionEntry(const CLI::Option& option) {
-  std::string value = TakesValue(option) ? Metavariable(option) : "";
-  const std::string name =
-      option.get_positional() ? option.get_name(true) : option.get_name(false, true);
-  return fmt::format(".TP\n\\fB{}\\fR{}{}\n{}\n", Roff(name), value.empty() ? "" : " ", Roff(value),
-                     Roff(DescriptionOf(option)));
-}
-
 /// Returns the sections of a command and its subcommands. `name` is "loopbench history add".
 std::string CommandSection(const CLI::App& command, const std::string& name) {
   std::string usage = name, entries, others;
@@ -301,7 +226,11 @@ std::string CommandSection(const CLI::App& command, const std::string& name) {
     if (option->get_positional()) {
       usage += " " + option->get_name(true) + (option->get_items_expected_max() > 1 ? " ..." : "");
     }
-    entries += OptionEntry(*option);
+    std::string value = TakesValue(*option) ? Metavariable(*option) : "";
+    entries += fmt::format(
+        ".TP\n\\fB{}\\fR{}{}\n{}\n",
+        Roff(option->get_positional() ? option->get_name(true) : option->get_name(false, true)),
+        value.empty() ? "" : " ", Roff(value), Roff(DescriptionOf(*option)));
   }
   for (const CLI::App* each : Subcommands(command)) {
     others += CommandSection(*each, name + " " + each->get_name());
@@ -342,9 +271,11 @@ std::string ParseFailure(const CLI::App& app, const CLI::Error& error) {
   for (const std::string& word : failed->remaining()) {
     const bool is_option = word.starts_with('-');
     if (!is_option && Subcommands(*failed).empty()) continue;
-    return fmt::format("{}: {}\n", command,
-                       Unknown(word.substr(0, word.find('=')),
-                               is_option ? OptionNames(*failed) : CommandNames(*failed)));
+    const std::string name = word.substr(0, word.find('='));
+    const std::string nearest =
+        NearestSpelling(name, is_option ? OptionNames(*failed) : CommandNames(*failed));
+    return fmt::format("{}: unknown {} '{}'{}\n", command, is_option ? "option" : "command", name,
+                       nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
   }
   const bool is_missing = std::string_view(error.what()) == "A subcommand is required";
   return fmt::format("{0}: {1} (see {0} --help)\n", command,
@@ -356,14 +287,11 @@ std::string HelpSection(const std::string& command) {
   const std::string heading = "\n## " + command + "\n\n";
   const std::size_t at = kCommandReference.find(heading);
   if (at == std::string_view::npos) throw std::logic_error("commands.md lacks " + command);
-  std::string_view section = kCommandReference.substr(at + heading.size());
-  section = section.substr(0, section.find("\n## "));
+  const std::string_view rest = kCommandReference.substr(at + heading.size());
+  std::istringstream section(std::string(rest.substr(0, rest.find("\n## "))));
   std::string text;
   bool is_code = false;
-  while (!section.empty()) {
-    const std::size_t end = std::min(section.find('\n'), section.size());
-    const std::string_view line = section.substr(0, end);
-    section.remove_prefix(std::min(end + 1, section.size()));
+  for (std::string line; std::getline(section, line);) {
     const bool is_fence = line.starts_with("```");
     is_code = is_code != is_fence;
     if (is_fence) {
@@ -460,49 +388,45 @@ void AddOption(CLI::App* app, const Option& row, std::vector<Finish>* later) {
   if (!option->get_positional() && !rules.takes_all) option->allow_extra_args(false);
 }
 
-std::vector<std::string> GivenOptions(const CLI::App& app) {
-  std::vector<std::string> names;
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->count() > 0) names.push_back(option->get_name());
-  }
-  return names;
-}
-
 }  // namespace
 
 void Commands::AddShell(const CLI::App& app) {
-  auto& [shell, subject] = Keep<std::array<std::string, 2>>();
-  auto& folder = Keep<std::filesystem::path>();
+  struct Values {
+    std::string shell, subject;
+    std::filesystem::path folder;
+  };
+  const auto values = std::make_shared<Values>();
   std::vector<std::string> names;
   for (const Command& row : rows_) {
     if (row.name.find(' ') == row.name.npos) names.push_back(row.name);
   }
   names.insert(names.end(), {"completion", "manual"});
-  const auto print = [](const std::string& text) {
-    PrintText(text);
-    return 0;
-  };
-  Add("completion", "Print a completion script",
-      [&, print](const Typed&) {
-        return print(shell == "zsh"    ? ZshScript(app)
-                     : shell == "fish" ? FishScript(app)
-                                       : BashScript(app));
-      },
-      {{"shell", "Shell to generate for", &shell, kRequired, OneOf({"bash", "zsh", "fish"})}});
-  Add("manual", "Print manual pages",
-      [&, print](const Typed&) {
-        if (folder.empty()) {
-          return print(ManualPage(app, subject.empty() ? nullptr : app.get_subcommand(subject)));
-        }
-        WriteFileAtomically(folder / "loopbench.1", ManualPage(app, nullptr));
-        for (const CLI::App* each : Subcommands(app)) {
-          const std::string file = "loopbench-" + each->get_name() + ".1";
-          WriteFileAtomically(folder / file, ManualPage(app, each));
-        }
-        return 0;
-      },
-      {{"command", "Command (default: all)", &subject, OneOf(names)},
-       {"-o,--out", "Folder for the pages of all commands", &folder}});
+  Add({"completion",
+       "Print a completion script",
+       [&app, values](const Typed&) {
+         PrintText(values->shell == "fish" ? FishScript(app)
+                                           : CompletionScript(app, values->shell));
+         return 0;
+       },
+       {{"shell", "Shell to generate for", &values->shell, kRequired,
+         OneOf({"bash", "zsh", "fish"})}}});
+  Add({"manual",
+       "Print manual pages",
+       [&app, values](const Typed&) {
+         const auto& [shell, subject, folder] = *values;
+         if (folder.empty()) {
+           PrintText(ManualPage(app, subject.empty() ? nullptr : app.get_subcommand(subject)));
+           return 0;
+         }
+         WriteFileAtomically(folder / "loopbench.1", ManualPage(app, nullptr));
+         for (const CLI::App* each : Subcommands(app)) {
+           const std::string file = "loopbench-" + each->get_name() + ".1";
+           WriteFileAtomically(folder / file, ManualPage(app, each));
+         }
+         return 0;
+       },
+       {{"command", "Command (default: all)", &values->subject, OneOf(names)},
+        {"-o,--out", "Folder for the pages of all commands", &values->folder}}});
 }
 
 int Commands::Run(int argc, char** argv, const std::string& footer) {
@@ -536,7 +460,9 @@ int Commands::Run(int argc, char** argv, const std::string& footer) {
     if (row.run) {
       command->callback([&run, &typed, command, &row] {
         run = row.run;
-        typed.given = GivenOptions(*command);
+        for (const CLI::Option* option : command->get_options()) {
+          if (option->count() > 0) typed.given.push_back(option->get_name());
+        }
       });
     }
   }

@@ -1,15 +1,9 @@
 // Subcommands of the program as rows: names, sentences, options, functions.
 #pragma once
 
-#include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <string>
-#include <type_traits>
-#include <utility>
 #include <variant>
-#include <vector>
 
 #include "harness/base/record.h"
 #include "harness/base/text.h"
@@ -89,43 +83,28 @@ struct Option {
   OptionRules rules;
 };
 
-/// Runs a parsed command and returns its exit code.
-using CommandFunction = std::function<int(const Typed&)>;
-
 struct Command {
   std::string name;  ///< "history add" is a command of "history", which has no function
   std::string sentence;
-  CommandFunction run;
-  std::vector<Option> options;
-  std::string notes;  ///< in --help, before the command's section of docs/reference/commands.md
+  std::function<int(const Typed&)> run = nullptr;  ///< returns the exit code
+  std::vector<Option> options = {};
+  /// In --help, before the command's section of docs/reference/commands.md.
+  std::string notes = "";
 };
 
 /// The subcommands of the program, and the values of their options.
 class Commands {
  public:
-  /// Keeps a value in which options are parsed.
-  template <class T>
-  T& Keep(T value = {}) {
-    const auto kept = std::make_shared<T>(std::move(value));
-    kept_.push_back(kept);
-    return *kept;
-  }
-
-  void Add(std::string name, std::string sentence, CommandFunction run = nullptr,
-           std::vector<Option> options = {}, std::string notes = "") {
-    rows_.push_back({std::move(name), std::move(sentence), std::move(run), std::move(options),
-                     std::move(notes)});
-  }
+  void Add(Command row) { rows_.push_back(std::move(row)); }
 
   /// Adds a command with the options of a T: `run` gets their values.
   template <class T>
   void Add(std::string name, std::string sentence, int (*run)(T&, const Typed&),
            std::string notes = "") {
-    auto& values = Keep<std::remove_const_t<T>>();
-    Add(
-        std::move(name), std::move(sentence),
-        [&values, run](const Typed& typed) { return run(values, typed); }, values.Options(),
-        std::move(notes));
+    const auto values = std::make_shared<std::remove_const_t<T>>();
+    Add({std::move(name), std::move(sentence),
+         [values, run](const Typed& typed) { return run(*values, typed); }, values->Options(),
+         std::move(notes)});
   }
 
   /// Parses the command line and runs its command. Prints help, or a mistake. Returns the exit
@@ -136,7 +115,6 @@ class Commands {
   void AddShell(const CLI::App& app);
 
   std::vector<Command> rows_;
-  std::vector<std::shared_ptr<void>> kept_;
 };
 
 // Each function adds related subcommands.

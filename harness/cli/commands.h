@@ -5,33 +5,20 @@
 // and 2.
 #pragma once
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <functional>
 #include <map>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
+#include <ranges>
+#include <set>
 
-#include "harness/base/record.h"
 #include "harness/base/store.h"
-#include "harness/base/text.h"
 #include "harness/cli/command_line.h"
-#include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/figures/figures.h"
 #include "harness/history/history.h"
 #include "harness/judge/judge.h"
 #include "harness/judge/tables.h"
 #include "harness/observers/reference.h"
-#include "harness/run/processes.h"
 #include "harness/suite/suite.h"
 #include "mechanism/simplify/model.h"
 #include "mechanism/simplify/structure.h"
@@ -51,11 +38,16 @@ void AddNote(std::vector<std::string>& notes, fmt::format_string<Values...> form
   notes.push_back(fmt::format(format, std::forward<Values>(values)...));
 }
 
-/// True for parts of documents: objects, and lists of objects or texts.
+/// True for parts of documents: objects, and lists of objects, records or texts.
 template <class T>
 constexpr bool kIsPart =
     std::is_same_v<T, JsonObject> || std::is_same_v<T, std::vector<JsonObject>> ||
     std::is_same_v<T, std::vector<std::string>>;
+
+/// Returns records as parts of a document.
+inline std::vector<JsonObject> ObjectsOf(const std::vector<Record>& records) {
+  return {records.begin(), records.end()};
+}
 
 /// Adds key, value, key, value, ... to a document or record; words of enumerations as texts.
 template <class Target, class Member, class... Rest>
@@ -80,10 +72,8 @@ JsonObject JsonOf(const Members&... members) {
 /// Prints one line, and returns 0.
 int PrintJson(const JsonObject& document);
 
-/// Returns columns from "key=header:format:importance, ...". Without a header, the key is the
-/// header; without a format, the column is a text. The other formats are integer, shortest,
-/// scientific, exponent, fixed and seconds.
-std::vector<TableColumn> Columns(std::string_view rows);
+/// Removes those of the columns that are empty in all rows.
+void EraseEmptyColumns(const std::vector<std::string>& keys, Table* table);
 
 /// Returns the last record of each case of a store in table order, with warnings from comparing
 /// records. Warnings about the store go to standard error. `watch` as for ReadRecords(). Throws
@@ -95,7 +85,7 @@ std::vector<Record> LoadRecords(const std::filesystem::path& store, const Select
 std::vector<Record> LatestWithWarnings(std::vector<Record> records);
 
 /// Writes drift.csv, drift.md, precision and timing tables to the store's folder, or next to a
-/// store that is a file, named after it. Prints their short forms.
+/// store that is a file. Prints their short forms.
 void WriteTables(const std::vector<Record>& records, const std::filesystem::path& store,
                  const std::string& typed);
 
@@ -149,17 +139,17 @@ std::vector<Record> LoadMeasurements(const std::filesystem::path& path);
 /// Writes `text` to `out` and says so; prints it if `out` is empty.
 void Deliver(const std::string& text, const std::filesystem::path& out);
 
-void AppendProvenance(Table& table, const std::string& typed);
+/// Returns the table with notes on its origin.
+Table WithProvenance(Table table, const std::string& typed);
 
-/// Renders a table for a file. CSV omits the date of printing: equal records and commands give
-/// equal bytes.
+/// Renders a table for a file. CSV omits the date: equal records and commands give equal bytes.
 std::string RenderKept(Table table, const std::string& format);
 
 /// Rejects an output that is named like a picture, unless it is an existing folder.
 void RejectPictures(const std::filesystem::path& out, const char* expected);
 
-/// Draws the figures into a folder, as svg or pdf. Prints the reason for each figure that cannot be
-/// drawn, and then returns 2.
+/// Draws figures into a folder, as svg or pdf. Returns 2 and prints the reasons if some cannot be
+/// drawn.
 int DrawAll(const std::vector<NamedFigure>& figures, const std::filesystem::path& folder,
             const std::string& format, FigureSize size);
 
@@ -171,9 +161,8 @@ inline FigureSize SizeNamed(const std::string& name) {
 /// Largest number of records held in memory: about 400 MB for runs of a few hundred steps.
 inline constexpr std::size_t kMaxHeld = 50'000;
 
-/// Writes CSV or JSON to standard output or `command.out`. Problems have the order of the store,
-/// rows the usual order, and columns cover all records. Throws ConfigError for options that need
-/// all rows at once.
+/// Writes CSV or JSON to standard output or `command.out`, problem by problem in the order of the
+/// store. Throws ConfigError for options that need all rows at once.
 int WriteLongTable(const TableCommand& command, const ProblemReader& reader,
                    const std::string& typed);
 
@@ -185,8 +174,8 @@ struct Loaded {
 };
 Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where);
 
-/// Returns the memory that this process may still allocate [bytes], by the machine and
-/// the process limit. `with_own` adds the memory in use. 0 if unknown.
+/// Returns the memory that this process may still allocate [bytes], and with `with_own` the memory
+/// in use. 0 if unknown.
 double FreeMemory(bool with_own = false);
 
 /// Runs that are no cases, whose ladders are checked. In a long sweep, each combination counts as
@@ -205,9 +194,7 @@ int PrintComparison(const std::filesystem::path& base, const std::filesystem::pa
 std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string& machine,
                                     bool only_times, std::string* name);
 
-// Keys that files of each kind may contain, as JSON Schema and as tables.
-
-/// Names of the kinds, as in the files configs/schema/KIND.schema.json.
+/// Names of the kinds of files, as in configs/schema/KIND.schema.json.
 std::vector<std::string> SchemaKinds();
 
 /// Returns the JSON Schema (draft 07) of a kind: the contents of its file in configs/schema/.
@@ -229,8 +216,9 @@ struct ExplainView {
 
 /// Prints a sentence for people, unless there is a document.
 template <typename... Values>
-void Say(const ExplainView& view, fmt::format_string<internal::PrintedAs<Values>...> format,
-         const Values&... values) {
+void PrintUnlessJson(const ExplainView& view,
+                     fmt::format_string<internal::PrintedAs<Values>...> format,
+                     const Values&... values) {
   if (view.document == nullptr) Print<Values...>(format, values...);
 }
 
@@ -257,13 +245,12 @@ std::string Spaced(const Vector& vector) {
 /// of freedom that the file does not expect are a ConfigError, in a document its "error" and 2.
 int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view);
 
-/// Prints the contents of a file: gravity, bodies, joints, their frames, forces.
+/// Prints gravity, bodies, joints, their frames, couplings and forces.
 void PrintModel(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view);
 
 // Models of one problem: the full model, one per applicable rule, and all rules combined.
 
-/// A model in the form in which it is written.
 struct ProblemModel {
   std::string name;  ///< "full", a rule's name or "combined"; with a number if it has parts
   bool is_exact = true;
@@ -292,24 +279,18 @@ ProblemModels MakeModels(const MechanismFile& file,
 /// their errors.
 void MeasureErrors(double horizon, double cpu_s, ProblemModels* ladder);
 
-/// Names of the bodies of the full model that the other lacks.
+/// Returns names of bodies of the full model that the other lacks.
 std::vector<std::string> RemovedBodies(const MechanismDescription& whole,
                                        const MechanismDescription& simplified);
 
 /// Name of the experiment file that runs all models: NAME-ladder.json.
 std::string LadderFileName(const ProblemModels& ladder);
 
-/// Writes NAME.json of all models, the experiment and models.md. All files are written next to the
-/// folder and read back before it is renamed. With `force` they atomically replace files of these
-/// names in an existing folder.
-///
-/// @throws ConfigError if the folder exists and is not empty, unless `force`; std::runtime_error if
-/// something cannot be written.
+/// Writes NAME.json of all models, the experiment and models.md: complete or not at all. With
+/// `force` they atomically replace files in an existing folder.
+/// @throws ConfigError if the folder exists and is not empty, unless `force`
 void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
                  const std::filesystem::path& folder, bool force);
-
-// Errors and costs of simpler models of one mechanism, as records of kind "model"
-// (docs/reference/records.md).
 
 struct ModelQuestion {
   double horizon = 0.0;  ///< [s]
@@ -318,9 +299,9 @@ struct ModelQuestion {
   std::string what;      ///< "my.json: --store", for messages
 };
 
-/// Returns a record for the full model and one per other model. All run alike (O-DCA, level
-/// projection, joint coordinates, ode45 at 1e-8), without observers and in turn. The error of a
-/// model is the largest distance of a named point between its certified motion and the full
+/// Returns a record of kind "model" (docs/reference/records.md) per model. All run alike (O-DCA,
+/// level projection, joint coordinates, ode45 at 1e-8), without observers and in turn. The error of
+/// a model is the largest distance of a named point between its certified motion and the full
 /// model's. Acceptance adds both certificates to the error. A model that cannot be judged is
 /// rejected with the reason.
 std::vector<Record> RecordsOfModels(const MechanismFile& file, const ProblemModels& models,
@@ -339,8 +320,6 @@ struct CertainMotion {
 /// ConfigError in a program without wide scalars, which `what` needs.
 CertainMotion MakeCertainMotion(const MechanismDescription& user, double horizon, double cpu_s,
                                 const std::string& what);
-
-// advise --simplify: simpler models of a problem within the accepted error, and their savings.
 
 /// Largest distance of a model's certified motion from the full model's.
 struct CausedError {

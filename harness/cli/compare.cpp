@@ -1,11 +1,5 @@
 // compare, fit and export: finished measurements.
-#include <ranges>
-#include <set>
-
-#include "harness/base/store.h"
 #include "harness/cli/commands.h"
-#include "harness/history/history.h"
-#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 namespace {
@@ -71,7 +65,7 @@ struct CompareCommand {
   }
 };
 
-/// One row per group of measures: number of compared values with each judgement.
+/// Returns the numbers of compared values with each judgement, by groups of measures.
 Table SummaryTable(const ComparisonReport& comparison) {
   Table table{.title = "Compared",
               .columns = Columns("group, same:integer, better:integer, worse:integer, "
@@ -103,10 +97,9 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
   table.title = with_same ? "All measures" : "Changes";
   table.columns = Columns("judgement, case, measure, base, new, ratio:seconds, why");
   // regressions first: the most important result
-  for (const Judgement judgement : {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter,
-                                    Judgement::kNotMeasured, Judgement::kSame}) {
-    if (!with_same && (judgement == Judgement::kNotMeasured || judgement == Judgement::kSame))
-      continue;
+  std::vector order = {Judgement::kWorse, Judgement::kDifferent, Judgement::kBetter};
+  if (with_same) order.insert(order.end(), {Judgement::kNotMeasured, Judgement::kSame});
+  for (const Judgement judgement : order) {
     for (const Finding& finding : comparison.findings) {
       if (finding.judgement != judgement) continue;
       const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
@@ -122,21 +115,15 @@ Table FindingTable(const ComparisonReport& comparison, bool with_same) {
 
 /// Returns "12 hashes not measured: another compiler, ..." for each reason.
 std::vector<std::string> ReasonNotes(const ComparisonReport& comparison) {
-  std::vector<std::pair<std::string, int>> reasons;
+  std::vector<std::string> all, reasons;
   for (const Finding& finding : comparison.findings) {
     if (finding.judgement != Judgement::kNotMeasured) continue;
-    const std::string reason =
-        fmt::format("{} not measured: {}", GroupOf(finding.measure.rule), finding.why);
-    const auto at = std::ranges::find(reasons, reason, &std::pair<std::string, int>::first);
-    if (at == reasons.end()) {
-      reasons.emplace_back(reason, 1);
-    } else {
-      ++at->second;
-    }
+    AddNote(all, "{} not measured: {}", GroupOf(finding.measure.rule), finding.why);
+    AddOnce(reasons, all.back());
   }
-  std::vector<std::string> notes;
-  for (const auto& [reason, count] : reasons) AddNote(notes, "{} {}", count, reason);
-  return notes;
+  return Mapped<std::string>(reasons, [&all](const std::string& reason) {
+    return fmt::format("{} {}", std::ranges::count(all, reason), reason);
+  });
 }
 
 void NoteCases(const std::string& what, const std::vector<std::string>& cases,
@@ -166,8 +153,7 @@ void NoteOrigins(const std::string& side, const std::vector<Record>& records,
   notes.insert(notes.end(), lines.begin(), lines.end());
 }
 
-/// Adds a note if one run is as a whole faster or slower. A changed machine speed has this effect,
-/// and no test within the runs can distinguish it from a change of all code.
+/// Adds a note if one run is as a whole faster or slower, as by a changed speed of the machine.
 void NoteCommonShift(const ComparisonReport& comparison, std::vector<std::string>& notes) {
   std::vector<double> ratios;
   for (const Finding& finding : comparison.findings) {
@@ -189,10 +175,10 @@ std::string Conclusion(const ComparisonReport& comparison, const CompareOptions&
   const int code = comparison.ExitCode(options);
   const int worse = comparison.Count(Judgement::kWorse);
   const int different = comparison.Count(Judgement::kDifferent);
-  if (code == 1 && different == 0) return "REGRESSION: " + WithCount(worse, "measure");
   if (code == 1 && worse == 0) return "DIFFERENT: " + WithCount(different, "measure");
   if (code == 1) {
-    return fmt::format("REGRESSION: {}, {} more different", WithCount(worse, "measure"), different);
+    return "REGRESSION: " + WithCount(worse, "measure") +
+           (different == 0 ? "" : fmt::format(", {} more different", different));
   }
   if (code == 2) return "INCONCLUSIVE: " + comparison.Obstacle(options);
   const int better = comparison.Count(Judgement::kBetter);
@@ -201,7 +187,7 @@ std::string Conclusion(const ComparisonReport& comparison, const CompareOptions&
          (undecided > 0 ? "; " + WithCount(undecided, "time") + " not compared" : "");
 }
 
-/// Filters the records of both sides. Rejects a key that neither side has: it would have no effect.
+/// Filters the records of both sides. Rejects a key that neither side has.
 void Choose(const Selection& where, const std::vector<std::string>& match,
             std::vector<Record>& base, std::vector<Record>& fresh) {
   std::vector<Record> both = base;
@@ -213,17 +199,19 @@ void Choose(const Selection& where, const std::vector<std::string>& match,
   fresh = Filter(fresh, where);
 }
 
+/// Returns the file of measurements in a folder or file.
+std::filesystem::path FileOf(const std::filesystem::path& path) {
+  return std::filesystem::is_directory(path) ? StoreFile(path) : path;
+}
+
 /// Returns the named base, or the last good state of the history with its description in `name`.
 std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Record>& fresh,
                              std::string* name) {
   if (command.history.empty() && command.branch.empty()) {
-    const auto file = [](const std::filesystem::path& path) {
-      return std::filesystem::is_directory(path) ? StoreFile(path) : path;
-    };
+    const std::filesystem::path base = FileOf(command.base);
     std::error_code none;
-    if (std::filesystem::equivalent(file(command.base), file(command.fresh), none)) {
-      Reject("compare: found '{}' as BASE and as NEW, expected two files",
-             file(command.base).string());
+    if (std::filesystem::equivalent(base, FileOf(command.fresh), none)) {
+      Reject("compare: found '{}' as BASE and as NEW, expected two files", base.string());
     }
     return LoadMeasurements(command.base);
   }
@@ -234,22 +222,22 @@ std::vector<Record> LoadBase(const CompareCommand& command, const std::vector<Re
 
 JsonObject ComparisonDocument(const ComparisonReport& comparison, const CompareOptions& options,
                               const std::vector<std::string>& notes) {
-  std::vector<JsonObject> groups, findings;
-  for (const Record& row : SummaryTable(comparison).rows) groups.emplace_back(row);
-  for (const Finding& finding : comparison.findings) {
-    const auto& [key, unit] = std::pair(finding.measure.key, finding.measure.heading.unit);
-    findings.push_back(JsonOf("judgement", ToString(finding.judgement), "case", finding.one,
-                              "measure", key, "unit", unit, "base", finding.base, "new",
-                              finding.fresh, "ratio", finding.ratio, "why", finding.why));
-  }
-  return JsonOf(
-      "conclusion", Conclusion(comparison, options), "exit_code", comparison.ExitCode(options),
-      "groups", groups, "findings", findings, "only_in_base", comparison.only_base, "only_in_new",
-      comparison.only_fresh, "more_than_once", comparison.ambiguous, "other_config_hash",
-      comparison.other_content, "other_settings", comparison.other_settings, "notes", notes);
+  std::vector<JsonObject> findings =
+      Mapped<JsonObject>(comparison.findings, [](const Finding& finding) {
+        return JsonOf("judgement", finding.judgement, "case", finding.one, "measure",
+                      finding.measure.key, "unit", finding.measure.heading.unit, "base",
+                      finding.base, "new", finding.fresh, "ratio", finding.ratio, "why",
+                      finding.why);
+      });
+  return JsonOf("conclusion", Conclusion(comparison, options), "exit_code",
+                comparison.ExitCode(options), "groups", ObjectsOf(SummaryTable(comparison).rows),
+                "findings", findings, "only_in_base", comparison.only_base, "only_in_new",
+                comparison.only_fresh, "more_than_once", comparison.ambiguous, "other_config_hash",
+                comparison.other_content, "other_settings", comparison.other_settings, "notes",
+                notes);
 }
 
-/// Prints exponents of time over size, one row per benchmark family. Returns 2 if there is none.
+/// Returns 2 if no exponent could be fitted.
 int PrintFits(const FitCommand& command, const Typed& typed) {
   const std::vector<Record> benchmarks = LoadMeasurements(command.file);
   Table table{
@@ -271,13 +259,11 @@ int PrintFits(const FitCommand& command, const Typed& typed) {
   }
   const bool on_screen = command.format == "text" && command.out.empty();
   Deliver(on_screen ? ToScreen(table) : Render(table, command.format), command.out);
-  const bool fitted = std::ranges::any_of(
-      table.rows, [](const Record& row) { return row.Find("exponent") != nullptr; });
-  return fitted ? 0 : 2;
+  const auto is_fitted = [](const Record& row) { return row.Find("exponent") != nullptr; };
+  return std::ranges::any_of(table.rows, is_fitted) ? 0 : 2;
 }
 
-/// Writes measurements as JSON for trackers of continuous benchmarking. Returns 0; 1 if values were
-/// omitted, each named on standard error; 2 if nothing is left.
+/// Returns 1 if values were omitted, each named on standard error; 2 if nothing is left.
 int ExportMeasurements(const ExportCommand& command, const Typed&) {
   std::vector<std::string> torn;
   auto [values, left_out] = TrackRecords(ReadMeasurements(command.file, &torn));
@@ -361,7 +347,6 @@ int ShowComparison(const CompareCommand& command, const Typed& typed) {
   return code;
 }
 
-/// Takes BASE and NEW of the command line.
 int PrintTypedComparison(CompareCommand& command, const Typed& typed) {
   const bool has_history = !command.history.empty() || !command.branch.empty();
   if (command.files.size() != (has_history ? 1u : 2u)) {
@@ -380,7 +365,7 @@ std::vector<Record> LoadMeasurements(const std::filesystem::path& path) {
   std::vector<std::string> warnings;
   std::vector<Record> records = ReadMeasurements(path, &warnings);
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
-  VerifyFilesOf(records, std::filesystem::is_directory(path) ? StoreFile(path) : path);
+  VerifyFilesOf(records, FileOf(path));
   return records;
 }
 

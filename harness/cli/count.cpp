@@ -1,13 +1,10 @@
 // count: exact operation counts of right-hand sides.
-#include <span>
 #include <sstream>
 
 #include "harness/cli/commands.h"
-#include "harness/config/benchmarks.h"
 #include "harness/config/formulations.h"
 #include "harness/generate/record.h"
 #include "harness/run/run.h"
-#include "harness/run/timing.h"
 
 namespace loopbench::harness {
 namespace {
@@ -79,7 +76,7 @@ void SetCounts(const generate::RecordingSubject& subject, const generate::Record
   Put(row, "exact", counts == other ? "yes" : "no");
 }
 
-/// Counts one part of a mechanism in one coordinate set: a row per formulation, level and solver.
+/// Adds a row per formulation, level and solver for one part of a mechanism.
 void CountPart(const CountCommand& command, const MechanismDescription& part, Coordinates set,
                std::size_t most_nodes, std::vector<Record>& rows) {
   const BenchmarkState state = ComputeState(part, set);
@@ -126,18 +123,6 @@ int CountHere(const CountCommand& command, const MechanismDescription& descripti
   return 0;
 }
 
-void RequireSizes(const SizedFamily& family, const std::vector<int>& sizes) {
-  if (sizes.empty()) {
-    Reject("--family {}: found no --sizes, expected numbers from {} to {}", family.name,
-           family.smallest, family.largest);
-  }
-  for (const int size : sizes) {
-    if (size >= family.smallest && size <= family.largest) continue;
-    Reject("--sizes: found {}, expected {} to {} of family {} ({})", size, family.smallest,
-           family.largest, family.name, family.of_what);
-  }
-}
-
 bool HasCounts(const Record& row) { return row.Find("flops") != nullptr; }
 
 std::string MethodOf(const Record& row) {
@@ -162,7 +147,7 @@ void AddGrowth(std::span<Record> rows) {
   }
 }
 
-/// Returns a sentence per level and solver: the method with the fewest operations at each size.
+/// Returns a sentence per level and solver.
 std::vector<std::string> Crossovers(std::span<const Record> rows) {
   std::map<std::string, std::map<double, const Record*>> cheapest;
   for (const Record& row : rows) {
@@ -186,24 +171,20 @@ std::vector<std::string> Crossovers(std::span<const Record> rows) {
   return sentences;
 }
 
-Table CountTable(std::vector<Record> rows) {
-  Table table{.rows = std::move(rows)};
-  table.columns = Columns(
-      "mechanism::2, formulation::2, enforcement::2, coordinates=coord.::2, solver::2, "
-      "bodies:integer, "
-      "flops:integer:2, flops_per_body=per body:fixed, exponent:exponent:2, kinematics:integer, "
-      "forces:integer, solve:integer, additions=+ -:integer, multiplications=*:integer, "
-      "divisions=/:integer, roots=sqrt:integer, sines=sin cos:integer, other:integer:-1, "
-      "depth:integer:1, solve_depth=depth of solve:integer:1, correction=Newton step:integer, "
-      "comparisons=compared:integer, flops_compared=flops with comparisons:integer:-2, "
-      "flops_as_run=flops as run:integer:1, exact::-1, not_recorded=not recorded::2");
-  table.notes = {
-      "flops: + - * count 1, / and sqrt 4, other functions 8 (McMahon 1986); depth: operations on "
-      "the longest path; zeros and ones of the geometry exploited, as run: not exploited"};
-  return table;
-}
+constexpr const char* kColumns =
+    "mechanism::2, formulation::2, enforcement::2, coordinates=coord.::2, solver::2, "
+    "bodies:integer, flops:integer:2, flops_per_body=per body:fixed, exponent:exponent:2, "
+    "kinematics:integer, forces:integer, solve:integer, additions=+ -:integer, "
+    "multiplications=*:integer, divisions=/:integer, roots=sqrt:integer, sines=sin cos:integer, "
+    "other:integer:-1, depth:integer:1, solve_depth=depth of solve:integer:1, "
+    "correction=Newton step:integer, comparisons=compared:integer, "
+    "flops_compared=flops with comparisons:integer:-2, flops_as_run=flops as run:integer:1, "
+    "exact::-1, not_recorded=not recorded::2";
+constexpr const char* kCounting =
+    "flops: + - * count 1, / and sqrt 4, other functions 8 (McMahon 1986); depth: operations on "
+    "the longest path; zeros and ones of the geometry exploited, as run: not exploited";
 
-/// Prints one row per right-hand side. Returns 2 if none was recorded.
+/// Returns 2 if no right-hand side was recorded.
 int CountOperations(const CountCommand& command, const Typed& typed) {
   constexpr std::size_t kMaxOfFiles = 100'000, kMaxOfFamilies = 1'000'000;
   if (command.mechanisms.empty() && command.family.empty()) {
@@ -234,7 +215,15 @@ int CountOperations(const CountCommand& command, const Typed& typed) {
   std::vector<std::string> crossovers;
   if (!command.family.empty()) {
     const SizedFamily& family = SizedFamilyOf(command.family);
-    RequireSizes(family, command.sizes);
+    if (command.sizes.empty()) {
+      Reject("--family {}: found no --sizes, expected numbers from {} to {}", family.name,
+             family.smallest, family.largest);
+    }
+    for (const int size : command.sizes) {
+      if (size >= family.smallest && size <= family.largest) continue;
+      Reject("--sizes: found {}, expected {} to {} of family {} ({})", size, family.smallest,
+             family.largest, family.name, family.of_what);
+    }
     for (const int size : command.sizes) {
       const int code = add(fmt::format("{} {}", family.name, size), [&] {
         MechanismDescription description = family.make(size);
@@ -251,23 +240,16 @@ int CountOperations(const CountCommand& command, const Typed& typed) {
   if (command.format == "jsonl") {
     for (const Record& row : rows) text += ToJsonObject(row) + "\n";
   }
-  Table table = CountTable(std::move(rows));
-  table.notes.insert(table.notes.end(), crossovers.begin(), crossovers.end());
+  Table table{.columns = Columns(kColumns), .rows = std::move(rows), .notes = crossovers};
+  table.notes.insert(table.notes.begin(), kCounting);
   const bool on_terminal = command.format == "text" && command.out.empty();
-  // drop columns of only some rows; files keep the reasons of missing counts
-  std::erase_if(table.columns, [&](const TableColumn& column) {
-    const bool is_optional = column.key == "exponent" || column.key == "flops_per_body" ||
-                             column.key == "correction" ||
-                             (column.key == "not_recorded" && on_terminal);
-    return is_optional && std::ranges::none_of(table.rows, [&](const Record& row) {
-             return row.Find(column.key) != nullptr;
-           });
-  });
+  EraseEmptyColumns({"exponent", "flops_per_body", "correction"}, &table);
+  if (on_terminal) EraseEmptyColumns({"not_recorded"}, &table);  // files keep it
   if (on_terminal) {
     PrintText(ToScreen(table));
     return code;
   }
-  AppendProvenance(table, typed.line);
+  table = WithProvenance(std::move(table), typed.line);
   Deliver(text.empty() ? RenderKept(table, command.format) : text, command.out);
   if (command.out.empty()) return code;
   for (const std::string& sentence : crossovers) Print("{}\n", sentence);

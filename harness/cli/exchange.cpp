@@ -16,8 +16,8 @@
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/exchange/export_c.h"
-#include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/import.h"
+#include "harness/exchange/model.h"
 #include "harness/figures/view.h"
 #include "harness/integrator/arkode.h"
 #include "harness/run/processes.h"
@@ -208,25 +208,21 @@ int Import(ImportCommand& command, const Typed&) {
   return PrintFromChild(command.file.string(), command.limits, [&] { return ImportHere(command); });
 }
 
-std::vector<std::string> ExportFormatNames() {
-  return Mapped<std::string>(exchange::ExportFormats(), &exchange::ExportFormat::name);
-}
-
 struct ConvertCommand {
   std::filesystem::path mechanism;
   std::string to;             ///< a name of ExportFormats()
   std::filesystem::path out;  ///< "": the mechanism file's name with the format's ending
-  exchange::ExportOptions options;
+  double time_step = exchange::kTimeStep;  ///< of MuJoCo [s]
   bool json = false;
   ProcessLimits limits = kFileLimits;
 
   std::vector<Option> Options() {
     return {MechanismArgument(&mechanism),
             {"--to", "mjcf: MuJoCo model; simbody: C++17 program", &to, kRequired,
-             OneOf(ExportFormatNames())},
+             OneOf(Mapped<std::string>(exchange::ExportFormats(), &exchange::ExportFormat::name))},
             {"-o,--out", "Output file (default: NAME.xml or NAME.cpp here)", &out},
             {"--step", "MuJoCo's step [s]; loop constraints are as stiff as it permits (mjcf)",
-             &options.time_step, From(1e-12, 1e3)},
+             &time_step, From(1e-12, 1e3)},
             JsonOption(&json),
             CpuOption(&limits),
             MemoryOption(&limits)};
@@ -254,7 +250,7 @@ int ConvertHere(const ConvertCommand& command) {
   const auto out = OutOr(command.out, command.mechanism, format.ending);
   exchange::ExportedFile file;
   try {
-    file = format.write(mechanism, command.options);
+    file = format.write(mechanism, command.time_step);
   } catch (const exchange::Unsupported& missing) {
     PrintError("{}: found what {} does not have, so nothing is written:\n",
                command.mechanism.string(), command.to);
@@ -317,14 +313,6 @@ constexpr const char* kProfile = "ode45";
 constexpr double kTolerance = 1e-6;
 constexpr std::size_t kMinStates = 500, kMaxStates = 2000;
 
-struct Motion {
-  generate::RecordingStart start;
-  std::vector<exchange::MotionState> states = {};
-  Outcome outcome = Outcome::kFinished;
-  double t_reached = 0.0;
-  double step = 0.0;  ///< for fixed steps
-};
-
 /// Returns a quarter of the median step of `states`, at most 1 ms, rounded down to 1, 2, 5 x 10^n.
 double StepOf(const std::vector<exchange::MotionState>& states) {
   std::vector<double> steps;
@@ -336,10 +324,11 @@ double StepOf(const std::vector<exchange::MotionState>& states) {
   return decade * (step >= 5.0 * decade ? 5.0 : step >= 2.0 * decade ? 2.0 : 1.0);
 }
 
-/// Returns accepted steps of the motion from the assembled start; the mode of the start is kept, as
-/// in generated code.
+/// Adds the start, accepted steps of the motion from it, and the step for fixed steps; the mode of
+/// the start is kept, as in generated code.
 template <class Space>
-Motion Move(const GenerateCommand& command, const generate::RecordingSubject& subject) {
+IntegratorResult Move(const GenerateCommand& command, exchange::CodeRequest& request) {
+  const generate::RecordingSubject& subject = request.subject;
   const Mechanism<Space, double> mechanism(subject.description, subject.coordinates);
   const Start<double> start = Assemble<Space>(subject.description, mechanism);
   if (start.outcome != Outcome::kFinished) {
@@ -347,8 +336,8 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
                                   start.message));
   }
   const auto system = MakeFormulation<Space>(subject.formulation, mechanism, subject.options);
-  Motion motion{.start = {0.0, start.q, start.u}};
-  motion.outcome = system->Start(0.0, start.q, start.u);
+  request.start = {0.0, start.q, start.u};
+  system->Start(0.0, start.q, start.u);
   std::vector<double> y(static_cast<std::size_t>(system->size()));
   system->ToState(start.q, start.u, y);
   IntegratorOptions options;
@@ -357,19 +346,16 @@ Motion Move(const GenerateCommand& command, const generate::RecordingSubject& su
   options.max_step = command.horizon / kMinStates;
   options.rtol = options.atol = kTolerance;
   const auto note = [&](double t, std::span<double> state) {
-    motion.states.push_back({t, {state.begin(), state.end()}});
+    request.motion.push_back({t, {state.begin(), state.end()}});
     return StepAction::kContinue;
   };
-  const IntegratorResult result = Integrate(*system, 0.0, command.horizon, y, options, note);
-  motion.outcome = result.outcome;
-  motion.t_reached = result.t_reached;
-  motion.step = command.step > 0.0 ? command.step : StepOf(motion.states);
-  const std::size_t every = motion.states.size() / kMaxStates + 1;
-  for (std::size_t i = 0; i * every < motion.states.size(); ++i) {
-    std::swap(motion.states[i], motion.states[i * every]);
-  }
-  motion.states.resize((motion.states.size() + every - 1) / every);
-  return motion;
+  IntegratorResult result = Integrate(*system, 0.0, command.horizon, y, options, note);
+  std::vector<exchange::MotionState>& states = request.motion;
+  request.step = command.step > 0.0 ? command.step : StepOf(states);
+  const std::size_t every = states.size() / kMaxStates + 1;
+  for (std::size_t i = 0; i * every < states.size(); ++i) std::swap(states[i], states[i * every]);
+  states.resize((states.size() + every - 1) / every);
+  return result;
 }
 
 int GenerateHere(const GenerateCommand& command) {
@@ -390,17 +376,14 @@ int GenerateHere(const GenerateCommand& command) {
                      fmt::format("{}: formulation {}, level {}, {} coordinates, solver {}",
                                  command.mechanism.filename().string(), command.formulation,
                                  command.level, command.coordinates, command.solver)}};
-  const Motion motion = description.space == SpaceKind::kPlanar
-                            ? Move<Planar>(command, request.subject)
-                            : Move<Spatial>(command, request.subject);
-  request.start = motion.start;
-  request.motion = motion.states;
-  request.step = motion.step;
+  const IntegratorResult motion = description.space == SpaceKind::kPlanar
+                                      ? Move<Planar>(command, request)
+                                      : Move<Spatial>(command, request);
   exchange::Code code;
   std::string fmu;
   try {
     code = exchange::MakeCode(request);
-    if (!command.fmu.empty()) fmu = exchange::MakeFmu(code, file.description.name, motion.step);
+    if (!command.fmu.empty()) fmu = exchange::MakeFmu(code, file.description.name, request.step);
   } catch (const generate::NotCovered& why) {
     throw ConfigError(command.mechanism.string() + ": cannot be generated: " + why.what());
   }
@@ -442,7 +425,7 @@ int GenerateHere(const GenerateCommand& command) {
   for (const exchange::CodeFunction& function : code.functions) {
     if (function.missed == 0) continue;
     Print("warning: {}: {} branches do not serve {} of {} states of the motion\n", function.name,
-          function.branches, function.missed, motion.states.size());
+          function.branches, function.missed, request.motion.size());
   }
   return 0;
 }

@@ -1,16 +1,8 @@
 // list, check and assemble: files before a run.
-#include <tuple>
-
 #include "harness/base/file_kind.h"
-#include "harness/base/record.h"
 #include "harness/cli/commands.h"
-#include "harness/config/benchmarks.h"
-#include "harness/config/options.h"
 #include "harness/judge/analysis.h"
-#include "harness/judge/judge.h"
 #include "harness/run/run.h"
-#include "harness/run/timing.h"
-#include "harness/suite/suite.h"
 #include "mechanism/start/branches.h"
 
 namespace loopbench::harness {
@@ -50,7 +42,6 @@ struct CheckCommand {
   }
 };
 
-/// Returns the cases that match, each with "runs".
 std::vector<Record> CaseRows(const std::vector<Experiment>& experiments, const Selection& filter) {
   std::vector<Record> rows;
   for (const Experiment& experiment : experiments) {
@@ -86,45 +77,37 @@ void PrintCaseDocument(const Overview& overview, const ExperimentFiles& files,
   PrintText("]}");
 }
 
-/// Number of combinations of a long sweep in a table.
-constexpr std::size_t kShown = 16;
-
 Table CaseTable(const Overview& overview, const Selection& filter, const OtherRuns& others) {
+  constexpr std::size_t kShown = 16;  // combinations of a long sweep
   const std::size_t step =
       overview.is_sample ? std::max<std::size_t>(1, overview.experiments.size() / kShown) : 1;
   std::vector<Experiment> experiments;
   for (std::size_t i = 0; i < overview.experiments.size(); i += step) {
     experiments.push_back(overview.experiments[i]);
   }
-  Table table;
-  table.title = experiments.front().name;
+  Table table{.title = experiments.front().name,
+              .columns = Columns("mechanism, formulation, enforcement, coordinates, solver")};
   if (!experiments.front().comment.empty()) table.title += ": " + experiments.front().comment;
-  table.columns = Columns("mechanism, formulation, enforcement, coordinates, solver");
   for (const auto& [name, value] : experiments.front().parameters.items()) {
     Format format = Format::kText;
     if (std::holds_alternative<double>(value)) format = Format::kShortest;
     if (std::holds_alternative<std::int64_t>(value)) format = Format::kInteger;
     table.columns.push_back({name, name, format, {}});
   }
-  const auto any = [&experiments](auto has) { return std::ranges::any_of(experiments, has); };
-  const auto any_method = [&any](auto has) {
-    return any([&has](const Experiment& one) { return std::ranges::any_of(one.methods, has); });
-  };
-  if (any_method([](const Method& method) { return method.threads > 1; })) {
-    table.columns.push_back({"threads", "threads", Format::kInteger});
+  std::set<std::string> unused = {"threads", "execution", "integrator", "step"};
+  for (const Experiment& one : experiments) {
+    for (const Method& method : one.methods) {
+      if (method.threads > 1) unused.erase("threads");
+      if (method.execution != Execution::kLibrary) unused.erase("execution");
+    }
+    if (one.integrators.size() > 1) unused.erase("integrator");
+    if (!one.fixed_steps.empty()) unused.erase("step");
   }
-  if (any_method([](const Method& method) { return method.execution != Execution::kLibrary; })) {
-    table.columns.push_back({"execution", "execution"});
+  for (TableColumn& column :
+       Columns("threads:integer, execution, integrator, rtol:shortest, step=step [s]:shortest, "
+               "horizon=horizon [s]:shortest, runs:integer")) {
+    if (!unused.contains(column.key)) table.columns.push_back(std::move(column));
   }
-  if (any([](const Experiment& one) { return one.integrators.size() > 1; })) {
-    table.columns.push_back({"integrator", "integrator"});
-  }
-  table.columns.push_back({"rtol", "rtol", Format::kShortest});
-  if (any([](const Experiment& one) { return !one.fixed_steps.empty(); })) {
-    table.columns.push_back({"step", "step [s]", Format::kShortest});
-  }
-  table.columns.push_back({"horizon", "horizon [s]", Format::kShortest});
-  table.columns.push_back({"runs", "runs", Format::kInteger});
   table.rows = CaseRows(experiments, filter);
   table.notes = {WithCount(overview.cases(), "case") + " and " +
                  WithCount(others.timings, "timing")};
@@ -145,49 +128,50 @@ Table CaseTable(const Overview& overview, const Selection& filter, const OtherRu
 
 /// Result of check for a valid file: a sentence for people, and JSON for programs.
 struct Checked {
-  std::string sentence;
-  JsonObject document;
+  std::filesystem::path path;
+  std::string sentence = "";
+  JsonObject document = {};
   std::vector<std::string> warnings = {};
+
+  template <class... Members>
+  void Set(const std::string& words, const Members&... members) {
+    sentence = words;
+    Put(document, "kind", members...);
+  }
+  void Warn(const std::string& text) {
+    PrintError("warning: {}: {}\n", path.string(), text);
+    warnings.push_back(text);
+  }
+  void AddUnitWarnings(const MechanismDescription& description) {
+    for (const std::string& warning : FindUnitWarnings(description)) {
+      Warn(description.name + ": " + warning);
+    }
+  }
+  /// Throws ConfigError with all faults of starts.
+  void AddStarts(const StartReport& report) {
+    for (const std::string& warning : report.warnings) Warn(warning);
+    if (report.faults.empty()) return;
+    const auto named = [&](const std::string& fault) { return path.string() + ": " + fault; };
+    Reject("{}\n(--no-assembly leaves this check out)", Joined(report.faults, "\n", named));
+  }
 };
 
-void AddWarning(const std::filesystem::path& path, const std::string& text, Checked* checked) {
-  PrintError("warning: {}: {}\n", path.string(), text);
-  checked->warnings.push_back(text);
-}
-
-/// Adds warnings on suspicious but valid numbers.
-void AddUnitWarnings(const std::filesystem::path& path, const MechanismDescription& description,
-                     Checked* checked) {
-  for (const Warning& warning : FindUnitWarnings(description)) {
-    AddWarning(path, fmt::format("{}: {}", description.name, warning.text), checked);
-  }
-}
-
-/// Adds the warnings. Throws ConfigError with all faults of starts, each with the file and the
-/// remedy.
-void AddStarts(const std::filesystem::path& path, const StartReport& report, Checked* checked) {
-  for (const std::string& warning : report.warnings) AddWarning(path, warning, checked);
-  if (report.faults.empty()) return;
-  throw ConfigError(Joined(report.faults, "\n",
-                           [&](const std::string& fault) { return path.string() + ": " + fault; }) +
-                    "\n(--no-assembly leaves this check out)");
-}
-
-Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& command) {
-  const Overview overview = MakeOverview(path, {{path}, command.files.settings, {}});
+void CheckExperiment(const CheckCommand& command, Checked& checked) {
+  const Overview overview =
+      MakeOverview(checked.path, {{checked.path}, command.files.settings, {}});
   const std::vector<Experiment>& experiments = overview.experiments;
-  Checked checked;
   for (const ExperimentProblem& problem : experiments.front().problems) {
-    AddUnitWarnings(path, problem.mechanism.description, &checked);
+    checked.AddUnitWarnings(problem.mechanism.description);
   }
   for (const Experiment& experiment : experiments) CheckLadders(experiment);
   if (!command.no_assembly) {
-    AddStarts(path, CheckStarts(experiments), &checked);
+    checked.AddStarts(CheckStarts(experiments));
     RequireFreedom(experiments);
   }
   const std::string& name = experiments.front().name;
-  checked.sentence =
-      fmt::format("experiment \"{}\", {}", name, WithCount(overview.cases(), "case"));
+  checked.Set(fmt::format("experiment \"{}\", {}", name, WithCount(overview.cases(), "case")),
+              "experiment", "name", name, "cases", overview.cases(), "combinations",
+              overview.combinations);
   if (overview.combinations > 1) {
     checked.sentence += " in " + WithCount(overview.combinations, "combination");
   }
@@ -196,70 +180,61 @@ Checked CheckExperiment(const std::filesystem::path& path, const CheckCommand& c
         "; each value of each axis was read, and the starts of {} combinations assembled",
         command.no_assembly ? 0 : experiments.size());
   }
-  Put(checked.document, "kind", "experiment", "name", name, "cases", overview.cases(),
-      "combinations", overview.combinations);
-  return checked;
 }
 
-Checked CheckMechanism(const std::filesystem::path& path, const CheckCommand& command) {
+void CheckMechanism(const CheckCommand& command, Checked& checked) {
   if (!command.files.settings.empty()) {
-    Reject("{}: --set is for experiments, and this is none", path.string());
+    Reject("{}: --set is for experiments, and this is none", checked.path.string());
   }
-  const MechanismFile file = ReadMechanism(path);
-  Checked checked;
-  AddUnitWarnings(path, file.description, &checked);
+  const MechanismFile file = ReadMechanism(checked.path);
+  const MechanismDescription& description = file.description;
+  checked.AddUnitWarnings(description);
   if (!command.no_assembly) {
-    StartReport report = CheckStart(file.description, command.limits);
-    for (std::string& warning : report.warnings) warning = file.description.name + ": " + warning;
-    AddStarts(path, report, &checked);
+    StartReport report = CheckStart(description, command.limits);
+    for (std::string& warning : report.warnings) warning = description.name + ": " + warning;
+    checked.AddStarts(report);
     RequireFreedom(file, command.limits);
   }
-  const auto& [name, bodies, joints] =
-      std::tie(file.description.name, file.description.bodies, file.description.joints);
-  checked.sentence =
-      fmt::format("mechanism \"{}\", {}, {}", name, WithCount(bodies.size() - 1, "body"),
-                  WithCount(joints.size(), "joint"));
-  Put(checked.document, "kind", "mechanism", "name", name, "bodies", bodies.size() - 1, "joints",
-      joints.size());
-  return checked;
+  const std::size_t bodies = description.bodies.size() - 1, joints = description.joints.size();
+  checked.Set(fmt::format("mechanism \"{}\", {}, {}", description.name, WithCount(bodies, "body"),
+                          WithCount(joints, "joint")),
+              "mechanism", "name", description.name, "bodies", bodies, "joints", joints);
 }
 
-/// Checks a file. Throws ConfigError with all mistakes.
+/// Throws ConfigError with all mistakes of a file.
 Checked CheckFile(const std::filesystem::path& path, const CheckCommand& command) {
-  Checked checked;
-  const auto set = [&checked](const std::string& sentence, const auto&... members) {
-    checked.sentence = sentence;
-    Put(checked.document, "kind", members...);
-  };
+  Checked checked{path};
   switch (KindOfFile(path)) {
     case FileKind::kExperiment:
-      return CheckExperiment(path, command);
+      CheckExperiment(command, checked);
+      break;
     case FileKind::kMechanism:
-      return CheckMechanism(path, command);
+      CheckMechanism(command, checked);
+      break;
     case FileKind::kClaims: {
       const std::size_t claims = ReadClaims(path).size();
-      set(WithCount(claims, "claim"), "claims", "claims", claims);
+      checked.Set(WithCount(claims, "claim"), "claims", "claims", claims);
       break;
     }
     case FileKind::kMap: {
       const MapRules map = ReadMapRules(path);
       std::size_t rows = 0;
       for (const MapGroup& group : map.groups) rows += group.rows.size();
-      set(fmt::format("robustness map of {} and {}", WithCount(rows, "row"),
-                      WithCount(map.columns.size(), "method")),
-          "map", "rows", rows, "methods", map.columns.size());
+      checked.Set(fmt::format("robustness map of {} and {}", WithCount(rows, "row"),
+                              WithCount(map.columns.size(), "method")),
+                  "map", "rows", rows, "methods", map.columns.size());
       break;
     }
     case FileKind::kBenchmarks: {
       const std::size_t groups = ReadBenchmarks(path).groups.size();
-      set(WithCount(groups, "group") + " of benchmarks", "benchmarks", "groups", groups);
+      checked.Set(WithCount(groups, "group") + " of benchmarks", "benchmarks", "groups", groups);
       break;
     }
     case FileKind::kSeries: {
       const PublishedSeries series = ReadPublishedSeries(path);
-      set(fmt::format("published series \"{}\", {} quantities at {} times", series.name,
-                      series.quantities.size(), series.times.size()),
-          "series", "quantities", series.quantities.size(), "times", series.times.size());
+      checked.Set(fmt::format("published series \"{}\", {} quantities at {} times", series.name,
+                              series.quantities.size(), series.times.size()),
+                  "series", "quantities", series.quantities.size(), "times", series.times.size());
     }
   }
   return checked;
@@ -296,8 +271,7 @@ int ListIntegrators(const IntegratorsCommand& command, const Typed&) {
             pair.stages(), profile.is_implicit ? "implicit" : "explicit", other},
            &table);
   }
-  std::vector<JsonObject> rows(table.rows.begin(), table.rows.end());
-  if (command.json) return PrintJson(JsonOf("integrators", rows));
+  if (command.json) return PrintJson(JsonOf("integrators", ObjectsOf(table.rows)));
   PrintText(ToScreen(table));
   return 0;
 }
@@ -339,7 +313,7 @@ struct AssembleCommand {
   }
 };
 
-/// Prints the branches: coordinates of joints in the tree, a row per branch.
+/// Prints the coordinates of the joints in the tree, a row per branch.
 void PrintBranches(const MechanismDescription& description, const Branches& branches,
                    const ExplainView& view) {
   Table table{.columns = Columns("branch:integer, times=starts:integer, distance:shortest")};

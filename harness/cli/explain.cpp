@@ -1,24 +1,18 @@
 // explain: problems, methods, runs and measures of an experiment.
-
-#include <set>
+#include <sstream>
 
 #include "harness/base/file_kind.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
 #include "harness/observers/registry.h"
-#include "harness/run/timing.h"
-#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
 namespace {
 
 std::string Numbers(const std::vector<double>& numbers) {
-  std::vector<std::string> words;
-  for (const double number : numbers) words.push_back(NumberCell(number));
-  return ListInWords(words);
+  return ListInWords(Mapped<std::string>(numbers, NumberCell));
 }
 
-/// Prints the problems as a table.
 void ExplainProblems(const Experiment& experiment) {
   Table table{
       .columns = Columns(
@@ -32,9 +26,18 @@ void ExplainProblems(const Experiment& experiment) {
   PrintSection("Problems", table, {.all = true});
 }
 
-/// Prints the methods as a table, and the meaning of their words.
+constexpr std::pair<std::string_view, std::string_view> kWords[] = {
+    {"joint", "joint coordinates, without one cut joint per loop, where drift appears."},
+    {"absolute", "position and orientation of each body; drift can appear at each joint."},
+    {"plain",
+     "plain factorisations (reduction: fixed independent speeds); they fail or lose accuracy if "
+     "constraints lose rank."},
+    {"rank-revealing",
+     "solvers that detect rank loss (reduction: independent speeds are chosen again)."}};
+
 void ExplainMethods(const Experiment& experiment) {
   Table table{.columns = Columns("formulation, enforcement, coordinates, solver")};
+  std::set<std::string_view> used;
   for (const Method& method : experiment.methods) {
     // a peer's name contains a slash; the solver is followed by threads and execution
     const std::string rest = ToString(method).substr(method.formulation.size() + 1);
@@ -42,29 +45,16 @@ void ExplainMethods(const Experiment& experiment) {
     AddRow({method.formulation, rest.substr(0, first), rest.substr(first + 1, second - first - 1),
             rest.substr(second + 1)},
            &table);
+    used.insert({method.formulation, ToString(method.enforcement), ToString(method.coordinates),
+                 ToString(method.solver)});
   }
   PrintSection("Methods", table, {.all = true});
-  const auto define = [&](std::string_view word, std::string_view sentence, auto is) {
-    if (std::ranges::any_of(experiment.methods, is)) Print("  {}: {}\n", word, sentence);
+  const auto define = [&used](std::string_view word, std::string_view sentence) {
+    if (used.contains(word)) Print("  {}: {}\n", word, sentence);
   };
-  for (const FormulationRow& row : Formulations()) {
-    define(row.name, row.sentence, [&](const Method& c) { return c.formulation == row.name; });
-  }
-  for (const LevelTraits& level : Levels()) {
-    define(level.name, level.sentence,
-           [&](const Method& c) { return ToString(c.enforcement) == level.name; });
-  }
-  define("joint", "joint coordinates, without one cut joint per loop, where drift appears.",
-         [](const Method& c) { return c.coordinates == Coordinates::kJoint; });
-  define("absolute", "position and orientation of each body; drift can appear at each joint.",
-         [](const Method& c) { return c.coordinates == Coordinates::kAbsolute; });
-  define("plain",
-         "plain factorisations (reduction: fixed independent speeds); they fail or lose accuracy "
-         "if constraints lose rank.",
-         [](const Method& c) { return c.solver == SolverKind::kAsPublished; });
-  define("rank-revealing",
-         "solvers that detect rank loss (reduction: independent speeds are chosen again).",
-         [](const Method& c) { return c.solver == SolverKind::kRankRevealing; });
+  for (const FormulationRow& row : Formulations()) define(row.name, row.sentence);
+  for (const LevelTraits& level : Levels()) define(level.name, level.sentence);
+  for (const auto& [word, sentence] : kWords) define(word, sentence);
 }
 
 /// Returns the unit of a joint's coordinate, from the first problem with this joint.
@@ -208,8 +198,8 @@ JsonObject ExperimentDocument(const std::filesystem::path& path, const Experimen
     sweep.push_back(
         JsonOf("name", name, "count", number, "values", ValuesOf(name, overview.experiments)));
   }
-  std::vector<std::string> methods;
-  for (const Method& method : first.methods) methods.push_back(ToString(method));
+  std::vector<std::string> methods =
+      Mapped<std::string>(first.methods, [](const Method& method) { return ToString(method); });
   return JsonOf("file", path, "kind", "experiment", "name", first.name, "comment", first.comment,
                 "cases", overview.cases(), "combinations", overview.combinations, "timings",
                 others.timings, "precision_runs", others.rungs, "references",
@@ -238,28 +228,20 @@ std::string MechanismText(const std::filesystem::path& path, ExplainView view,
 
 constexpr std::size_t kMaxRows = 40, kFirstRows = 30, kIndent = 2, kNarrowest = 24;
 
-std::size_t LongestWord(std::string_view text) {
-  std::size_t longest = 0;
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find(' '), text.size());
-    longest = std::max(longest, CellsOf(text.substr(0, end)));
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return longest;
-}
-
 /// Breaks only the last column, for a pipe, and no name in it, so that names can be searched.
 Table LastColumnBroken(Table table) {
   TableColumn& last = table.columns.back();
   if (last.format != Format::kText) return table;
   std::size_t taken = kIndent;
   for (std::size_t c = 0; c + 1 < table.columns.size(); ++c) {
-    taken += TextColumn(table.columns[c], table.rows).width + kColumnGap;
+    taken += TextWidth(table.columns[c], table.rows) + kColumnGap;
   }
   constexpr std::size_t kUsual = 100;
   last.most_cells = kUsual > taken + kNarrowest ? kUsual - taken : kNarrowest;
   for (const Record& row : table.rows) {
-    last.most_cells = std::max(last.most_cells, LongestWord(EscapeTerminal(row.Text(last.key))));
+    for (const auto word : std::views::split(EscapeTerminal(row.Text(last.key)), ' ')) {
+      last.most_cells = std::max(last.most_cells, CellsOf({word.begin(), word.end()}));
+    }
   }
   return table;
 }
@@ -284,7 +266,6 @@ struct ExplainCommand {
   }
 };
 
-/// Prints runs and measures of experiments, and models of mechanisms, by the kind of each file.
 /// Mechanisms are analysed in a child process under `limits`; returns 2 if a limit ended it.
 int Explain(ExplainCommand& command, const Typed&) {
   auto& [files, limits, view, json] = command;
@@ -322,8 +303,7 @@ std::string ShortNumber(double value) { return fmt::format("{:.6g}", value + 0.0
 void PrintSection(const std::string& title, const Table& table, const ExplainView& view,
                   const char* key) {
   if (view.document != nullptr) {
-    std::vector<JsonObject> rows(table.rows.begin(), table.rows.end());
-    if (*key != '\0') view.document->Add(key, rows);
+    if (*key != '\0') view.document->Add(key, ObjectsOf(table.rows));
     return;
   }
   Print("\n{}\n", title);
@@ -339,12 +319,10 @@ void PrintSection(const std::string& title, const Table& table, const ExplainVie
   });
   const Screen screen = OutputScreen();
   const std::size_t room = screen.width - std::min(screen.width, kIndent);
-  const std::string text =
-      ToText(screen.is_terminal ? FitWidth(shown, room) : LastColumnBroken(shown));
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    if (end > begin) Print("  {}\n", text.substr(begin, end - begin));
-    begin = end + 1;
+  std::istringstream text(
+      ToText(screen.is_terminal ? FitWidth(shown, room) : LastColumnBroken(shown)));
+  for (std::string line; std::getline(text, line);) {
+    if (!line.empty()) Print("  {}\n", line);
   }
   if (shown.rows.size() < table.rows.size()) {
     Print("  ... and {} more rows (--all shows them)\n", table.rows.size() - shown.rows.size());

@@ -1,10 +1,6 @@
 // explain: model, start and structure of a mechanism.
-#include <array>
-#include <numbers>
-
 #include "harness/cli/commands.h"
 #include "harness/judge/analysis.h"
-#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
 #include "mechanism/model/kinematics.h"
 #include "odca/odca.h"
@@ -49,32 +45,35 @@ Table LoopTable(const MechanismDescription& description, const Structure& struct
 void PrintFreedom(const Structure& s, const std::vector<std::string>& idle,
                   const ExplainView& view) {
   const int each = s.space == SpaceKind::kPlanar ? 3 : 6;
-  Say(view, "\nDegrees of freedom\n");
-  Say(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
-      s.counted_freedom, s.bodies, each, s.rows);
+  PrintUnlessJson(view, "\nDegrees of freedom\n");
+  PrintUnlessJson(view, "  {} by counting (Gruebler, Kutzbach): {} bodies x {} - {} constraints\n",
+                  s.counted_freedom, s.bodies, each, s.rows);
   if (!s.analysed) return;
-  Say(view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
+  PrintUnlessJson(
+      view, "  {} by rank: {} speeds of the tree - rank {} of the {} constraints of loops{}\n",
       s.joint_u - s.rank_nearby, s.joint_u, s.rank_nearby, s.loop_rows,
       s.couplings > 0 ? " and couplings" : "");
-  for (const std::string& one : idle) Say(view, "  1 of them idle: {}\n", one);
+  for (const std::string& one : idle) PrintUnlessJson(view, "  1 of them idle: {}\n", one);
   if (s.locked() && s.freedom_at_start() > 0) {
-    Say(view,
-        "  0 finite motions: the start is singular, and its first-order motions\n"
-        "  lead back to it\n");
+    PrintUnlessJson(view,
+                    "  0 finite motions: the start is singular, and its first-order motions\n"
+                    "  lead back to it\n");
     return;
   }
   if (s.freedom_of_parts) {
-    Say(view, "  {} finite motions: a part cannot move, see Warnings\n", *s.freedom_of_parts);
+    PrintUnlessJson(view, "  {} finite motions: a part cannot move, see Warnings\n",
+                    *s.freedom_of_parts);
     return;
   }
   if (s.freedom_at_start() != s.freedom()) {
-    Say(view, "  {} at the start, a singular configuration of rank {}\n", s.freedom_at_start(),
-        s.rank);
+    PrintUnlessJson(view, "  {} at the start, a singular configuration of rank {}\n",
+                    s.freedom_at_start(), s.rank);
   }
   if (s.rank > 0 && s.singular_values.size() == 0) {
-    Say(view, "  all constraints are independent at the start, by sparse pivots\n");
+    PrintUnlessJson(view, "  all constraints are independent at the start, by sparse pivots\n");
   } else if (s.rank > 0) {
-    Say(view, "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest nonzero\n",
+    PrintUnlessJson(
+        view, "  scaled singular values at the start: {:.3g} largest, {:.3g} smallest nonzero\n",
         s.singular_values[0], s.singular_values[s.rank - 1]);
   }
 }
@@ -85,23 +84,26 @@ void PrintRedundant(const MechanismDescription& description, const Structure& st
   const int listed = static_cast<int>(structure.redundant.size());
   const int rest = structure.loop_rows - structure.rank_nearby - listed;
   const int implied = structure.couplings > 0 ? std::max(rest, 0) : 0;
-  Say(view, "\nRedundant constraints: {}\n", listed + implied);
+  PrintUnlessJson(view, "\nRedundant constraints: {}\n", listed + implied);
   if (implied > 0) {
-    Say(view, "  couplings: {} of them follow from other constraints at the start\n", implied);
+    PrintUnlessJson(view, "  couplings: {} of them follow from other constraints at the start\n",
+                    implied);
   }
   bool released = false;
   for (const RedundantDirection& one : structure.redundant) {
-    Say(view, "  {}: {}{}\n", description.joints[one.joint].name, one.name,
-        one.released ? "" : " (at the start)");
+    PrintUnlessJson(view, "  {}: {}{}\n", description.joints[one.joint].name, one.name,
+                    one.released ? "" : " (at the start)");
     released = released || one.released;
   }
   if (!released) return;
-  Say(view, "  All of them can be removed at once; the motion stays the same.\n");
+  PrintUnlessJson(view, "  All of them can be removed at once; the motion stays the same.\n");
   if (structure.rounding > 0.0) {
-    Say(view, "  They are redundant within {:.2g} lengths: a run removes them (\"accuracy\").\n",
+    PrintUnlessJson(
+        view, "  They are redundant within {:.2g} lengths: a run removes them (\"accuracy\").\n",
         structure.rounding);
   } else {
-    Say(view,
+    PrintUnlessJson(
+        view,
         "  They are redundant at every position: a run keeps the rank of the constraints and "
         "observes all\n  (\"preprocess\": \"redundancy\").\n");
   }
@@ -163,7 +165,7 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
   const Statics statics = FindStatics(description, structure.start);
   if (view.document != nullptr) view.document->Add("statics_message", statics.why);
   if (!statics.why.empty()) {
-    Say(view, "\nForces at rest: none, {}\n", statics.why);
+    PrintUnlessJson(view, "\nForces at rest: none, {}\n", statics.why);
     return 2;
   }
   double largest = 0.0;
@@ -215,15 +217,16 @@ int PrintStatics(const MechanismDescription& description, const Structure& struc
   }
   PrintSection("Efforts that hold the start at rest", efforts, view, "efforts_at_rest");
   PrintSection("Reactions at rest", reactions, view, "reactions_at_rest");
-  Say(view,
+  PrintUnlessJson(
+      view,
       "  Ground axes, on the body \"on\" at the joint's point; efforts and joint forces are not in "
       "them.\n");
   if (std::ranges::any_of(statics.values, [](double value) { return std::isnan(value); })) {
-    Say(view, "  not unique: redundant constraints share the load in no one way.\n");
+    PrintUnlessJson(view, "  not unique: redundant constraints share the load in no one way.\n");
   }
   if (statics.free > 0) {
-    Say(view, "  {} that no force drives {} not held.\n", WithCount(statics.free, "motion"),
-        statics.free == 1 ? "is" : "are");
+    PrintUnlessJson(view, "  {} that no force drives {} not held.\n",
+                    WithCount(statics.free, "motion"), statics.free == 1 ? "is" : "are");
   }
   return 0;
 }
@@ -241,7 +244,7 @@ int PrintRange(const MechanismDescription& description, const ExplainView& view)
   const CoordinateRange range = FindRange(description, joint);
   if (view.document != nullptr) view.document->Add("range_message", range.why);
   if (!range.why.empty()) {
-    Say(view, "\nRange of {}: none, {}\n", view.range, range.why);
+    PrintUnlessJson(view, "\nRange of {}: none, {}\n", view.range, range.why);
     return 2;
   }
   const ValueWord word =
@@ -274,26 +277,20 @@ int PrintRange(const MechanismDescription& description, const ExplainView& view)
   return 0;
 }
 
-std::vector<JsonObject> LoopDocuments(const MechanismDescription& description,
-                                      const Structure& structure) {
-  std::vector<JsonObject> loops;
-  for (const LoopPath& loop : structure.loops) {
-    const auto [joints, bodies] = NamesIn(loop, description);
-    loops.push_back(JsonOf("cut", description.joints[loop.cut_joint].name, "open_shift",
-                           loop.open_shift, "open_rotation", loop.open_rotation, "joints", joints,
-                           "bodies", bodies));
-  }
-  return loops;
-}
-
-/// Prints facts that the other sections do not contain.
+/// Adds facts that the other sections do not contain.
 void DescribeStructure(const MechanismDescription& description, const Structure& s,
                        const std::vector<std::string>& idle, JsonObject* document) {
-  std::vector<JsonObject> redundant;
-  for (const RedundantDirection& one : s.redundant) {
-    redundant.push_back(JsonOf("joint", description.joints[one.joint].name, "direction", one.name,
-                               "at_every_position", one.released));
-  }
+  const std::vector<JointDescription>& joints = description.joints;
+  std::vector<JsonObject> loops = Mapped<JsonObject>(s.loops, [&](const LoopPath& loop) {
+    const auto [joint_names, body_names] = NamesIn(loop, description);
+    return JsonOf("cut", joints[loop.cut_joint].name, "open_shift", loop.open_shift,
+                  "open_rotation", loop.open_rotation, "joints", joint_names, "bodies", body_names);
+  });
+  std::vector<JsonObject> redundant =
+      Mapped<JsonObject>(s.redundant, [&](const RedundantDirection& one) {
+        return JsonOf("joint", joints[one.joint].name, "direction", one.name, "at_every_position",
+                      one.released);
+      });
   const auto known = [&s](int number) {
     return s.analysed ? Value(std::int64_t{number}) : Value();
   };
@@ -302,8 +299,7 @@ void DescribeStructure(const MechanismDescription& description, const Structure&
              known(s.freedom_at_start()), "constraints_of_loops", s.loop_rows, "rank",
              known(s.rank_nearby), "rank_at_start", known(s.rank), "idle", idle);
   Put(*document, "start_outcome", s.start.outcome, "start_message", s.start.message,
-      "degrees_of_freedom", freedom, "loops", LoopDocuments(description, s), "redundant",
-      redundant);
+      "degrees_of_freedom", freedom, "loops", loops, "redundant", redundant);
 }
 
 // The assembled start of a mechanism, joint by joint, and its energy.
@@ -401,11 +397,20 @@ void PrintStart(const MechanismDescription& description, const Start<double>& st
     view.document->Add("energy", JsonOf("kinetic", energy.kinetic, "potential", energy.potential,
                                         "total", energy.total()));
   }
-  Say(view, "  Energy: kinetic {} J + potential {} J = {} J\n", ShortNumber(energy.kinetic),
-      ShortNumber(energy.potential), ShortNumber(energy.total()));
-  Say(view,
+  PrintUnlessJson(view, "  Energy: kinetic {} J + potential {} J = {} J\n",
+                  ShortNumber(energy.kinetic), ShortNumber(energy.potential),
+                  ShortNumber(energy.total()));
+  PrintUnlessJson(
+      view,
       "  Zero potential: centres of mass and constant forces at the ground's origin, springs at "
       "rest,\n  joint torques at coordinate 0.\n");
+}
+
+/// Prints lines under a title, or "none".
+void PrintLines(const char* title, const std::vector<std::string>& lines, const ExplainView& view) {
+  PrintUnlessJson(view, "\n{}\n", title);
+  if (lines.empty()) PrintUnlessJson(view, "  none\n");
+  for (const std::string& line : lines) PrintUnlessJson(view, "  {}\n", line);
 }
 
 }  // namespace
@@ -414,8 +419,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   const MechanismFile file = ReadMechanism(path);
   const MechanismDescription& description = file.description;
   const Structure structure = AnalyseStructure(description);
-  const std::vector<Warning> warnings = FindWarnings(description, structure);
-  const std::vector<std::string> idle =
+  const std::vector<std::string> warnings = FindWarnings(description, structure),
+                                 idle =
                                      NamesOf(description, FindIdleFreedoms(description, structure)),
                                  hints = FindHints(description, structure);
   if (view.document != nullptr) {
@@ -423,8 +428,8 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
         std::vector<double>(description.gravity.begin(), description.gravity.end()));
     DescribeStructure(description, structure, idle, view.document);
   }
-  Say(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
-      path.string(), ToString(description.space));
+  PrintUnlessJson(view, "{} ({})\n  {} mechanism; lengths in m, angles in rad\n", description.name,
+                  path.string(), ToString(description.space));
   PrintModel(description, structure, view);
   if (description.space == SpaceKind::kPlanar) {
     PrintStart<Planar>(description, structure.start, view);
@@ -437,23 +442,18 @@ int ExplainMechanism(const std::filesystem::path& path, const ExplainView& view)
   PrintIslands(description, structure, view);
   PrintCoordinates(structure, view);
   PrintPlanOfJoins(description, view);
-  Say(view, "\nPossible simplifications\n");
   const Compiled compiled = Compile(description, CompileOptions::All());
-  if (compiled.report.empty()) Say(view, "  none\n");
-  for (const std::string& line : compiled.report) Say(view, "  {}\n", line);
+  PrintLines("Possible simplifications", compiled.report, view);
   if (compiled.done != CompileOptions::None()) {
-    Say(view, "  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
-        ToString(compiled.done), ToString(CompileOptions()));
+    PrintUnlessJson(view,
+                    "  Applicable: {}. Default of a run: {} (\"preprocess\" of an experiment).\n",
+                    ToString(compiled.done), ToString(CompileOptions()));
   }
   if (view.document != nullptr) {
-    std::vector<std::string> texts = Mapped<std::string>(warnings, &Warning::text);
-    Put(*view.document, "simplifications", compiled.report, "warnings", texts, "hints", hints);
+    Put(*view.document, "simplifications", compiled.report, "warnings", warnings, "hints", hints);
   }
-  Say(view, "\nWarnings\n");
-  if (warnings.empty()) Say(view, "  none\n");
-  for (const Warning& warning : warnings) Say(view, "  {}\n", warning.text);
-  if (!hints.empty()) Say(view, "\nHints\n");
-  for (const std::string& hint : hints) Say(view, "  {}\n", hint);
+  PrintLines("Warnings", warnings, view);
+  if (!hints.empty()) PrintLines("Hints", hints, view);
   int code = structure.start.outcome == Outcome::kInconsistentStart ? 2 : 0;
   const bool is_assembled = code == 0;
   if (view.statics && is_assembled) code = PrintStatics(description, structure, view);

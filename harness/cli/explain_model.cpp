@@ -20,17 +20,10 @@ std::string Place(const BodyDescription& body, const Vector3d& at, SpaceKind spa
   return text;
 }
 
-std::string InertiaText(const Eigen::Matrix3d& I, SpaceKind space) {
-  if (space == SpaceKind::kPlanar) return ShortNumber(I(2, 2));
-  std::string text = Spaced(Vector3d(I.diagonal()));
-  const Vector3d products(I(0, 1), I(0, 2), I(1, 2));
-  if (!products.isZero(0.0)) text += " " + Spaced(products);
-  return text;
-}
-
 Table BodyTable(const MechanismDescription& description, const Structure& structure) {
   Table table{.columns = Columns("name=body, part=subsystem:integer, mass=mass [kg]:shortest, "
                                  "inertia=inertia [kg m^2], com=com [m], points=points [m]")};
+  const bool planar = description.space == SpaceKind::kPlanar;
   const auto add = [&](const BodyDescription& body) -> Record& {
     Record& row = table.rows.emplace_back();
     row.Set("name", body.name);
@@ -45,30 +38,24 @@ Table BodyTable(const MechanismDescription& description, const Structure& struct
     for (const int index : structure.islands[i].bodies) {
       const BodyDescription& body = description.bodies[index];
       Record& row = add(body);
-      Put(row, "part", i + 1, "mass", body.mass, "inertia",
-          InertiaText(body.inertia, description.space), "com",
+      const Eigen::Matrix3d& I = body.inertia;
+      const Vector3d products(I(0, 1), I(0, 2), I(1, 2));
+      std::string inertia = planar ? ShortNumber(I(2, 2)) : Spaced(Vector3d(I.diagonal()));
+      if (!planar && !products.isZero(0.0)) inertia += " " + Spaced(products);
+      Put(row, "part", i + 1, "mass", body.mass, "inertia", inertia, "com",
           VectorText(body.com, description.space));
     }
   }
   return table;
 }
 
-/// Returns the free speeds of a joint: the directions of its kind minus those with a given motion.
-int FreeSpeeds(SpaceKind space, const JointDescription& joint) {
-  const int kind = space == SpaceKind::kPlanar && TraitsOf(joint.type).in_plane
-                       ? KindOf<Planar, double>(joint.type).num_u
-                       : KindOf<Spatial, double>(joint.type).num_u;
-  return kind - static_cast<int>(joint.motions.size());
-}
-
 std::string FunctionText(const TimeFunctionDescription& function) {
   if (const auto* polynomial = std::get_if<Polynomial>(&function)) {
-    std::string text;
-    for (std::size_t i = 0; i < polynomial->coefficients.size(); ++i) {
-      text += (i == 0 ? "" : " + ") + ShortNumber(polynomial->coefficients[i]);
-      if (i > 0) text += i == 1 ? " t" : fmt::format(" t^{}", i);
-    }
-    return text;
+    return Joined(polynomial->coefficients, " + ", [power = 0](double number) mutable {
+      const std::string text = ShortNumber(number);
+      const int i = power++;
+      return i == 0 ? text : i == 1 ? text + " t" : fmt::format("{} t^{}", text, i);
+    });
   }
   if (const auto* harmonic = std::get_if<Harmonic>(&function)) {
     return fmt::format("{} + {} sin({} t + {})", ShortNumber(harmonic->mean),
@@ -83,22 +70,21 @@ std::string FunctionText(const TimeFunctionDescription& function) {
 
 /// Returns parameters, the rotor and prescribed motions.
 std::string Given(SpaceKind space, const JointDescription& joint) {
-  std::string text;
+  std::vector<std::string> given;
   const JointParameter& own = TraitsOf(joint.type).parameter;
   if (!own.key.empty()) {
-    text = fmt::format("{} {} {}", own.key, ShortNumber(joint.parameter), own.unit);
+    AddNote(given, "{} {} {}", own.key, ShortNumber(joint.parameter), own.unit);
   }
   const std::vector<ValueWord> words = ValueWords(joint.type, space, false);
   if (joint.rotor_inertia > 0.0) {
-    text += fmt::format("{}rotor {} {}", text.empty() ? "" : "; ", ShortNumber(joint.rotor_inertia),
-                        words.at(0).is_length() ? "kg" : "kg m^2");
+    AddNote(given, "rotor {} {}", ShortNumber(joint.rotor_inertia),
+            words.at(0).is_length() ? "kg" : "kg m^2");
   }
   for (const PrescribedMotion& motion : joint.motions) {
     const ValueWord& word = words.at(static_cast<std::size_t>(motion.coordinate));
-    text += fmt::format("{}{} = {} [{}]", text.empty() ? "" : "; ", word.name,
-                        FunctionText(motion.value), word.unit);
+    AddNote(given, "{} = {} [{}]", word.name, FunctionText(motion.value), word.unit);
   }
-  return text;
+  return Joined(given, "; ");
 }
 
 Table JointTable(const MechanismDescription& description, const Structure& structure) {
@@ -110,7 +96,11 @@ Table JointTable(const MechanismDescription& description, const Structure& struc
   for (const LoopPath& loop : structure.loops) cut[loop.cut_joint] = true;
   for (std::size_t j = 0; j < description.joints.size(); ++j) {
     const JointDescription& joint = description.joints[j];
-    const int free = FreeSpeeds(description.space, joint);
+    // directions of its kind without those with a given motion
+    const int kind = dim == 3 && TraitsOf(joint.type).in_plane
+                         ? KindOf<Planar, double>(joint.type).num_u
+                         : KindOf<Spatial, double>(joint.type).num_u;
+    const int free = kind - static_cast<int>(joint.motions.size());
     AddRow({joint.name, joint.type, description.bodies[joint.from.body].name,
             description.bodies[joint.to.body].name, free, dim - free,
             cut[j] ? "closes a loop" : "tree", Given(description.space, joint)},
@@ -163,41 +153,34 @@ Table FrameTable(const MechanismDescription& description) {
   return table;
 }
 
-/// Adds a force as "type", "acts on" and "with".
-void AddForce(const MechanismDescription& description, ForceDescription force, Table* table) {
-  const ForceParts parts = PartsOf(force);
-  std::vector<std::string> on, with;
-  bool is_length = true;
-  if (parts.joint != nullptr) {
-    const JointDescription& joint = description.joints[*parts.joint];
-    on.push_back("joint " + joint.name);
-    is_length = ValueWords(joint.type, description.space, false).at(0).is_length();
-  }
-  for (const BodyPoint* point : parts.points) {
-    const BodyDescription& body = description.bodies[point->body];
-    on.push_back(body.name + " at " + Place(body, point->at, description.space));
-  }
-  if (parts.value != nullptr) {
-    with.push_back(
-        fmt::format("{} [{}]", FunctionText(*parts.value), quantity::kEffort.Unit(is_length)));
-  }
-  if (parts.force != nullptr) {
-    with.push_back(fmt::format("force ({}) N in {} axes",
-                               VectorText(*parts.force, description.space),
-                               *parts.in_body_axes ? "body" : "ground"));
-  }
-  for (const ForceNumber& number : parts.numbers) {
-    with.push_back(fmt::format("{} {} {}", number.key, ShortNumber(*number.value),
-                               number.quantity.Unit(is_length)));
-  }
-  AddRow({parts.name, fmt::format("{}", fmt::join(on, ", ")),
-          fmt::format("{}", fmt::join(with, ", "))},
-         table);
-}
-
 Table ForceTable(const MechanismDescription& description) {
   Table table{.columns = Columns("type=force, on=acts on, with")};
-  for (const ForceDescription& force : description.forces) AddForce(description, force, &table);
+  for (ForceDescription force : description.forces) {
+    const ForceParts parts = PartsOf(force);
+    std::vector<std::string> on, with;
+    bool is_length = true;
+    if (parts.joint != nullptr) {
+      const JointDescription& joint = description.joints[*parts.joint];
+      on.push_back("joint " + joint.name);
+      is_length = ValueWords(joint.type, description.space, false).at(0).is_length();
+    }
+    for (const BodyPoint* point : parts.points) {
+      const BodyDescription& body = description.bodies[point->body];
+      on.push_back(body.name + " at " + Place(body, point->at, description.space));
+    }
+    if (parts.value != nullptr) {
+      AddNote(with, "{} [{}]", FunctionText(*parts.value), quantity::kEffort.Unit(is_length));
+    }
+    if (parts.force != nullptr) {
+      AddNote(with, "force ({}) N in {} axes", VectorText(*parts.force, description.space),
+              *parts.in_body_axes ? "body" : "ground");
+    }
+    for (const ForceNumber& number : parts.numbers) {
+      AddNote(with, "{} {} {}", number.key, ShortNumber(*number.value),
+              number.quantity.Unit(is_length));
+    }
+    AddRow({parts.name, Joined(on, ", "), Joined(with, ", ")}, &table);
+  }
   return table;
 }
 
@@ -217,16 +200,18 @@ Table CouplingTable(const MechanismDescription& description) {
 void PrintModel(const MechanismDescription& description, const Structure& structure,
                 const ExplainView& view) {
   const bool planar = description.space == SpaceKind::kPlanar;
-  Say(view, "  gravity ({}) m/s^2 in ground axes\n",
-      VectorText(description.gravity, description.space));
+  PrintUnlessJson(view, "  gravity ({}) m/s^2 in ground axes\n",
+                  VectorText(description.gravity, description.space));
   PrintSection("Bodies", BodyTable(description, structure), view, "bodies");
-  Say(view, "  Points and com are relative to the body's origin; inertia is about com.\n");
-  if (!planar) Say(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz unless zero.\n");
+  PrintUnlessJson(view,
+                  "  Points and com are relative to the body's origin; inertia is about com.\n");
+  if (!planar) PrintUnlessJson(view, "  Inertia is Ixx Iyy Izz, and Ixy Ixz Iyz unless zero.\n");
   PrintSection("Joints", JointTable(description, structure), view, "joints");
   PrintSection("Frames of joints",
                planar ? FrameTable<Planar>(description) : FrameTable<Spatial>(description), view,
                "frames");
-  Say(view,
+  PrintUnlessJson(
+      view,
       "  Origin, axis and rotation vector are in body axes. Coordinates describe M relative to "
       "F.\n");
   if (!description.couplings.empty()) {

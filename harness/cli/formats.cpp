@@ -1,7 +1,6 @@
 // schema and migrate: keys of files of each kind, and of earlier versions.
 #include <unistd.h>
 
-#include <array>
 #include <exception>
 #include <fstream>
 #include <ranges>
@@ -18,40 +17,20 @@ namespace loopbench::harness {
 namespace {
 
 struct Kind {
-  std::string name, title;
+  std::string_view name, title;
   Json (*schema)();
 };
 
-const std::array<Kind, 6>& Kinds() {
-  static const std::array<Kind, 6> kinds = {
-      {{"mechanism", "mechanism", MechanismSchema},
-       {"experiment", "experiment", ExperimentSchema},
-       {"benchmarks", "benchmarks", BenchmarksSchema},
-       {"claims", "claims", ClaimsSchema},
-       {"map", "robustness map", MapSchema},
-       {"series", "published series", PublishedSeriesSchema}}};
-  return kinds;
-}
+constexpr Kind kKinds[] = {{"mechanism", "mechanism", MechanismSchema},
+                           {"experiment", "experiment", ExperimentSchema},
+                           {"benchmarks", "benchmarks", BenchmarksSchema},
+                           {"claims", "claims", ClaimsSchema},
+                           {"map", "robustness map", MapSchema},
+                           {"series", "published series", PublishedSeriesSchema}};
 
 const Kind& KindOf(const std::string& name) {
-  return *std::ranges::find(Kinds(), name, &Kind::name);
+  return *std::ranges::find(kKinds, name, &Kind::name);
 }
-
-}  // namespace
-
-std::vector<std::string> SchemaKinds() { return Mapped<std::string>(Kinds(), &Kind::name); }
-
-std::string SchemaOfKind(const std::string& kind) {
-  return SchemaText("Loopbench " + KindOf(kind).title, KindOf(kind).schema());
-}
-
-std::string TablesOfKinds(const std::vector<std::string>& kinds) {
-  std::vector<std::pair<std::string, Json>> schemas;
-  for (const std::string& kind : kinds) schemas.emplace_back(kind, KindOf(kind).schema());
-  return SchemaTables(schemas);
-}
-
-namespace {
 
 struct SchemaCommand {
   std::string kind;
@@ -70,13 +49,14 @@ int PrintSchema(const SchemaCommand& command, const Typed&) {
 
 using std::string_view;
 
-/// Name in a configuration file, and the keys of the objects that contain it, between slashes; "//"
-/// is the top level.
-struct OldKey {
-  string_view old, now, within;
+/// Word of earlier versions. `where` holds the keys with it, between slashes; "": any key.
+struct OldWord {
+  string_view old, now, where = "";
 };
 
-constexpr OldKey kKeys[] = {
+/// Keys of configuration files, and the keys of the objects that contain them; "//" is the top
+/// level.
+constexpr OldWord kKeys[] = {
     {"columns", "methods", "//groups/timing/families/"},
     {"scenes", "problems", "//ensembles/"},
     {"observe", "known_solution", "//mechanism/"},
@@ -92,12 +72,8 @@ constexpr OldKey kKeys[] = {
     {"only_under", "partially_reproduced", "/wording/"},
 };
 
-struct OldName {
-  string_view old, now;
-};
-
 /// Keys of records, which conditions and measures of configuration files also use.
-constexpr OldName kRecordKeys[] = {
+constexpr OldWord kRecordKeys[] = {
     {"scene_id", "problem_id"},
     {"content", "config_hash"},
     {"doubts", "warnings"},
@@ -117,12 +93,9 @@ constexpr OldName kRecordKeys[] = {
 };
 constexpr string_view kConditions = "/select/require/where/when/benchmarks/of/relative_to/";
 
-/// Word among the values of some keys; several words are separated by spaces.
-struct OldValue {
-  string_view old, now, keys;
-};
 constexpr string_view kOutcomes = "/outcome/right/expected_outcome/when/word/";
-constexpr OldValue kValues[] = {
+/// Words among the values of these keys; several words are separated by spaces.
+constexpr OldWord kValues[] = {
     {"as-published", "plain", "/solver/"},
     {"position", "projection", "/enforcement/"},
     {"inexpressible", "unsupported", kOutcomes},
@@ -137,17 +110,18 @@ bool Holds(string_view words, string_view word) {
   return words.find("/" + std::string(word) + "/") != words.npos;
 }
 
-string_view RecordKey(string_view key) {
-  const auto* known = std::ranges::find(kRecordKeys, key, &OldName::old);
-  return known == std::end(kRecordKeys) ? key : known->now;
+template <std::size_t size>
+string_view Renamed(const OldWord (&words)[size], string_view word, string_view where = "") {
+  for (const OldWord& known : words) {
+    if (known.old == word && (known.where.empty() || Holds(known.where, where))) return known.now;
+  }
+  return word;
 }
 
 /// Returns today's name of `key` in the object under `within`.
 string_view ConfigurationKey(string_view key, string_view within) {
-  for (const OldKey& known : kKeys) {
-    if (known.old == key && Holds(known.within, within)) return known.now;
-  }
-  return Holds(kConditions, within) ? RecordKey(key) : key;
+  const string_view now = Renamed(kKeys, key, within);
+  return now == key && Holds(kConditions, within) ? Renamed(kRecordKeys, key) : now;
 }
 
 /// Returns "/problems/0/mechanism/initial/fixed" for "/scenes/0/mechanism/initial/held".
@@ -168,14 +142,11 @@ std::string Pointer(string_view pointer) {
 /// Returns the new value under `key`, without its quotation marks.
 std::string NewValue(string_view value, string_view key) {
   if (key == "field") return Pointer(value);
-  if (key == "measure" || key == "of" || key == "relative_to") return std::string(RecordKey(value));
+  if (key == "measure" || key == "of" || key == "relative_to")
+    return std::string(Renamed(kRecordKeys, value));
   std::string text;
   for (const auto part : std::views::split(value, ' ')) {
-    string_view word(part.begin(), part.end());
-    for (const OldValue& known : kValues) {
-      if (known.old == word && Holds(known.keys, key)) word = known.now;
-    }
-    text += word;
+    text += Renamed(kValues, string_view(part.begin(), part.end()), key);
     text += ' ';
   }
   if (!text.empty()) text.pop_back();
@@ -258,7 +229,7 @@ class Renamer {
       }
       const string_view key = String();
       const bool is_top = is_record_ && depth == 0;
-      Replace(key, is_top ? RecordKey(key) : ConfigurationKey(key, within));
+      Replace(key, is_top ? Renamed(kRecordKeys, key) : ConfigurationKey(key, within));
       SkipSpace();
       ++at_;  // the colon
       SkipSpace();
@@ -298,9 +269,8 @@ std::string RenamedLine(string_view line, const std::string& place, std::size_t*
   return object.append(end);
 }
 
-/// Writes the lines of a record file through `write`; returns the number of replaced names.
-std::size_t RenameLines(const std::filesystem::path& file,
-                        const std::function<void(string_view)>& write) {
+/// Writes the lines of a record file to `output`, if any; returns the number of replaced names.
+std::size_t RenameLines(const std::filesystem::path& file, OutputFile* output) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw std::runtime_error(file.string() + ": cannot be read");
   std::size_t count = 0, number = 0;
@@ -311,8 +281,8 @@ std::size_t RenameLines(const std::filesystem::path& file,
     } catch (const ConfigError&) {
       if (!is_torn || number == 1) throw;
     }
-    write(line);
-    if (!is_torn) write("\n");
+    if (!is_torn) line += '\n';
+    if (output != nullptr) output->Write(line);
   }
   return count;
 }
@@ -339,10 +309,10 @@ std::size_t MigrateFile(const std::filesystem::path& file) {
   }
   if (HasRecordLines(file)) {
     const Lock lock{OpenLocked(file, false, "wait for it")};
-    const std::size_t count = RenameLines(file, [](string_view) {});
+    const std::size_t count = RenameLines(file, nullptr);
     if (count == 0) return 0;
     OutputFile output(file, Onto::kAnyFile);
-    RenameLines(file, [&output](string_view part) { output.Write(part); });
+    RenameLines(file, &output);
     output.Finish();
     return count;
   }
@@ -402,6 +372,18 @@ int Migrate(const MigrateCommand& command, const Typed&) {
 
 }  // namespace
 
+std::vector<std::string> SchemaKinds() { return Mapped<std::string>(kKinds, &Kind::name); }
+
+std::string SchemaOfKind(const std::string& kind) {
+  return SchemaText(fmt::format("Loopbench {}", KindOf(kind).title), KindOf(kind).schema());
+}
+
+std::string TablesOfKinds(const std::vector<std::string>& kinds) {
+  std::vector<std::pair<std::string, Json>> schemas;
+  for (const std::string& kind : kinds) schemas.emplace_back(kind, KindOf(kind).schema());
+  return SchemaTables(schemas);
+}
+
 void AddFormats(Commands& commands) {
   commands.Add("schema", "Print the JSON Schema (draft 07) of a file type", PrintSchema);
   commands.Add("migrate", "Replace names of earlier versions in files", Migrate);
@@ -415,9 +397,9 @@ std::string WithMigrationHint(std::string message) {
     return holds(fmt::format("unknown key \"{}\"", old));
   };
   const auto is_value = [&](string_view old) { return holds(fmt::format("found \"{}\",", old)); };
-  if (std::ranges::any_of(kKeys, is_key, &OldKey::old) ||
-      std::ranges::any_of(kRecordKeys, is_key, &OldName::old) ||
-      std::ranges::any_of(kValues, is_value, &OldValue::old) ||
+  if (std::ranges::any_of(kKeys, is_key, &OldWord::old) ||
+      std::ranges::any_of(kRecordKeys, is_key, &OldWord::old) ||
+      std::ranges::any_of(kValues, is_value, &OldWord::old) ||
       holds("no key that identifies the file type") ||
       holds(fmt::format(kExpectedFormat, kRecordFormat))) {
     message += "\n`loopbench migrate FILE` replaces names of earlier versions";

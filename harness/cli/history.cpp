@@ -1,7 +1,4 @@
 // history: measurements of successive commits.
-#include "harness/history/history.h"
-
-#include "harness/base/store.h"
 #include "harness/cli/commands.h"
 
 namespace loopbench::harness {
@@ -12,9 +9,10 @@ struct PlaceOptions {
   HistoryPlace place;
 
   std::vector<Option> With(std::vector<Option> options) {
-    options.push_back({"--store", "Folder of the history", &place.store});
-    options.push_back({"--branch", "Git branch that contains the history, instead of a folder",
-                       &place.branch, Excludes({"--store"})});
+    options.insert(options.end(),
+                   {{"--store", "Folder of the history", &place.store},
+                    {"--branch", "Git branch that contains the history, instead of a folder",
+                     &place.branch, Excludes({"--store"})}});
     return options;
   }
 };
@@ -104,18 +102,6 @@ HistoryFindings Chosen(HistoryFindings found, const HistoryShowCommand& command)
   return found;
 }
 
-Table CommitTable(const History& history) {
-  Table table{.title = "Last commits", .columns = Columns("commit, date, machine, mark, note")};
-  constexpr std::size_t kLastShown = 10;
-  const std::size_t n = history.entries.size();
-  for (std::size_t i = n > kLastShown ? n - kLastShown : 0; i < n; ++i) {
-    const HistoryEntry& entry = history.entries[i];
-    AddRow({ShortCommit(entry.commit), entry.date, entry.machine, entry.mark, entry.note}, &table);
-  }
-  if (n > kLastShown) AddNote(table.notes, "{} earlier ones", n - kLastShown);
-  return table;
-}
-
 JsonObject FindingsDocument(const History& history, const HistoryFindings& found) {
   std::vector<JsonObject> all, endings;
   for (const EndingChange& change : found.endings) {
@@ -150,7 +136,7 @@ int HistoryAdd(const HistoryAddCommand& command, const Typed&) {
   if (entry.commit.empty() || entry.date.empty()) {
     const CheckedOut found = FindCommit(entry.commit.empty() ? "HEAD" : entry.commit);
     if (found.commit.empty()) {
-      throw ConfigError(
+      Reject(
           "history add: found no such commit in a git repository here, expected --commit and "
           "--date");
     }
@@ -169,15 +155,13 @@ int HistoryAdd(const HistoryAddCommand& command, const Typed&) {
   return 0;
 }
 
-/// Prints steps, newest first, and the commits. Returns 0.
 int HistoryShow(const HistoryShowCommand& command, const Typed& typed) {
   const auto [history, all] = ReadFindings(command.place);
   const HistoryFindings found = Chosen(all, command);
   if (command.json) return PrintJson(FindingsDocument(history, found));
   Table steps = StepTable(history, found);
   if (command.format != "text") {
-    AppendProvenance(steps, typed.line);
-    PrintText(Render(steps, command.format));
+    PrintText(Render(WithProvenance(std::move(steps), typed.line), command.format));
     return 0;
   }
   if (steps.rows.empty()) {
@@ -187,7 +171,15 @@ int HistoryShow(const HistoryShowCommand& command, const Typed& typed) {
   } else {
     PrintText(ToScreen(steps) + "\n");
   }
-  PrintText(ToScreen(CommitTable(history)) + "\n");
+  Table commits{.title = "Last commits", .columns = Columns("commit, date, machine, mark, note")};
+  constexpr std::size_t kLastShown = 10;
+  const std::size_t n = history.entries.size(), first = n > kLastShown ? n - kLastShown : 0;
+  for (const HistoryEntry& entry : history.entries | std::views::drop(first)) {
+    AddRow({ShortCommit(entry.commit), entry.date, entry.machine, entry.mark, entry.note},
+           &commits);
+  }
+  if (first > 0) AddNote(commits.notes, "{} earlier ones", first);
+  PrintText(ToScreen(commits) + "\n");
   return 0;
 }
 
@@ -238,7 +230,7 @@ std::vector<Record> LastGoodRecords(const HistoryPlace& place, const std::string
 }
 
 void AddHistory(Commands& commands) {
-  commands.Add("history", "Follow measurements over commits and find change points");
+  commands.Add({"history", "Follow measurements over commits and find change points"});
   commands.Add("history add", "Add the results of a commit", HistoryAdd);
   commands.Add("history show", "List change points and recent commits", HistoryShow);
   commands.Add("history report", "Write an HTML page with all change points and charts",

@@ -1,13 +1,6 @@
-// Models of one problem: the full model and simpler ones, their certified motions, errors and
-// records.
+// Models of one problem, their certified motions, errors and records.
 #include <unistd.h>
 
-#include <memory>
-#include <stdexcept>
-#include <system_error>
-
-#include "harness/base/record.h"
-#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/judge/analysis.h"
 #include "harness/run/run.h"
@@ -22,24 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Exact facts that remain valid: on bodies that still exist, and in an approximate model only its
-/// length. Only an exact model in one part has the expected degrees of freedom.
-ObservedQuantities ObserveIn(const MechanismDescription& description,
-                             const ObservedQuantities& observe, bool keeps_facts) {
-  ObservedQuantities known = observe;
-  const auto is_there = [&](const std::string& body) {
-    return Contains(description.bodies, body, &BodyDescription::name);
-  };
-  std::erase_if(known.branch_invariants, [&](const AngleCombination& combination) {
-    return !keeps_facts || !std::ranges::all_of(
-                               combination, [&](const auto& term) { return is_there(term.first); });
-  });
-  if (known.closed_form && (!keeps_facts || !is_there(known.closed_form->body))) {
-    known.closed_form.reset();
-  }
-  return known;
-}
-
 void AddModels(const MechanismFile& file, const std::string& name, bool is_exact,
                const std::string& assumption, const Simplified& simplified, ProblemModels* ladder) {
   for (std::size_t part = 0; part < simplified.parts.size(); ++part) {
@@ -50,8 +25,22 @@ void AddModels(const MechanismFile& file, const std::string& name, bool is_exact
     model.description.name = fmt::format("{}-{}", file.description.name, model.name);
     const bool same_axes =
         simplified.R_WC.isIdentity(0.0) && model.description.space == file.description.space;
-    model.observe = ObserveIn(model.description, file.observe, is_exact && same_axes);
-    if (!is_exact || simplified.parts.size() > 1) model.observe.expected.reset();
+    // exact facts of bodies that still exist; only an exact model in one part has the expected
+    // degrees of freedom
+    const bool keeps_facts = is_exact && same_axes;
+    const auto is_there = [&model](const std::string& body) {
+      return Contains(model.description.bodies, body, &BodyDescription::name);
+    };
+    ObservedQuantities& known = model.observe = file.observe;
+    std::erase_if(known.branch_invariants, [&](const AngleCombination& combination) {
+      return !keeps_facts || !std::ranges::all_of(combination, [&](const auto& term) {
+        return is_there(term.first);
+      });
+    });
+    if (known.closed_form && (!keeps_facts || !is_there(known.closed_form->body))) {
+      known.closed_form.reset();
+    }
+    if (!is_exact || simplified.parts.size() > 1) known.expected.reset();
     model.done = simplified.done;
     model.dropped = simplified.dropped;
     model.assumption = assumption;
@@ -68,11 +57,8 @@ std::string Sentence(std::string text) {
 std::string CommentOf(const ProblemModel& model, const std::string& whole) {
   std::string text =
       fmt::format("{} of {}: {}", model.is_exact ? "Exact model" : "Simplified model", whole,
-                  Sentence(fmt::format("{}", fmt::join(model.done, "; "))));
-  if (!model.dropped.empty()) {
-    text +=
-        fmt::format(" Removed: {}", Sentence(fmt::format("{}", fmt::join(model.dropped, "; "))));
-  }
+                  Sentence(Joined(model.done, "; ")));
+  if (!model.dropped.empty()) text += " Removed: " + Sentence(Joined(model.dropped, "; "));
   if (!model.assumption.empty()) text += fmt::format(" Assumption: {}", Sentence(model.assumption));
   return text;
 }
@@ -82,7 +68,6 @@ std::string List(const std::vector<std::string>& lines) {
                 [](const std::string& line) { return "- " + EscapeMarkdown(line) + "\n"; });
 }
 
-/// Returns the name of the experiment.
 std::string LadderName(const ProblemModels& ladder) {
   return ladder.models.front().description.name + "-models";
 }
@@ -100,14 +85,13 @@ std::vector<std::string> RemovedParts(const MechanismDescription& whole,
       if (now.body < 0) {
         lost.push_back(point);
       } else {
-        found.push_back(fmt::format(
-            "{} on {}", point, now.body == kGround ? "ground" : simplified.bodies[now.body].name));
+        AddNote(found, "{} on {}", point,
+                now.body == kGround ? "ground" : simplified.bodies[now.body].name);
       }
     }
-    std::string line = fmt::format("body {} is removed", body);
-    if (!found.empty()) line += fmt::format("; its points: {}", fmt::join(found, ", "));
-    if (!lost.empty()) line += fmt::format("; removed points: {}", fmt::join(lost, ", "));
-    lines.push_back(line);
+    AddNote(lines, "body {} is removed{}{}{}{}", body,
+            found.empty() ? "" : "; its points: ", Joined(found, ", "),
+            lost.empty() ? "" : "; removed points: ", Joined(lost, ", "));
   }
   return lines;
 }
@@ -151,12 +135,6 @@ std::string PageOf(const ProblemModels& ladder, double horizon, const std::strin
     }
   }
   return page;
-}
-
-bool IsThere(const fs::path& folder) {
-  std::error_code error;
-  const bool there = fs::exists(fs::symlink_status(folder, error));
-  return there && !(fs::is_directory(folder, error) && fs::is_empty(folder, error));
 }
 
 constexpr int kRepeats = 20;  ///< timed runs of each model; the fastest counts
@@ -263,24 +241,21 @@ ProblemModels MakeModels(const MechanismFile& file,
   }
   const Simplified all = Combine(file.description, ideas, run, options);
   if (all.ideas.size() < 2) return ladder;  // it would equal that rule's model
-  std::vector<std::string_view> assumptions;
-  for (const SimplificationRule* idea : all.ideas) {
-    if (!idea->assumption.empty()) assumptions.push_back(idea->assumption);
-  }
+  std::vector<std::string> assumptions =
+      Mapped<std::string>(all.ideas, &SimplificationRule::assumption);
+  std::erase(assumptions, "");
   AddModels(file, "combined", std::ranges::all_of(all.ideas, &SimplificationRule::is_exact),
-            fmt::format("{}", fmt::join(assumptions, "; ")), all, &ladder);
+            Joined(assumptions, "; "), all, &ladder);
   return ladder;
 }
 
 std::vector<std::string> RemovedBodies(const MechanismDescription& whole,
                                        const MechanismDescription& simplified) {
-  std::vector<std::string> names;
-  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
-    const std::string& name = whole.bodies[b].name;
-    const bool stays = std::ranges::find(simplified.bodies.begin() + 1, simplified.bodies.end(),
-                                         name, &BodyDescription::name) != simplified.bodies.end();
-    if (!stays) names.push_back(name);
-  }
+  std::vector<std::string> names = Mapped<std::string>(whole.bodies, &BodyDescription::name);
+  names.erase(names.begin());  // ground
+  std::erase_if(names, [&simplified](const std::string& name) {
+    return Contains(simplified.bodies | std::views::drop(1), name, &BodyDescription::name);
+  });
   return names;
 }
 
@@ -310,7 +285,9 @@ std::string LadderFileName(const ProblemModels& ladder) {
 
 void WriteModels(const ProblemModels& ladder, double horizon, const std::string& typed,
                  const std::filesystem::path& folder, bool force) {
-  const bool is_there = IsThere(folder);
+  std::error_code error;
+  const bool is_there = fs::exists(fs::symlink_status(folder, error)) &&
+                        !(fs::is_directory(folder, error) && fs::is_empty(folder, error));
   if (is_there && !force) {
     Reject("{}: found a folder with files, expected a new one; --force puts the models among them",
            folder.string());
@@ -340,7 +317,6 @@ void WriteModels(const ProblemModels& ladder, double horizon, const std::string&
     for (const auto& [name, text] : files) WriteFileAtomically(folder / name, text);
     return;
   }
-  std::error_code error;
   fs::rename(fresh.path(), target, error);
   if (error) {
     Reject<std::runtime_error>("cannot make '{}': {}", target.string(), error.message());

@@ -1,20 +1,11 @@
 #include "harness/cli/program.h"
 
-#include <fmt/format.h>
-
 #include <exception>
-#include <filesystem>
 #include <new>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "harness/base/store.h"
-#include "harness/base/text.h"
-#include "harness/cli/command_line.h"
 #include "harness/cli/commands.h"
 #include "harness/config/formulations.h"
-#include "mechanism/model/dense_memory.h"
+#include "mechanism/algebra/dense_memory.h"
 
 namespace loopbench {
 namespace harness {

@@ -3,13 +3,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <fstream>
-
-#include "harness/base/store.h"
 #include "harness/cli/commands.h"
-#include "harness/figures/figures.h"
 #include "harness/judge/analysis.h"
-#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
 
 namespace loopbench::harness {
@@ -17,29 +12,30 @@ namespace {
 
 using Write = std::function<void(std::string_view)>;
 
-void RefuseWhatNeedsAllRows(const TableCommand& command, const ProblemReader& reader) {
-  const TableView& view = command.view;
-  const std::string found =
-      fmt::format("{}: found {} records of {:.1f} GB", command.store.string(), reader.records(),
-                  1e-9 * static_cast<double>(reader.bytes()));
-  const bool is_flat = command.format == "csv" || command.format == "json";
-  if (!is_flat) {
-    Reject(
-        "{}, expected at most {} that fit into memory for a table that people read: choose some "
-        "with --where PARAMETER=..., or write all with --format csv",
-        found, kMaxHeld);
-  }
-  const std::string needs_all = !view.sort.empty()         ? "--sort"
-                                : !view.group.empty()      ? "--group"
-                                : !command.gate.empty()    ? "--fail-on"
-                                : view.kind == "factorial" ? "--kind factorial"
-                                                           : "";
-  if (needs_all.empty()) return;
-  Reject("{}, expected at most {} that fit into memory with {}: choose some with --where", found,
-         kMaxHeld, needs_all);
+/// Omits the date in CSV.
+std::vector<std::string> KeptNotes(std::vector<std::string> notes, const std::string& format) {
+  if (format != "csv") return notes;
+  std::erase_if(notes, [](const std::string& note) { return note.starts_with("date: "); });
+  return notes;
 }
 
-/// Writer of the rows of one table, one by one.
+void RefuseWhatNeedsAllRows(const TableCommand& command, const ProblemReader& reader) {
+  const TableView& view = command.view;
+  const bool is_flat = command.format == "csv" || command.format == "json";
+  const std::string needs_all = !is_flat ? "for a table that people read: choose some with --where "
+                                           "PARAMETER=..., or write all with --format csv"
+                                : !view.sort.empty()       ? "with --sort"
+                                : !view.group.empty()      ? "with --group"
+                                : !command.gate.empty()    ? "with --fail-on"
+                                : view.kind == "factorial" ? "with --kind factorial"
+                                                           : "";
+  if (needs_all.empty()) return;
+  Reject("{}: found {} records of {:.1f} GB, expected at most {} that fit into memory {}{}",
+         command.store.string(), reader.records(), 1e-9 * static_cast<double>(reader.bytes()),
+         kMaxHeld, needs_all, is_flat ? ": choose some with --where" : "");
+}
+
+/// Writer of the rows of one table.
 class ProblemRows {
  public:
   /// `samples`: a record of each set of keys.
@@ -82,62 +78,35 @@ class ProblemRows {
 
 constexpr double kGrows = 4.0;  // memory of a record relative to its line, measured
 
-/// Memory budget for the records of a store.
-class MemoryBudget {
- public:
-  /// Takes the memory that is free now as budget.
-  explicit MemoryBudget(std::filesystem::path store)
-      : store_(std::move(store)), free_(FreeMemory()) {}
-
-  /// True if records with `bytes` bytes of lines fit.
-  bool Has(std::uint64_t bytes) const {
-    return free_ == 0.0 || kGrows * static_cast<double>(bytes) < 0.9 * free_;
-  }
-
-  /// Throws ConfigError if they do not fit; `found` describes the records.
-  void Require(const std::string& found, std::uint64_t bytes) const {
-    if (Has(bytes)) return;
-    Reject(
-        "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
-        "fewer: choose some with --where PARAMETER=..., or write all with table --format csv",
-        store_.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free_ * 1e-9);
-  }
-
- private:
-  std::filesystem::path store_;
-  double free_ = 0.0;  ///< 0 if unknown
-};
+/// True if records with `bytes` bytes of lines fit into free memory; 0: unknown.
+bool Fit(std::uint64_t bytes, double free) {
+  return free == 0.0 || kGrows * static_cast<double>(bytes) < 0.9 * free;
+}
 
 }  // namespace
 
 int WriteLongTable(const TableCommand& command, const ProblemReader& reader,
                    const std::string& typed) {
   RefuseWhatNeedsAllRows(command, reader);
-  std::vector<std::string> notes = Provenance(typed), warnings;
-  if (command.format == "csv") {  // as RenderKept() does
-    std::erase_if(notes, [](const std::string& note) { return note.starts_with("date: "); });
-  }
-  struct NoRows {};  // leaves an existing file unchanged
-  const auto fill = [&](const Write& write) {
-    ProblemRows writer(command, reader.samples(), write);
-    reader.ForEach(
-        [&](std::vector<Record> records) {
-          writer.Add(LatestWithWarnings(std::move(records)), notes);
-        },
-        &warnings);
-    if (writer.rows() == 0) throw NoRows();
-    writer.End(notes);
-  };
-  try {
-    if (command.out.empty()) {
-      fill([](std::string_view text) { PrintText(std::string(text)); });
-    } else {
-      WriteFileAtomically(command.out, fill);
-      Print("wrote {}\n", command.out.string());
-    }
-  } catch (const NoRows&) {
+  const std::vector<std::string> notes = KeptNotes(Provenance(typed), command.format);
+  std::vector<std::string> warnings;
+  std::optional<OutputFile> file;
+  if (!command.out.empty()) file.emplace(command.out);
+  const auto write = [&file](std::string_view text) { file ? file->Write(text) : PrintText(text); };
+  ProblemRows writer(command, reader.samples(), write);
+  reader.ForEach(
+      [&](std::vector<Record> records) {
+        writer.Add(LatestWithWarnings(std::move(records)), notes);
+      },
+      &warnings);
+  if (writer.rows() == 0) {  // an existing file stays unchanged
     PrintError("{}: no records match {}\n", command.store.string(), ToText(command.view.where));
     return 2;
+  }
+  writer.End(notes);
+  if (file) {
+    file->Finish();
+    Print("wrote {}\n", command.out.string());
   }
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
   return 0;
@@ -145,13 +114,13 @@ int WriteLongTable(const TableCommand& command, const ProblemReader& reader,
 
 Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where) {
   if (!IsLarge(StoreFile(store))) return {LoadRecords(store, where), {}};
-  const MemoryBudget room(store);
+  const double free = FreeMemory();
   struct TooMany {};
   if (ChoosesLines(where)) {
     try {
       return {LoadRecords(store, where,
-                          [&room](std::size_t records, std::uint64_t bytes) {
-                            if (records > kMaxHeld || !room.Has(bytes)) throw TooMany();
+                          [free](std::size_t records, std::uint64_t bytes) {
+                            if (records > kMaxHeld || !Fit(bytes, free)) throw TooMany();
                           }),
               {}};
     } catch (const TooMany&) {
@@ -159,7 +128,7 @@ Loaded LoadOrScan(const std::filesystem::path& store, const Selection& where) {
     }
   }
   ProblemReader reader(store, where);
-  if (reader.records() > kMaxHeld || !room.Has(reader.bytes())) return {{}, std::move(reader)};
+  if (reader.records() > kMaxHeld || !Fit(reader.bytes(), free)) return {{}, std::move(reader)};
   return {LoadRecords(store, where), {}};
 }
 
@@ -183,29 +152,12 @@ int PrintJson(const JsonObject& document) {
   return 0;
 }
 
-std::vector<TableColumn> Columns(std::string_view rows) {
-  constexpr std::string_view kFormats[] = {"",         "integer", "shortest", "scientific",
-                                           "exponent", "fixed",   "seconds"};
-  std::vector<TableColumn> columns;
-  while (!rows.empty()) {
-    std::string_view row = rows.substr(0, rows.find(", "));
-    rows.remove_prefix(std::min(row.size() + 2, rows.size()));
-    const auto next = [&row](char end) {
-      const std::string part(row.substr(0, row.find(end)));
-      row.remove_prefix(std::min(part.size() + 1, row.size()));
-      return part;
-    };
-    const std::string heading = next(':'), format = next(':');
-    const std::size_t equals = heading.find('=');
-    TableColumn& column = columns.emplace_back();
-    column.key = heading.substr(0, equals);
-    column.header = heading.substr(equals == heading.npos ? 0 : equals + 1);
-    const auto* known = std::ranges::find(kFormats, format);
-    if (known == std::end(kFormats)) throw std::logic_error("no format of columns: " + format);
-    column.format = static_cast<Format>(known - kFormats);
-    if (!row.empty()) column.importance = std::stoi(std::string(row));
-  }
-  return columns;
+void EraseEmptyColumns(const std::vector<std::string>& keys, Table* table) {
+  std::erase_if(table->columns, [&](const TableColumn& column) {
+    return Contains(keys, column.key) && std::ranges::all_of(table->rows, [&](const Record& row) {
+             return Cell(row, column).empty();
+           });
+  });
 }
 
 std::vector<Record> LatestWithWarnings(std::vector<Record> records) {
@@ -218,14 +170,21 @@ std::vector<Record> LatestWithWarnings(std::vector<Record> records) {
 std::vector<Record> LoadRecords(const std::filesystem::path& store, const Selection& where,
                                 const ReadWatch& watch) {
   const std::filesystem::path file = StoreFile(store);
-  const MemoryBudget room(store);
+  const double free = FreeMemory();
+  const auto require = [&](const std::string& found, std::uint64_t bytes) {
+    if (Fit(bytes, free)) return;
+    Reject(
+        "{}: found {}, which take some {:.1f} GB of memory, of which {:.1f} GB are free; expected "
+        "fewer: choose some with --where PARAMETER=..., or write all with table --format csv",
+        store.string(), found, kGrows * static_cast<double>(bytes) * 1e-9, free * 1e-9);
+  };
   if (IsLarge(file) && !ChoosesLines(where)) {
-    room.Require("all its records", std::filesystem::file_size(file));
+    require("all its records", std::filesystem::file_size(file));
   }
   std::vector<std::string> warnings;
   const auto look = [&](std::size_t records, std::uint64_t bytes) {
     if (watch) watch(records, bytes);
-    room.Require(fmt::format("{} records and more", records), bytes);
+    require(fmt::format("{} records and more", records), bytes);
   };
   std::vector<Record> records = LatestWithWarnings(ReadRecords(store, where, &warnings, look));
   for (const std::string& warning : warnings) PrintError("warning: {}\n", warning);
@@ -238,14 +197,13 @@ void Deliver(const std::string& text, const std::filesystem::path& out) {
   Print("wrote {}\n", out.string());
 }
 
-void AppendProvenance(Table& table, const std::string& typed) {
-  for (const std::string& note : Provenance(typed)) table.notes.push_back(note);
+Table WithProvenance(Table table, const std::string& typed) {
+  std::ranges::move(Provenance(typed), std::back_inserter(table.notes));
+  return table;
 }
 
 std::string RenderKept(Table table, const std::string& format) {
-  if (format == "csv") {
-    std::erase_if(table.notes, [](const std::string& note) { return note.starts_with("date: "); });
-  }
+  table.notes = KeptNotes(std::move(table.notes), format);
   return Render(table, format);
 }
 
@@ -270,7 +228,7 @@ void WriteTables(const std::vector<Record>& records, const std::filesystem::path
   for (const std::string kind : {"drift", "precision", "timing"}) {
     Table full = MakeTable(records, {.kind = kind});
     if (full.rows.empty()) continue;
-    AppendProvenance(full, typed);
+    full = WithProvenance(std::move(full), typed);
     for (const auto& [format, ending] : {std::pair{"csv", ".csv"}, {"markdown", ".md"}}) {
       std::filesystem::path file = store;
       file = is_file ? file.replace_extension(kind + ending) : file / (kind + ending);

@@ -1,11 +1,7 @@
 // table, plot, report, robustness, check-claims, work-precision: views of the records of a store.
-#include <array>
-
 #include "harness/base/json_document.h"
 #include "harness/cli/commands.h"
-#include "harness/figures/figures.h"
 #include "harness/figures/report.h"
-#include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 namespace {
@@ -118,13 +114,13 @@ std::filesystem::path FileOf(const PlotCommand& command) {
 }
 
 /// Loads records, of which there must be some.
-std::vector<Record> LoadSome(const std::filesystem::path& store, const Selection& where = {}) {
+std::vector<Record> LoadSome(const std::filesystem::path& store, const Selection& where = {},
+                             const char* none = "no records") {
   std::vector<Record> records = LoadRecords(store, where);
-  if (records.empty()) Reject("{}: no records", store.string());
+  if (records.empty()) Reject("{}: {}", store.string(), none);
   return records;
 }
 
-/// Throws if a figure could not be written.
 void RequireWritten(const std::optional<std::string>& fault, const std::string& path) {
   if (fault) throw std::runtime_error(*fault);
   Print("wrote {}\n", path);
@@ -132,17 +128,15 @@ void RequireWritten(const std::optional<std::string>& fault, const std::string& 
 
 bool IsFree(const PlotCommand& command) {
   const FreeFigure& free = command.free;
-  if ((free.x + free.y + free.group + free.log).empty() && !free.title && free.labels.empty()) {
-    return false;
-  }
   if (free.x.empty() != free.y.empty()) {
     throw ConfigError(free.y.empty() ? "plot: found --x KEY without --y KEY, expected both"
                                      : "plot: found --y KEY without --x KEY, expected both");
   }
-  if (free.x.empty()) {
+  if (!free.x.empty()) return true;
+  if (!(free.group + free.log).empty() || free.title || !free.labels.empty()) {
     throw ConfigError("plot: --group, --log, --title and --label need --x KEY and --y KEY");
   }
-  return true;
+  return false;
 }
 
 int NothingMatches(const PlotCommand& command) {
@@ -183,12 +177,11 @@ int DrawMany(const ProblemReader& reader, const PlotCommand& command) {
   return DrawFree(points.records(), command);
 }
 
-/// Writes robustness-map.csv, .md and the picture; prints the reason if the picture fails.
+/// Writes robustness-map.csv, .md and the picture.
 int WriteMap(const RobustnessMap& map, const MapCommand& command, const std::string& typed) {
   const std::filesystem::path stem = command.out / "robustness-map";
-  Table cells = MapCellTable(map);
-  AppendProvenance(cells, typed);
-  WriteFileAtomically(stem.string() + ".csv", RenderKept(cells, "csv"));
+  WriteFileAtomically(stem.string() + ".csv",
+                      RenderKept(WithProvenance(MapCellTable(map), typed), "csv"));
   WriteFileAtomically(stem.string() + ".md", MapMarkdown(map, Provenance(typed)));
   const std::string picture = stem.string() + "." + command.format;
   const auto error = WriteMapFigure(picture, map, SizeNamed(command.size));
@@ -197,7 +190,6 @@ int WriteMap(const RobustnessMap& map, const MapCommand& command, const std::str
   return error ? 2 : 0;
 }
 
-/// Draws only the picture, from the map's own CSV.
 int RedrawMap(const MapRules& rules, const MapCommand& command) {
   if (!command.gate.empty() || command.out.empty()) {
     Reject(
@@ -211,7 +203,7 @@ int RedrawMap(const MapRules& rules, const MapCommand& command) {
   return 0;
 }
 
-/// Throws if there is no demand: the gate could not fail, and success would be meaningless.
+/// Throws if there is no demand: the gate could not fail.
 void RequireDemands(const RobustnessMap& map, const std::filesystem::path& rules) {
   for (const auto& group : map.cells) {
     for (const auto& row : group) {
@@ -240,7 +232,7 @@ int PrintTable(const TableCommand& command, const Typed& typed) {
                    : "");
     return 2;
   }
-  AppendProvenance(table, typed.line);
+  table = WithProvenance(std::move(table), typed.line);
   Deliver(on_terminal ? ToScreen(table) : RenderKept(table, command.format), command.out);
   return command.gate.empty() ? 0 : WarningGate(table.rows);
 }
@@ -261,10 +253,8 @@ int Plot(const PlotCommand& command, const Typed&) {
   if (records.empty()) return NothingMatches(command);
   if (is_free) return DrawFree(records, command);
   std::vector<NamedFigure> figures = AllFigures(Filter(records, {Condition{"kind", {"accuracy"}}}));
-  for (NamedFigure& figure :
-       PrecisionFigures(Filter(records, {Condition{"kind", {"precision"}}}))) {
-    figures.push_back(std::move(figure));
-  }
+  std::ranges::move(PrecisionFigures(Filter(records, {Condition{"kind", {"precision"}}})),
+                    std::back_inserter(figures));
   if (figures.empty()) {
     PrintError(
         "{}: no accuracy records with series and none in several scalars match; --x KEY --y KEY "
@@ -284,9 +274,7 @@ int PrintMap(const MapCommand& command, const Typed& typed) {
   VerifyFilesOf(records, StoreFile(command.store));
   const RobustnessMap map = MakeRobustnessMap(rules, records);
   if (!command.gate.empty()) RequireDemands(map, command.rules);
-  Table table = MapTable(map);
-  AppendProvenance(table, typed.line);
-  PrintText(ToScreen(table));
+  PrintText(ToScreen(WithProvenance(MapTable(map), typed.line)));
   const int written = command.out.empty() ? 0 : WriteMap(map, command, typed.line);
   if (command.gate.empty()) return written;
   const std::vector<std::string> broken = BrokenDemands(map);
@@ -295,8 +283,7 @@ int PrintMap(const MapCommand& command, const Typed& typed) {
 }
 
 int PrintVerdicts(const VerdictCommand& command, const Typed& typed) {
-  const std::vector<Record> records = LoadRecords(command.store);
-  if (records.empty()) throw ConfigError(command.store.string() + ": found no records to judge");
+  const std::vector<Record> records = LoadSome(command.store, {}, "found no records to judge");
   RequireOneContent(records, command.store, "check-claims");
   VerifyFilesOf(records, StoreFile(command.store));
   std::vector<ClaimResult> results = Mapped<ClaimResult>(
@@ -309,18 +296,15 @@ int PrintVerdicts(const VerdictCommand& command, const Typed& typed) {
     for (const CheckResult& check : result.checks) {
       const bool is_unmeasured = result.verdict == Verdict::kNotMeasured;
       for (const std::string& text : {is_unmeasured ? check.reason : "", check.remark}) {
-        const std::string note = result.rule.id + ": " + text;
-        if (!text.empty() && !Contains(verdicts.notes, note)) verdicts.notes.push_back(note);
+        if (!text.empty()) AddOnce(verdicts.notes, result.rule.id + ": " + text);
       }
     }
   }
-  AppendProvenance(verdicts, typed.line);
-  PrintText(ToScreen(verdicts) + "\n");
+  PrintText(ToScreen(WithProvenance(std::move(verdicts), typed.line)) + "\n");
   if (!command.out.empty()) Print("wrote {}\n", command.out.string());
   return 0;
 }
 
-/// Writes the page; returns 2 if the store has no records, or this program has no pages.
 int WriteReport(const ReportCommand& command, const Typed& typed) {
   if (kReportScript.empty()) {
     PrintError("report: this program was built without (cmake -DLOOPBENCH_REPORT=ON needs npm)\n");
@@ -347,20 +331,6 @@ int WriteReport(const ReportCommand& command, const Typed& typed) {
   return data.changed.empty() ? 0 : 2;
 }
 
-void WriteWorkPrecision(const WorkPrecision& work_precision, const std::filesystem::path& folder,
-                        const std::string& typed) {
-  const std::string stem = (folder / "work-precision").string();
-  Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
-  Table cheapest = CheapestTable(work_precision);
-  AppendProvenance(rows, typed);
-  AppendProvenance(cheapest, typed);
-  WriteFileAtomically(stem + ".csv", RenderKept(rows, "csv"));
-  WriteFileAtomically(stem + "-overview.csv", RenderKept(cheapest, "csv"));
-  WriteFileAtomically(stem + ".md", WorkPrecisionMarkdown(work_precision, Provenance(typed)));
-}
-
-/// Prints fronts, overview and fairness statement; writes work-precision.csv,
-/// work-precision-overview.csv, work-precision.md and the figures.
 int PrintWorkPrecision(const WorkPrecisionCommand& command, const Typed& typed) {
   const std::vector<Record> records = LoadSome(command.store, command.options.where);
   RequireOneContent(records, command.store, "work-precision");
@@ -369,23 +339,23 @@ int PrintWorkPrecision(const WorkPrecisionCommand& command, const Typed& typed) 
   const std::filesystem::path folder = !command.out.empty() ? command.out
                                        : is_file            ? command.store.parent_path()
                                                             : command.store;
-  WriteWorkPrecision(work_precision, folder, typed.line);
+  const std::string stem = (folder / "work-precision").string();
+  Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
+  WriteFileAtomically(stem + ".csv", RenderKept(WithProvenance(rows, typed.line), "csv"));
+  WriteFileAtomically(stem + "-overview.csv",
+                      RenderKept(WithProvenance(CheapestTable(work_precision), typed.line), "csv"));
+  WriteFileAtomically(stem + ".md", WorkPrecisionMarkdown(work_precision, Provenance(typed.line)));
+  const std::vector<std::string> fairness = FairnessStatement(work_precision);
   if (command.format == "text") {
     const Table fronts = WorkPrecisionTable(work_precision, {.compact = true, .all = command.all});
     PrintText(ToScreen(fronts) + "\n");
-    // which conditions were equal and which were not
     Table overview = OverviewTable(work_precision);
-    overview.notes = FairnessStatement(work_precision);
-    AppendProvenance(overview, typed.line);
-    PrintText(ToScreen(overview) + "\n");
-    const std::string stem = (folder / "work-precision").string();
+    overview.notes = fairness;
+    PrintText(ToScreen(WithProvenance(std::move(overview), typed.line)) + "\n");
     Print("wrote {0}.csv, {0}-overview.csv, {0}.md\n", stem);
   } else {
-    Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
-    for (std::string& line : FairnessStatement(work_precision))
-      rows.notes.push_back(std::move(line));
-    AppendProvenance(rows, typed.line);
-    PrintText(RenderKept(rows, command.format));
+    rows.notes.insert(rows.notes.end(), fairness.begin(), fairness.end());
+    PrintText(RenderKept(WithProvenance(std::move(rows), typed.line), command.format));
   }
   if (!command.draws) return 0;
   return DrawAll(WorkPrecisionFigures(work_precision), folder / "figures", command.figures,

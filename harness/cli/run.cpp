@@ -1,18 +1,8 @@
 // run, merge and estimate: experiments into a store, stores into one, and the time before.
 #include "harness/run/run.h"
 
-#include <fstream>
-#include <iterator>
-#include <set>
-
-#include "harness/base/store.h"
-#include "harness/base/text.h"
 #include "harness/cli/commands.h"
 #include "harness/judge/analysis.h"
-#include "harness/judge/judge.h"
-#include "harness/observers/trajectory.h"
-#include "harness/run/timing.h"
-#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
 namespace {
@@ -45,42 +35,13 @@ struct RunCommand {
         {"--rerun", "Stored cases to run again", &rerun, OneOf({"none", "failed", "all"})},
         GateOption(&gate),
         {"--no-timing", "Skip timings", &no_timing},
-        // the gate judges accuracy runs
-
         {"--timing-only", "Run timings only", &timing_only, Excludes({"--no-timing", "--fail-on"})},
         {"--precision-only", "Run only precision studies (several floating-point types)",
          &precision_only, Excludes({"--no-timing", "--timing-only", "--fail-on"})}};
   }
 };
 
-/// Returns the records of `ids`, in order; other records of the store are ignored.
-std::vector<Record> RecordsOf(const std::vector<std::string>& ids,
-                              const std::vector<Record>& records) {
-  std::map<std::string, const Record*> last;
-  for (const Record& record : records) last[record.Text("id")] = &record;
-  std::vector<Record> asked;
-  for (const std::string& id : ids) asked.push_back(*last.at(id));
-  return WithContents(std::move(asked));
-}
-
-void PrintInterrupted(const RunCommand& command, const ResultStore& store, const Typed& typed) {
-  std::ifstream file(store.file(), std::ios::binary);
-  const auto records =
-      std::count(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>(), '\n');
-  PrintError(
-      "interrupted: {} kept in {}, {} of them of this run; cases under way were "
-      "stopped and left nothing, tables were not written\n",
-      WithCount(records, "record"), store.file().string(), store.appended());
-  if (command.suite.rerun == Rerun::kAll) {
-    PrintError(
-        "to resume, without those that were run again: the same command with --rerun none\n");
-  } else {
-    PrintError("to resume: {}\n", typed.again);
-  }
-}
-
-/// Runs the cases that the store lacks, then writes its tables. If interrupted, prints the number
-/// of kept results and returns 128 + the signal number: 130 for Ctrl-C.
+/// If interrupted, prints the number of kept results and returns 128 + the signal number.
 int RunExperiments(RunCommand& command, const Typed& typed) {
   std::vector<Setting> settings;
   for (const std::string& text : command.settings) settings.push_back(ParseSetting(text));
@@ -119,7 +80,16 @@ int RunExperiments(RunCommand& command, const Typed& typed) {
     try {
       count = RunSuite(workload, command.suite, finished, store);
     } catch (const Interrupted& interrupted) {
-      PrintInterrupted(command, store, typed);
+      std::ifstream file(store.file(), std::ios::binary);
+      const auto records = std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+      PrintError(
+          "interrupted: {} kept in {}, {} of them of this run; cases under way were stopped and "
+          "left nothing, tables were not written\n",
+          WithCount(records, "record"), store.file().string(), store.appended());
+      PrintError("to resume{}\n", command.suite.rerun == Rerun::kAll
+                                      ? ", without those that were run again: the same command "
+                                        "with --rerun none"
+                                      : ": " + typed.again);
       return interrupted.exit_code();
     }
     PrintError(
@@ -135,7 +105,11 @@ int RunExperiments(RunCommand& command, const Typed& typed) {
         out.string(), out.string(), workload.first().problems.front().name);
     return 0;
   }
-  std::vector<Record> records = RecordsOf(count.ids, ReadRecords(out));
+  // of the store only the requested cases
+  std::map<std::string, Record> last;
+  for (Record& record : ReadRecords(out)) last[record.Text("id")] = std::move(record);
+  std::vector<Record> records = WithContents(
+      Mapped<Record>(count.ids, [&last](const std::string& id) { return last.at(id); }));
   SetWarnings(&records);
   WriteTables(records, out, typed.line);
   Print("results in {}\n", out.string());
@@ -169,18 +143,6 @@ std::string SameRun(const Record& record) {
   return text;
 }
 
-/// Returns CPU time [s] of the unperturbed run by SameRun(), from an earlier store.
-std::map<std::string, double> EarlierTimes(const std::filesystem::path& store) {
-  std::map<std::string, double> times;
-  if (store.empty()) return times;
-  for (const Record& record : ReadRecords(store)) {
-    // wall time depends on how many runs shared the processors
-    if (record.Text("kind") != "accuracy" || std::isnan(record.Number("cpu_s"))) continue;
-    times[SameRun(record)] = record.Number("cpu_s");
-  }
-  return times;
-}
-
 /// Returns "1.5 s", "12 min", "3.4 h".
 std::string Duration(double seconds) {
   if (seconds < 0.1) return "less than 0.1 s";
@@ -194,13 +156,27 @@ struct Line : CaseLine {
   double seconds = 0.0;
 };
 
-struct Plan {
-  std::vector<Line> lines;
-  std::size_t cases = 0, runs = 0, references = 0, rungs = 0, timings = 0, known = 0;
-  double seconds = 0.0, reference_seconds = 0.0, ladder_seconds = 0.0, timing_seconds = 0.0;
+struct Work {
+  std::size_t count = 0;
+  double seconds = 0.0;
+
+  void Add(std::size_t more, double more_seconds) {
+    count += more;
+    seconds += more_seconds;
+  }
+  void Scale(double factor) {
+    count = static_cast<std::size_t>(std::llround(factor * static_cast<double>(count)));
+    seconds *= factor;
+  }
 };
 
-/// Makes a plan; in a long sweep some combinations represent all.
+struct Plan {
+  std::vector<Line> lines;
+  Work runs, references, rungs, timings;
+  std::size_t cases = 0, known = 0;
+};
+
+/// In a long sweep some combinations represent all.
 Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* estimate) {
   Plan plan;
   // seconds and number of the examined cases of each line: all cases, or some of a long sweep
@@ -208,7 +184,13 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
   const std::vector<Experiment>& experiments = overview.experiments;
   std::set<std::string> references;
   std::size_t asked_references = 0;
-  const std::map<std::string, double> earlier = EarlierTimes(command.from);
+  std::map<std::string, double> earlier;  // CPU times [s] of unperturbed runs by SameRun()
+  for (const Record& record :
+       command.from.empty() ? std::vector<Record>() : ReadRecords(command.from)) {
+    // wall time depends on how many runs shared the processors
+    if (record.Text("kind") != "accuracy" || std::isnan(record.Number("cpu_s"))) continue;
+    earlier[SameRun(record)] = record.Number("cpu_s");
+  }
   std::vector<std::function<void()>> work;
   std::vector<Progress::Piece> pieces;
   const auto add = [&](const std::string& label, std::function<void()> one) {
@@ -229,21 +211,17 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
         ++asked_references;
         const ReferenceCase reference = ReferenceOf(experiments[i], one, "results.jsonl");
         if (!references.insert(reference.id).second) return;
-        plan.reference_seconds += estimate->OfReference(i, reference);
+        plan.references.Add(1, estimate->OfReference(i, reference));
       });
     }
     for (const LadderGroup& ladder : LadderGroups(experiment, command.files.filter)) {
-      add("in several scalars", [&, i, ladder] {
-        plan.ladder_seconds += estimate->OfLadder(i, ladder);
-        plan.rungs += ladder.keys.size();
-      });
+      add("in several scalars",
+          [&, i, ladder] { plan.rungs.Add(ladder.keys.size(), estimate->OfLadder(i, ladder)); });
     }
     if (command.no_timing) continue;
     for (const TimingGroup& group : TimingGroups(experiment, command.files.filter)) {
-      add("timings of " + group.name, [&, i, group] {
-        plan.timing_seconds += estimate->OfTiming(i, group);
-        plan.timings += group.cases.size();
-      });
+      add("timings of " + group.name,
+          [&, i, group] { plan.timings.Add(group.cases.size(), estimate->OfTiming(i, group)); });
     }
   }
   Progress progress("estimate", std::move(pieces), 1);
@@ -252,28 +230,23 @@ Plan MakePlan(const Overview& overview, const PlanCommand& command, Estimate* es
     work[i]();
     progress.Done(i);
   }
-  plan.references = references.size();
   for (const CaseLine& line : overview.lines) {
     const auto& [seconds, cases] = times[line.mechanism + "\n" + line.method];
     plan.lines.push_back({line, cases == 0 ? 0.0
                                            : seconds * static_cast<double>(line.cases) /
                                                  static_cast<double>(cases)});
     plan.cases += line.cases;
-    plan.runs += line.runs;
-    plan.seconds += plan.lines.back().seconds;
+    plan.runs.Add(line.runs, plan.lines.back().seconds);
   }
   if (overview.is_sample) {
     const double all =
         static_cast<double>(overview.combinations) / static_cast<double>(experiments.size());
-    const auto scale = [all](std::size_t* count, double* seconds) {
-      *count = static_cast<std::size_t>(std::llround(all * static_cast<double>(*count)));
-      *seconds *= all;
-    };
-    scale(&plan.rungs, &plan.ladder_seconds);
-    scale(&plan.timings, &plan.timing_seconds);
+    plan.rungs.Scale(all);
+    plan.timings.Scale(all);
     // combinations of one motion share their reference: then there are no more than were found
-    const bool is_one_each = plan.references >= std::min(asked_references, experiments.size());
-    if (is_one_each) scale(&plan.references, &plan.reference_seconds);
+    if (references.size() >= std::min(asked_references, experiments.size())) {
+      plan.references.Scale(all);
+    }
   }
   return plan;
 }
@@ -302,17 +275,18 @@ void PrintPlan(const Overview& overview, const Plan& plan, const PlanCommand& co
     Print("Pilot run stopped: {}. Its cases are estimated by its CPU time.\n", one);
   }
   Print("{}, {} (ensembles in addition to the unperturbed run), {}\n",
-        WithCount(plan.cases, "case"), WithCount(plan.runs, "run"),
-        WithCount(plan.timings, "timing"));
-  Print("estimated time: accuracy {} with one job", Duration(plan.seconds));
-  if (plan.references > 0) {
-    Print(", {} {}", WithCount(plan.references, "reference"), Duration(plan.reference_seconds));
+        WithCount(plan.cases, "case"), WithCount(plan.runs.count, "run"),
+        WithCount(plan.timings.count, "timing"));
+  Print("estimated time: accuracy {} with one job", Duration(plan.runs.seconds));
+  if (plan.references.count > 0) {
+    Print(", {} {}", WithCount(plan.references.count, "reference"),
+          Duration(plan.references.seconds));
   }
-  if (plan.rungs > 0) {
-    Print(", {} in several floating-point types {}", WithCount(plan.rungs, "run"),
-          Duration(plan.ladder_seconds));
+  if (plan.rungs.count > 0) {
+    Print(", {} in several floating-point types {}", WithCount(plan.rungs.count, "run"),
+          Duration(plan.rungs.seconds));
   }
-  if (plan.timings > 0) Print(", timings {}", Duration(plan.timing_seconds));
+  if (plan.timings.count > 0) Print(", timings {}", Duration(plan.timings.seconds));
   Print("\n");
   std::string source;
   if (!command.from.empty()) {
@@ -339,12 +313,12 @@ JsonObject PlanDocument(const std::filesystem::path& path, const Overview& overv
                   line.runs, "seconds", line.seconds);
   });
   return JsonOf("file", path, "name", overview.experiments.front().name, "combinations",
-                overview.combinations, "cases", plan.cases, "runs", plan.runs, "accuracy_seconds",
-                plan.seconds, "references", plan.references, "reference_seconds",
-                plan.reference_seconds, "precision_runs", plan.rungs, "precision_seconds",
-                plan.ladder_seconds, "timings", plan.timings, "timing_seconds", plan.timing_seconds,
-                "cases_known", plan.known, "pilots", estimate.pilots(), "pilots_cut_off",
-                estimate.cut_off(), "lines", lines);
+                overview.combinations, "cases", plan.cases, "runs", plan.runs.count,
+                "accuracy_seconds", plan.runs.seconds, "references", plan.references.count,
+                "reference_seconds", plan.references.seconds, "precision_runs", plan.rungs.count,
+                "precision_seconds", plan.rungs.seconds, "timings", plan.timings.count,
+                "timing_seconds", plan.timings.seconds, "cases_known", plan.known, "pilots",
+                estimate.pilots(), "pilots_cut_off", estimate.cut_off(), "lines", lines);
 }
 
 int PrintPlans(const PlanCommand& command, const Typed&) try {
@@ -357,7 +331,7 @@ int PrintPlans(const PlanCommand& command, const Typed&) try {
     RequirePeers(overview.experiments);
     Estimate estimate(overview.experiments, Estimate::Budget(), command.files.filter);
     Plan plan = MakePlan(overview, command, &estimate);
-    plan.seconds += ThreadCpuSeconds() - begin;  // a run reads and expands the file too
+    plan.runs.seconds += ThreadCpuSeconds() - begin;  // a run reads and expands the file too
     if (command.json) {
       documents.push_back(PlanDocument(path, overview, plan, estimate));
     } else {

@@ -1,6 +1,4 @@
 // simplify: models of one problem, from the full one to the simplest.
-#include <charconv>
-
 #include "harness/cli/commands.h"
 #include "harness/run/run.h"
 #include "mechanism/model/mechanism.h"
@@ -9,27 +7,22 @@
 namespace loopbench::harness {
 namespace {
 
-/// Returns names of ways to lump masses, in the order of Lumping.
-const std::vector<std::string>& LumpingNames() {
-  static const std::vector<std::string> names = {"centre-of-mass", "half", "none"};
-  return names;
-}
+/// Names of ways to lump masses, in the order of Lumping.
+const std::vector<std::string> kLumpings = {"centre-of-mass", "half", "none"};
 
 /// Returns the default limits: "light-links 0.01, ...".
 std::string LimitsText() {
-  std::string text;
+  std::vector<std::string> limits;
   for (const SimplificationRule& idea : SimplificationRules()) {
-    if (idea.limit == nullptr) continue;
-    text +=
-        fmt::format("{}{}={}", text.empty() ? "" : ", ", idea.name, SimplifyOptions{}.*idea.limit);
+    if (idea.limit != nullptr) AddNote(limits, "{}={}", idea.name, SimplifyOptions{}.*idea.limit);
   }
-  return text;
+  return fmt::format("{}", fmt::join(limits, ", "));
 }
 
 struct SimplifyCommand {
   std::filesystem::path mechanism, store, out;
   std::vector<std::string> only, thresholds;
-  std::string lumping = LumpingNames().front();
+  std::string lumping = kLumpings.front();
   double short_run = 1.0, horizon = 10.0, errors = 0.0;  ///< [s]
   double accept = 0.0;                                   ///< [m]
   bool assembled = false, force = false, only_list = false, all = false;
@@ -41,7 +34,7 @@ struct SimplifyCommand {
         {"--list", "List possible simplifications (default)", &only_list},
         {"--only", "Rules to apply: NAME[,NAME]", &only, kSplits},
         {"--threshold", "Threshold of a rule, NAME=VALUE; defaults: " + LimitsText(), &thresholds},
-        {"--lump-mass", "New place of a light link's mass", &lumping, OneOf(LumpingNames())},
+        {"--lump-mass", "New place of a light link's mass", &lumping, OneOf(kLumpings)},
         {"--trial-duration", "Duration of the trial run that finds nearly rigid parts [s]; 0: none",
          &short_run, From(0.0, 1e6)},
         {"--verify", "Run all models for this time [s] and report errors of their points; 0: no",
@@ -66,17 +59,13 @@ struct SimplifyCommand {
   }
 };
 
-/// Returns names of rules, and of the rules with a limit.
-std::vector<std::string> IdeaNames() {
-  return Mapped<std::string>(SimplificationRules(), &SimplificationRule::name);
-}
-
 const SimplificationRule& IdeaNamed(const std::string& name, const std::string& option) {
   const auto found = std::ranges::find(SimplificationRules(), name, &SimplificationRule::name);
   if (found != SimplificationRules().end()) return *found;
-  const std::string nearest = NearestSpelling(name, IdeaNames());
-  Reject("{} {}: found \"{}\", expected one of {}{}", option, name, name,
-         fmt::join(IdeaNames(), ", "),
+  std::vector<std::string> names =
+      Mapped<std::string>(SimplificationRules(), &SimplificationRule::name);
+  const std::string nearest = NearestSpelling(name, names);
+  Reject("{} {}: found \"{}\", expected one of {}{}", option, name, name, fmt::join(names, ", "),
          nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest));
 }
 
@@ -84,16 +73,15 @@ std::vector<const SimplificationRule*> Chosen(const std::vector<std::string>& on
   for (const std::string& name : only) IdeaNamed(name, "--only");
   std::vector<const SimplificationRule*> chosen;
   for (const SimplificationRule& idea : SimplificationRules()) {
-    const bool wanted = only.empty() || Contains(only, idea.name);
-    if (wanted) chosen.push_back(&idea);
+    if (only.empty() || Contains(only, idea.name)) chosen.push_back(&idea);
   }
   return chosen;
 }
 
 SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
   SimplifyOptions options;
-  options.lumping = static_cast<Lumping>(std::ranges::find(LumpingNames(), command.lumping) -
-                                         LumpingNames().begin());
+  options.lumping =
+      static_cast<Lumping>(std::ranges::find(kLumpings, command.lumping) - kLumpings.begin());
   for (const std::string& text : command.thresholds) {
     const std::size_t equals = text.find('=');
     if (equals == std::string::npos) {
@@ -115,32 +103,26 @@ SimplifyOptions LimitsSaid(const SimplifyCommand& command) {
   return options;
 }
 
-Table CandidateTable(const SimplificationRule& idea, const Simplified& simplified) {
-  Table table{.columns = Columns("what=candidate, number, taken, why=because")};
-  for (const Candidate& candidate : simplified.candidates) {
-    AddRow({candidate.what,
-            std::isnan(candidate.number) ? "" : fmt::format("{:.3g}", candidate.number),
-            idea.limit == nullptr ? ""
-            : candidate.taken     ? "yes"
-                                  : "no",
-            candidate.why},
-           &table);
-  }
-  return table;
-}
-
 void PrintIdea(const SimplificationRule& idea, const Simplified& simplified,
                const SimplifyOptions& options, const ExplainView& view) {
   const std::string title = fmt::format("{}: {}{}", idea.name, idea.sentence,
                                         idea.is_exact ? "" : " (changes the motion)");
-  if (simplified.candidates.empty()) {
+  Table table{.columns = Columns("what=candidate, number, taken, why=because")};
+  for (const Candidate& candidate : simplified.candidates) {
+    const char* taken = candidate.taken ? "yes" : "no";
+    AddRow({candidate.what,
+            std::isnan(candidate.number) ? "" : fmt::format("{:.3g}", candidate.number),
+            idea.limit == nullptr ? "" : taken, candidate.why},
+           &table);
+  }
+  if (table.rows.empty()) {
     Print("\n{}\n", title);
   } else {
-    PrintSection(title, CandidateTable(idea, simplified), view);
-  }
-  if (idea.limit != nullptr && !simplified.candidates.empty()) {
-    Print("  number: {}; taken {} {}\n", idea.number, idea.is_least ? "from" : "up to",
-          options.*idea.limit);
+    PrintSection(title, table, view);
+    if (idea.limit != nullptr) {
+      Print("  number: {}; taken {} {}\n", idea.number, idea.is_least ? "from" : "up to",
+            options.*idea.limit);
+    }
   }
   if (!simplified.applies()) Print("  Does not apply: {}.\n", simplified.why_not);
   for (const std::string& lost : simplified.dropped) Print("  Removed: {}.\n", lost);
@@ -149,24 +131,22 @@ void PrintIdea(const SimplificationRule& idea, const Simplified& simplified,
   }
 }
 
-int SpeedsOf(const MechanismDescription& description) {
-  return description.space == SpaceKind::kPlanar
-             ? Mechanism<Planar, double>(description, Coordinates::kJoint).num_u()
-             : Mechanism<Spatial, double>(description, Coordinates::kJoint).num_u();
-}
-
 void PrintModels(const ProblemModels& ladder, const ExplainView& view) {
   Table table{.columns = Columns(
                   "name=model, motion, space, bodies:integer, joints:integer, speeds:integer, "
                   "error=model error [m], worst=at, evaluations:integer, removed")};
   const MechanismDescription& whole = ladder.models.front().description;
   for (const ProblemModel& model : ladder.models) {
-    AddRow({model.name, model.is_exact ? "the same" : "changed", model.description.space,
-            model.description.bodies.size() - 1, model.description.joints.size(),
-            SpeedsOf(model.description), model.error, model.worst,
-            model.rhs_evaluations < 0 ? Value() : Value(model.rhs_evaluations),
-            fmt::format("{}", fmt::join(RemovedBodies(whole, model.description), ", "))},
-           &table);
+    const int speeds =
+        model.description.space == SpaceKind::kPlanar
+            ? Mechanism<Planar, double>(model.description, Coordinates::kJoint).num_u()
+            : Mechanism<Spatial, double>(model.description, Coordinates::kJoint).num_u();
+    AddRow(
+        {model.name, model.is_exact ? "the same" : "changed", model.description.space,
+         model.description.bodies.size() - 1, model.description.joints.size(), speeds, model.error,
+         model.worst, model.rhs_evaluations < 0 ? Value() : Value(model.rhs_evaluations),
+         fmt::format("{}", fmt::join(RemovedBodies(whole, model.description), ", "))},
+        &table);
   }
   PrintSection("Models", table, view);
   Print(
@@ -175,18 +155,6 @@ void PrintModels(const ProblemModels& ladder, const ExplainView& view) {
     Print(
         "  model error: the largest distance of a named point from its place in the full model.\n");
   }
-}
-
-/// Reads the full model, which must have a start.
-MechanismFile ReadWhole(const SimplifyCommand& command) {
-  MechanismFile file = ReadMechanism(command.mechanism);
-  std::string why;
-  MechanismDescription assembled = WithAssembledStart(file.description, &why);
-  if (!why.empty()) {
-    Reject("{}: its initial assembly fails: {}", command.mechanism.string(), why);
-  }
-  if (command.assembled) file.description = std::move(assembled);
-  return file;
 }
 
 /// Returns `part` of the available CPU time.
@@ -210,19 +178,6 @@ ShortRun LookAt(const MechanismDescription& whole,
   return run;
 }
 
-void PrintIdeas(const ProblemModels& ladder, const SimplifyOptions& options,
-                const ExplainView& view) {
-  std::vector<std::string_view> idle;
-  for (const auto& [idea, simplified] : ladder.ideas) {
-    if (simplified.why_not == kNothingOfTheKind) {
-      idle.push_back(idea->name);
-    } else {
-      PrintIdea(*idea, simplified, options, view);
-    }
-  }
-  if (!idle.empty()) Print("\nThere is nothing for: {}.\n", fmt::join(idle, ", "));
-}
-
 /// Stores and prints the error and cost of each model.
 void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
                    const ProblemModels& ladder, const ExplainView& view) {
@@ -240,18 +195,29 @@ void PrintVerdicts(const SimplifyCommand& command, const MechanismFile& file,
   Print("  {} in {}\n", WithCount(records.size(), "record"), store.file().string());
 }
 
-/// Lists the possible simplifications of each rule. With a folder, writes a mechanism file for each
-/// applicable rule, for all combined and for the full model, an experiment and a summary page.
-/// Returns 2 if the start cannot be assembled, or there is nothing to write.
 int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
                  const std::string& typed) {
   const std::vector<const SimplificationRule*> ideas = Chosen(command.only);
   const SimplifyOptions options = LimitsSaid(command);
-  const MechanismFile file = ReadWhole(command);
+  MechanismFile file = ReadMechanism(command.mechanism);
+  std::string why;
+  MechanismDescription assembled = WithAssembledStart(file.description, &why);
+  if (!why.empty()) {
+    Reject("{}: its initial assembly fails: {}", command.mechanism.string(), why);
+  }
+  if (command.assembled) file.description = std::move(assembled);
   Print("{} ({})\n", file.description.name, command.mechanism.string());
   const ShortRun run = LookAt(file.description, ideas, command);
   ProblemModels ladder = MakeModels(file, ideas, run, options);
-  PrintIdeas(ladder, options, view);
+  std::vector<std::string_view> idle;
+  for (const auto& [idea, simplified] : ladder.ideas) {
+    if (simplified.why_not == kNothingOfTheKind) {
+      idle.push_back(idea->name);
+    } else {
+      PrintIdea(*idea, simplified, options, view);
+    }
+  }
+  if (!idle.empty()) Print("\nThere is nothing for: {}.\n", fmt::join(idle, ", "));
   const bool any = ladder.models.size() > 1;
   if (!command.store.empty()) {
     PrintVerdicts(command, file, ladder, view);
@@ -275,16 +241,6 @@ int SimplifyFile(const SimplifyCommand& command, const ExplainView& view,
   return 0;
 }
 
-/// Returns a table of the rules with their thresholds.
-std::string RuleList() {
-  std::string rules = "Rules; only those with a threshold change the motion:\n";
-  for (const SimplificationRule& rule : SimplificationRules()) {
-    rules += fmt::format("  {:16} {}\n", rule.name, rule.sentence);
-    if (rule.limit != nullptr) rules += fmt::format("  {:16} threshold: {}\n", "", rule.number);
-  }
-  return rules;
-}
-
 int SimplifyInChild(const SimplifyCommand& command, const Typed& typed) {
   return PrintFromChild(command.mechanism.string(), command.limits,
                         [&] { return SimplifyFile(command, {.all = command.all}, typed.line); });
@@ -293,8 +249,13 @@ int SimplifyInChild(const SimplifyCommand& command, const Typed& typed) {
 }  // namespace
 
 void AddSimplify(Commands& commands) {
+  std::string rules = "Rules; only those with a threshold change the motion:\n";
+  for (const SimplificationRule& rule : SimplificationRules()) {
+    rules += fmt::format("  {:16} {}\n", rule.name, rule.sentence);
+    if (rule.limit != nullptr) rules += fmt::format("  {:16} threshold: {}\n", "", rule.number);
+  }
   commands.Add("simplify", "Generate simpler models of a mechanism and measure their errors",
-               SimplifyInChild, RuleList() + "\n");
+               SimplifyInChild, rules + "\n");
 }
 
 }  // namespace loopbench::harness

@@ -1,12 +1,4 @@
 // trajectory: output of a run over time, or an external trajectory checked against a mechanism.
-#include "harness/observers/trajectory.h"
-
-#include <array>
-#include <iterator>
-#include <numbers>
-#include <ranges>
-#include <set>
-
 #include "harness/base/json_document.h"
 #include "harness/cli/commands.h"
 
@@ -37,14 +29,9 @@ struct TrajectoryCommand {
   }
 };
 
-Value Maybe(const LargestAt& largest) {
-  return largest.is_known ? Value(largest.value) : Value(std::monostate());
-}
-Value When(const LargestAt& largest) {
-  return largest.is_known ? Value(largest.t) : Value(std::monostate());
-}
+Value Maybe(const LargestAt& largest) { return largest.is_known ? Value(largest.value) : Value(); }
+Value When(const LargestAt& largest) { return largest.is_known ? Value(largest.t) : Value(); }
 
-/// Returns the requested columns, including t.
 std::vector<std::size_t> Chosen(const TrajectoryReader& reader, const TrajectoryCommand& command) {
   std::vector<std::size_t> chosen;
   const auto& columns = reader.columns();
@@ -94,38 +81,24 @@ int ExportOne(const std::filesystem::path& from, const std::filesystem::path& to
   return 0;
 }
 
-/// Returns true if the file is unchanged since its run; else prints the reason.
-bool IsVerified(const Record& record, const std::filesystem::path& file) try {
-  VerifyTrajectory(record, file);
-  return true;
-} catch (const ChangedFile& changed) {
-  PrintError("{}\n", changed.what());
-  return false;
-}
-
-/// Returns the sweep parameters of a case and their values.
-std::vector<std::pair<std::string, std::string>> ParametersOf(const Record& record,
-                                                              const std::vector<Record>& records) {
-  std::vector<std::pair<std::string, std::string>> parameters;
-  for (const TableColumn& parameter : WithParameters({}, records)) {
-    const std::string text = record.Text(parameter.key);
-    if (parameter.key != "step" && !text.empty()) parameters.emplace_back(parameter.key, text);
-  }
-  return parameters;
-}
-
-/// Returns the name of a case's file.
-std::string NameOf(const Record& record,
-                   const std::vector<std::pair<std::string, std::string>>& parameters) {
-  std::string name;
+/// Writes the trajectory of a case of `records` into --out.
+void ExportCase(const Record& record, const std::vector<Record>& records,
+                const std::filesystem::path& from, const TrajectoryCommand& command) {
+  std::vector<std::string> words, notes;
   for (const char* key : {"mechanism", "formulation", "enforcement", "coordinates", "solver",
                           "integrator", "rtol", "step", "horizon"}) {
-    if (!record.Text(key).empty()) name += (name.empty() ? "" : "-") + record.Text(key);
+    words.push_back(record.Text(key));
   }
-  for (const auto& [key, value] : parameters) name += fmt::format("-{}-{}", key, value);
-  if (const std::string content = record.Text("config_hash"); !content.empty())
-    name += "-" + content;
-  return FileName(name);
+  for (const TableColumn& parameter : WithParameters({}, records)) {
+    const std::string text = record.Text(parameter.key);
+    if (parameter.key == "step" || text.empty()) continue;
+    AddNote(notes, "{}: {}", parameter.key, text);
+    AddNote(words, "{}-{}", parameter.key, text);
+  }
+  words.push_back(record.Text("config_hash"));
+  std::erase(words, "");
+  const std::string name = FileName(fmt::format("{}", fmt::join(words, "-")));
+  ExportOne(from, command.out / (name + "." + command.format), command, notes);
 }
 
 int OfStore(const TrajectoryCommand& command, const std::string& typed) {
@@ -153,20 +126,20 @@ int OfStore(const TrajectoryCommand& command, const std::string& typed) {
       PrintError("{}: missing; run --rerun all writes it\n",
                  (file.parent_path() / "trajectories" / record.Text("trajectory")).string());
       code = 2;
-    } else if (!IsVerified(record, from)) {
-      code = 2;
-    } else if (!command.out.empty()) {
-      const auto parameters = ParametersOf(record, records);
-      std::vector<std::string> notes;
-      for (const auto& [key, value] : parameters) AddNote(notes, "{}: {}", key, value);
-      ExportOne(from, command.out / (NameOf(record, parameters) + "." + command.format), command,
-                notes);
+      continue;
     }
+    try {
+      VerifyTrajectory(record, from);
+    } catch (const ChangedFile& changed) {
+      PrintError("{}\n", changed.what());
+      code = 2;
+      continue;
+    }
+    if (!command.out.empty()) ExportCase(record, records, from, command);
   }
   if (command.out.empty()) {
     table.notes = {"files are in " + (file.parent_path() / "trajectories").string()};
-    AppendProvenance(table, typed);
-    PrintText(ToScreen(table) + "\n");
+    PrintText(ToScreen(WithProvenance(std::move(table), typed)) + "\n");
   }
   return code;
 }
@@ -217,8 +190,7 @@ void PrintCheck(const TrajectoryCommand& command, const std::string& typed) {
   for (const std::string& label : check.unknown) {
     table.notes.push_back("not of this mechanism, passed over: " + label);
   }
-  AppendProvenance(table, typed);
-  PrintText(ToScreen(table) + "\n");
+  PrintText(ToScreen(WithProvenance(std::move(table), typed)) + "\n");
 }
 
 /// Returns true for positions and speeds, which every row has. Forces and work may be unknown.
@@ -279,7 +251,7 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   for (std::size_t row = 0; row < theirs.rows(); ++row) {
     bool is_between = false;
     ValueAt(ours, ours.time, theirs.At(row, theirs.time), &is_between);
-    if (is_between) ++between;
+    between += is_between ? 1 : 0;
   }
   std::vector<std::string> whole_turns;
   for (const SharedColumn& column : shared) {
@@ -323,8 +295,7 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
         between, theirs.rows(), command.ours.string());
   }
   std::ranges::move(whole_turns, std::back_inserter(table.notes));
-  AppendProvenance(table, typed);
-  PrintText(ToScreen(table) + "\n");
+  PrintText(ToScreen(WithProvenance(std::move(table), typed)) + "\n");
   if (command.figure.empty()) return 0;
   // one axis has one unit
   std::vector<SharedColumn> drawn;
@@ -340,8 +311,6 @@ int LayBeside(const TrajectoryCommand& command, const std::string& typed) {
   return 0;
 }
 
-/// Lists the trajectories of a store; writes them to `out`; checks one against a mechanism;
-/// compares it with the trajectory `ours`.
 int ShowTrajectories(const TrajectoryCommand& command, const Typed& typed) {
   const bool is_store = command.source.extension() != ".csv";
   if (!command.columns.empty() && command.out.empty() && command.ours.empty()) {

@@ -3,7 +3,6 @@
 
 #include <span>
 #include <stdexcept>
-#include <string>
 
 #include "harness/config/options.h"
 

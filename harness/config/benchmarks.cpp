@@ -2,21 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <set>
 #include <stdexcept>
 #include <system_error>
 
-#include "harness/base/fields.h"
 #include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
-#include "harness/config/formulations.h"
-#include "harness/config/mechanism_reader.h"
-#include "harness/config/options.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
-#include "mechanism/simplify/compile.h"
 
 namespace loopbench::harness {
 namespace {
@@ -30,69 +24,19 @@ MechanismDescription Started(MechanismDescription description, int size) {
   return description;
 }
 
-}  // namespace
-
-const std::vector<SizedFamily>& SizedFamilies() {
-  // the smallest loops have three bars in the plane and six in space
-  static const std::vector<SizedFamily> all = {
-      {"chain", 3, kLargest, "bars of a closed chain", [](int n) { return Started(Chain(n), n); }},
-      {"ladder", 1, kLargest, "windows in a row", [](int n) { return Ladder(n, 1.0, 1.0); }},
-      // storey angles start at 0.4 rad and increase by 0.1 rad: the 25th is 2.8 rad, the 29th would
-      // be flat
-      {"grid", 1, 25, "storeys of as many windows", [](int n) { return Grid(n, n, 0.4, 0.5); }},
-      {"tree", 1, kLargest, "bars of a binary tree", [](int n) { return Tree(n, 0.1); }},
-      {"arm", 1, kLargest, "bars in space, with axes of all directions",
-       [](int n) { return Started(Arm(n, false), n); }},
-      {"ring", 6, kLargest, "the same in a closed loop",
-       [](int n) { return Started(Arm(n, true), n); }}};
-  return all;
-}
-
-std::vector<std::string> NamesOfSizedFamilies() {
-  return Mapped<std::string>(SizedFamilies(), &SizedFamily::name);
-}
-
-std::string TextOfSizedFamilies() {
-  std::string text = "Meaning of a size:";
-  for (const SizedFamily& family : SizedFamilies()) {
-    text += fmt::format("{} {} ({}, from {})", &family == &SizedFamilies().front() ? "" : ",",
-                        family.name, family.of_what, family.smallest);
-  }
-  return text + ".";
-}
-
-const SizedFamily& SizedFamilyOf(const std::string& name) {
-  const auto at = std::ranges::find(SizedFamilies(), name, &SizedFamily::name);
-  if (at == SizedFamilies().end()) throw std::invalid_argument("no family \"" + name + "\"");
-  return *at;
-}
-
-MechanismDescription BenchmarkMember::Make() const {
-  return family.empty() ? description : SizedFamilyOf(family).make(size);
-}
-
-std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Method& method) {
-  return std::string(kNames<BenchmarkKind>[static_cast<std::size_t>(kind)]) + "/" + member.name +
-         "/" + ToString(method);
-}
-namespace {
-
 std::vector<BenchmarkMember> ReadBenchmarkMechanisms(const JsonNode& node,
-                                                     const std::filesystem::path& folder,
-                                                     ErrorList* errors) {
+                                                     const std::filesystem::path& folder) {
   std::vector<BenchmarkMember> members;
   for (const JsonNode& element : node.OneOrMore("mechanism files")) {
     const std::string named = element.Text();
     const std::filesystem::path path = (folder / named).lexically_normal();
-    if (named.empty() || !ExpectFile(element, path, "a mechanism file")) continue;
-    try {
+    if (named.empty()) continue;
+    ReadNamedFile(element, path, "a mechanism file", [&] {
       BenchmarkMember member;
       member.description = ReadMechanism(path).description;
       member.name = member.description.name;
       members.push_back(std::move(member));
-    } catch (const ConfigError& mistakes) {
-      errors->AddText(mistakes.what());
-    }
+    });
   }
   return members;
 }
@@ -156,7 +100,7 @@ void ReadMembers(const JsonNode& node, GroupInFile& group) {
   if (mechanisms && family) {
     family->Fail("no \"family\" beside \"mechanisms\"; make two groups");
   } else if (mechanisms) {
-    group.members = ReadBenchmarkMechanisms(*mechanisms, group.folder, &node.errors());
+    group.members = ReadBenchmarkMechanisms(*mechanisms, group.folder);
     if (const auto sizes = node.Optional("sizes")) sizes->Fail("no \"sizes\" without a \"family\"");
   } else if (family) {
     group.members = ReadBenchmarkFamily(*family, node);
@@ -186,7 +130,7 @@ const Fields<GroupInFile>& GroupFields() {
        {"preprocess", Bool(&GroupInFile::compile),
         "If true, the members' parts after all simplifications replace the members."},
        {"", By(Json::object(), ChangeMembers)},
-       {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>(), "a measured quantity"),
+       {"measure", Choices(&BenchmarkGroup::kinds, NamesOf<BenchmarkKind>, "a measured quantity"),
         "Right-hand sides, integrator steps, or both.", "\"rhs\", \"step\" or both"},
        {"methods", Methods(&BenchmarkGroup::methods), "Methods that impose the loop constraints.",
         "an array of methods"}});
@@ -283,6 +227,50 @@ const Fields<BenchmarkSet>& BenchmarkFields() {
 }
 
 }  // namespace
+
+const std::vector<SizedFamily>& SizedFamilies() {
+  // the smallest loops have three bars in the plane and six in space
+  static const std::vector<SizedFamily> all = {
+      {"chain", 3, kLargest, "bars of a closed chain", [](int n) { return Started(Chain(n), n); }},
+      {"ladder", 1, kLargest, "windows in a row", [](int n) { return Ladder(n, 1.0, 1.0); }},
+      // storey angles start at 0.4 rad and increase by 0.1 rad: the 25th is 2.8 rad, the 29th would
+      // be flat
+      {"grid", 1, 25, "storeys of as many windows", [](int n) { return Grid(n, n, 0.4, 0.5); }},
+      {"tree", 1, kLargest, "bars of a binary tree", [](int n) { return Tree(n, 0.1); }},
+      {"arm", 1, kLargest, "bars in space, with axes of all directions",
+       [](int n) { return Started(Arm(n, false), n); }},
+      {"ring", 6, kLargest, "the same in a closed loop",
+       [](int n) { return Started(Arm(n, true), n); }}};
+  return all;
+}
+
+std::vector<std::string> NamesOfSizedFamilies() {
+  return Mapped<std::string>(SizedFamilies(), &SizedFamily::name);
+}
+
+std::string TextOfSizedFamilies() {
+  std::string text = "Meaning of a size:";
+  for (const SizedFamily& family : SizedFamilies()) {
+    text += fmt::format("{} {} ({}, from {})", &family == &SizedFamilies().front() ? "" : ",",
+                        family.name, family.of_what, family.smallest);
+  }
+  return text + ".";
+}
+
+const SizedFamily& SizedFamilyOf(const std::string& name) {
+  const auto at = std::ranges::find(SizedFamilies(), name, &SizedFamily::name);
+  if (at == SizedFamilies().end()) throw std::invalid_argument("no family \"" + name + "\"");
+  return *at;
+}
+
+MechanismDescription BenchmarkMember::Make() const {
+  return family.empty() ? description : SizedFamilyOf(family).make(size);
+}
+
+std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Method& method) {
+  return std::string(kNames<BenchmarkKind>[static_cast<std::size_t>(kind)]) + "/" + member.name +
+         "/" + ToString(method);
+}
 
 Json BenchmarksSchema() { return BenchmarkFields().OwnSchema(); }
 

@@ -12,9 +12,8 @@
 
 namespace loopbench::harness {
 
-// Families of mechanisms of any size (mechanism/description/library.h), for benchmarks and for
-// timings of experiments.
-
+/// Family of mechanisms of any size (mechanism/description/library.h), for benchmarks and for
+/// timings of experiments.
 struct SizedFamily {
   std::string name;
   int smallest, largest;
@@ -30,9 +29,6 @@ std::string TextOfSizedFamilies();
 
 /// Returns the family of that name, which must exist.
 const SizedFamily& SizedFamilyOf(const std::string& name);
-
-// Benchmarks of loopbench_bench and loopbench_count: mechanisms, families, methods, and hashes of
-// the states of measurement. Plain data; benchmarks.h fills it.
 
 enum class BenchmarkKind {
   kRhs,   ///< one right-hand side
@@ -75,17 +71,9 @@ struct BenchmarkSet {
 /// "rhs/chain/10/odca/acceleration/joint/rank-revealing".
 std::string BenchmarkName(BenchmarkKind kind, const BenchmarkMember& member, const Method& method);
 
-// Reads benchmarks (configs/benchmarks/default.json):
-//   {"name", "comment", "states", "integrator", "step",
-//    "groups": [{"mechanisms": [path, ...]  or  "family": "chain|ladder|grid", "sizes": [...],
-//                "in_space": false, "preprocess": false,
-//                "measure": ["rhs", "step"], "methods": [...]}]}
-// Paths are relative to the file; methods are as in experiments. "states" names a file of hashes,
-// written by loopbench_bench --save-states:
-//   {"<member>/<coordinates>": "<16 hexadecimal digits>"}
-
-/// Reads the file with its mechanisms and states. Throws ConfigError with all errors, each with
-/// file, JSON Pointer, found value, expected value and nearest spelling.
+/// Reads the file (configs/schema/benchmarks.schema.json) with its mechanisms and states. "states"
+/// names a file of hashes, written by loopbench_bench --save-states. Throws ConfigError with all
+/// errors, each with file, JSON Pointer, found value, expected value and nearest spelling.
 BenchmarkSet ReadBenchmarks(const std::filesystem::path& path);
 
 /// Reads benchmarks from text; `path` is used in messages and as base of relative paths.

@@ -2,19 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "harness/config/experiment_sections.h"
-#include "harness/config/formulations.h"
-#include "harness/config/options.h"
 
 namespace loopbench::harness {
 namespace {
 
 template <class T>
 bool EmptyOrContains(const std::vector<T>& accepted, const T& value) {
-  return accepted.empty() || std::find(accepted.begin(), accepted.end(), value) != accepted.end();
+  return accepted.empty() || std::ranges::find(accepted, value) != accepted.end();
 }
 
 /// Step control of a case: a tolerance or a fixed step.
@@ -27,14 +24,6 @@ std::vector<StepChoice> StepChoices(const Experiment& experiment) {
   for (const double tolerance : experiment.tolerances) choices.push_back({.tolerance = tolerance});
   for (const double step : experiment.fixed_steps) choices.push_back({.step = step});
   return choices;
-}
-
-/// Returns the integrators of a method: all of the experiment; for a peer, which has its own, only
-/// one placeholder.
-std::vector<std::string> IntegratorsOf(const Experiment& experiment, const Method& method) {
-  std::vector<std::string> integrators = experiment.integrators;
-  if (IsPeer(method) && integrators.size() > 1) integrators.resize(1);
-  return integrators;
 }
 
 Case MakeCase(const Experiment& experiment, std::size_t problem, const Method& method,
@@ -61,12 +50,38 @@ Case MakeCase(const Experiment& experiment, std::size_t problem, const Method& m
   return one;
 }
 
-void DropExcluded(const Experiment& experiment, std::vector<Case>* cases) {
-  if (experiment.exclusions.empty()) return;
-  std::erase_if(*cases, [&experiment](const Case& one) {
-    return std::any_of(experiment.exclusions.begin(), experiment.exclusions.end(),
-                       [&one](const Selection& exclusion) { return Matches(one.keys, exclusion); });
+/// Returns cases without ensembles. `horizon`: the only one of each problem (0: its shortest);
+/// nothing for all. `integrator`: the only one; "": the integrators of each method.
+std::vector<Case> ExpandRuns(const Experiment& experiment, const std::vector<Method>& methods,
+                             const std::vector<StepChoice>& choices,
+                             std::optional<double> horizon = std::nullopt,
+                             const std::string& integrator = "") {
+  std::vector<Case> cases;
+  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
+    std::vector<double> horizons = experiment.problems[problem].horizons;
+    if (horizon && !horizons.empty()) {
+      horizons = {*horizon > 0.0 ? *horizon : std::ranges::min(horizons)};
+    }
+    for (const double own : horizons) {
+      for (const Method& method : methods) {
+        std::vector<std::string> integrators = experiment.integrators;
+        if (!integrator.empty()) integrators = {integrator};
+        // a placeholder for a peer, which has its own
+        if (IsPeer(method) && integrators.size() > 1) integrators.resize(1);
+        for (const std::string& name : integrators) {
+          for (const StepChoice& choice : choices) {
+            cases.push_back(MakeCase(experiment, problem, method, choice, own, name));
+          }
+        }
+      }
+    }
+  }
+  std::erase_if(cases, [&experiment](const Case& one) {
+    return std::ranges::any_of(experiment.exclusions, [&one](const Selection& exclusion) {
+      return Matches(one.keys, exclusion);
+    });
   });
+  return cases;
 }
 
 }  // namespace
@@ -164,37 +179,6 @@ bool Matches(const EnsembleRule& rule, const Case& one) {
          EmptyOrContains(rule.solvers, one.method.solver);
 }
 
-namespace {
-
-/// Returns cases without ensembles. `horizon`: the only one of each problem (0: its shortest);
-/// nothing for all. `integrator`: the only one; "": the integrators of each method.
-std::vector<Case> ExpandRuns(const Experiment& experiment, const std::vector<Method>& methods,
-                             const std::vector<StepChoice>& choices,
-                             std::optional<double> horizon = std::nullopt,
-                             const std::string& integrator = "") {
-  std::vector<Case> cases;
-  for (std::size_t problem = 0; problem < experiment.problems.size(); ++problem) {
-    std::vector<double> horizons = experiment.problems[problem].horizons;
-    if (horizon && !horizons.empty()) {
-      horizons = {*horizon > 0.0 ? *horizon : std::ranges::min(horizons)};
-    }
-    for (const double own : horizons) {
-      for (const Method& method : methods) {
-        for (const std::string& name : integrator.empty() ? IntegratorsOf(experiment, method)
-                                                          : std::vector<std::string>{integrator}) {
-          for (const StepChoice& choice : choices) {
-            cases.push_back(MakeCase(experiment, problem, method, choice, own, name));
-          }
-        }
-      }
-    }
-  }
-  DropExcluded(experiment, &cases);
-  return cases;
-}
-
-}  // namespace
-
 bool IsPeer(const Method& method) {
   const FormulationRow* row = FindFormulation(method.formulation);
   return row != nullptr && row->is_peer();
@@ -203,9 +187,9 @@ bool IsPeer(const Method& method) {
 std::vector<Case> Expand(const Experiment& experiment) {
   std::vector<Case> cases = ExpandRuns(experiment, experiment.methods, StepChoices(experiment));
   for (Case& one : cases) {
-    const auto rule =
-        std::find_if(experiment.ensembles.begin(), experiment.ensembles.end(),
-                     [&one](const EnsembleRule& candidate) { return Matches(candidate, one); });
+    const auto rule = std::ranges::find_if(
+        experiment.ensembles,
+        [&one](const EnsembleRule& candidate) { return Matches(candidate, one); });
     if (rule == experiment.ensembles.end()) continue;
     one.ensemble = rule->size;
     one.seed = rule->seed;

@@ -309,9 +309,7 @@ std::vector<Case> ExpandLadders(const Experiment& experiment);
 /// have none. Empty if timing is off.
 std::vector<Case> ExpandTiming(const Experiment& experiment);
 
-// Limits as keys and values, for the content of a case.
-
-/// Returns each limit under its key in files.
+/// Returns each limit under its key in files, for the content of a case.
 Record RecordOf(const Limits& limits);
 
 }  // namespace loopbench::harness

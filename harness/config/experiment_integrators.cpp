@@ -1,12 +1,10 @@
 // Integrators of an experiment file: Butcher tables, absolute tolerances, limits of steps.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <charconv>
 
 #include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/config/options.h"
 
 namespace loopbench::harness {
 namespace {
@@ -106,22 +104,10 @@ std::string ReadIntegrator(const JsonNode& node, MechanismFiles& files) {
     return "";
   }
   const std::filesystem::path path = files.Resolve(name);
-  if (!ExpectFile(node, path, "a Butcher table")) return "";
-  try {
-    return ReadDocument(files.Text(path), path.string(), ReadTable);
-  } catch (const ConfigError& mistakes) {
-    node.errors().AddText(mistakes.what());
-    return "";
-  }
-}
-
-}  // namespace
-
-Json IntegratorsSchema() {
-  Json named = PatternSchema(R"(^ARKODE_|\.json$)");
-  named["words"] = "table of ARKODE, file";
-  return OneOrMoreSchema(
-      EitherSchema({ChoiceSchema(ProfileNames()), named, TableFields().Schema()}), true);
+  std::string table;
+  ReadNamedFile(node, path, "a Butcher table",
+                [&] { table = ReadDocument(files.Text(path), path.string(), ReadTable); });
+  return table;
 }
 
 void ReadIntegrators(const JsonNode& node, ExperimentFile& experiment) {
@@ -132,6 +118,29 @@ void ReadIntegrators(const JsonNode& node, ExperimentFile& experiment) {
     const bool again = std::ranges::count(experiment.integrators, name) > 0;
     again ? element.Fail("each value once") : experiment.integrators.push_back(name);
   }
+}
+
+void ReadAtol(const JsonNode& node, ExperimentFile& experiment) {
+  if (node.value().is_object()) {
+    AtolFields().Read(node, &experiment.atols.emplace());
+  } else {
+    experiment.atol = node.Number(kPositive);
+  }
+}
+
+}  // namespace
+
+FieldValue<ExperimentFile> IntegratorsValue() {
+  Json named = PatternSchema(R"(^ARKODE_|\.json$)");
+  named["words"] = "table of ARKODE, file";
+  return {OneOrMoreSchema(
+              EitherSchema({ChoiceSchema(ProfileNames()), named, TableFields().Schema()}), true),
+          ReadIntegrators,
+          [](const ExperimentFile& file) { return Json(file.integrators.front()); }};
+}
+
+FieldValue<ExperimentFile> AtolValue() {
+  return By(EitherSchema({NumberSchema(kPositive), AtolFields().Schema()}), ReadAtol);
 }
 
 const Fields<AbsoluteTolerances>& AtolFields() {
@@ -165,16 +174,6 @@ const Fields<Integration>& IntegrationFields() {
         "Error at which the iteration ends, as a part of the tolerances."}});
   return fields;
 }
-
-void ReadAtol(const JsonNode& node, ExperimentFile& experiment) {
-  if (node.value().is_object()) {
-    AtolFields().Read(node, &experiment.atols.emplace());
-  } else {
-    experiment.atol = node.Number(kPositive);
-  }
-}
-
-Json AtolSchema() { return EitherSchema({NumberSchema(kPositive), AtolFields().Schema()}); }
 
 void RequireUseOfIntegrators(const JsonNode& node, ExperimentFile& file) {
   const auto integrator = node.Optional("integrator"), integration = node.Optional("integration");

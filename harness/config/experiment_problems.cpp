@@ -1,9 +1,6 @@
 // Sections of an experiment: problems, families of mechanisms, ensembles of initial values.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <limits>
 #include <numbers>
 #include <set>
 #include <system_error>
@@ -11,7 +8,6 @@
 #include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/config/mechanism_reader.h"
 #include "harness/config/mechanism_sections.h"
 #include "mechanism/description/library.h"
 #include "mechanism/description/transforms.h"
@@ -22,11 +18,6 @@ namespace {
 // Limits of drawn coordinates [rad or m]: a member's start is reached in steps of 0.1.
 constexpr Range kFarthest = {.min = -1e4, .max = 1e4};
 constexpr Range kAmplitude = {.min = 0.0, .max = kFarthest.max, .above_min = true};
-
-/// Ensemble rule and its experiment.
-struct RuleOfExperiment : EnsembleRule {
-  const Experiment* experiment = nullptr;
-};
 
 /// Reads numbers that must be in `used`; others would match nothing.
 std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<double>& used) {
@@ -46,21 +37,21 @@ std::vector<double> ReadUsedNumbers(const JsonNode& node, const std::vector<doub
   return numbers;
 }
 
-void ReadTolerances(const JsonNode& node, RuleOfExperiment& rule) {
-  rule.tolerances = ReadUsedNumbers(node, rule.experiment->tolerances);
+void ReadTolerances(const JsonNode& node, EnsembleRule& rule, const Experiment& experiment) {
+  rule.tolerances = ReadUsedNumbers(node, experiment.tolerances);
 }
 
-void ReadHorizons(const JsonNode& node, RuleOfExperiment& rule) {
+void ReadHorizons(const JsonNode& node, EnsembleRule& rule, const Experiment& experiment) {
   std::set<double> horizons;
-  for (const ExperimentProblem& problem : rule.experiment->problems) {
+  for (const ExperimentProblem& problem : experiment.problems) {
     horizons.insert(problem.horizons.begin(), problem.horizons.end());
   }
   rule.horizons = ReadUsedNumbers(node, {horizons.begin(), horizons.end()});
 }
 
-void ReadProblemNames(const JsonNode& node, RuleOfExperiment& rule) {
+void ReadProblemNames(const JsonNode& node, EnsembleRule& rule, const Experiment& experiment) {
   NameList known;
-  for (const ExperimentProblem& problem : rule.experiment->problems) known.Add(problem.name);
+  for (const ExperimentProblem& problem : experiment.problems) known.Add(problem.name);
   for (const JsonNode& element : node.OneOrMore("problem names")) {
     const auto problem = element.Choice(known, "a problem");
     if (problem) rule.problems.push_back(known.all()[static_cast<std::size_t>(*problem)]);
@@ -114,7 +105,7 @@ void CheckBetween(const JsonNode& element, const EnsembleRule& rule, const Exper
 }
 
 /// Reads "between" or "perturb".
-void ReadStart(const JsonNode& node, RuleOfExperiment& rule) {
+void ReadStart(const JsonNode& node, EnsembleRule& rule) {
   if (const auto between = node.Optional("between")) {
     if (const auto perturb = node.Optional("perturb")) {
       perturb->Fail("no \"perturb\" with \"between\"");
@@ -126,12 +117,12 @@ void ReadStart(const JsonNode& node, RuleOfExperiment& rule) {
   }
 }
 
-const Fields<RuleOfExperiment>& EnsembleFields() {
-  using Rule = RuleOfExperiment;
+const Fields<EnsembleRule, const Experiment>& EnsembleFields() {
+  using Rule = EnsembleRule;
   constexpr std::int64_t kMaxSeed = std::numeric_limits<std::int32_t>::max();
   static const Json bounds = ArraySchema(NumberSchema(kFarthest), 2, 2);
   static const Json one_start = {{"oneOf", {Requires({"perturb"}), Requires({"between"})}}};
-  static const Fields<Rule> fields(
+  static const Fields<Rule, const Experiment> fields(
       "ensemble",
       "Perturbed repetitions of the cases that match all given case keys. The first match "
       "applies.",
@@ -147,17 +138,15 @@ const Fields<RuleOfExperiment>& EnsembleFields() {
        {"problems", By(OneOrMoreSchema(TextSchema()), ReadProblemNames), "Names of problems."},
        {"horizons", By(NumberListSchema(kPositive), ReadHorizons), "Horizons of cases [s]."},
        {"tolerances", By(NumberListSchema(kPositive), ReadTolerances), "Tolerances of cases."},
-       {"formulation", FormulationChoices(&Rule::formulations), "Formulations of cases."},
-       {"enforcement", LevelChoices(&Rule::enforcements), "Enforcement levels of cases."},
-       {"coordinates", Choices(&Rule::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
+       {"formulation", Choices(&Rule::formulations, FormulationNames, "a formulation"),
+        "Formulations of cases."},
+       {"enforcement", Choices(&Rule::enforcements, LevelNames, "a level of enforcement"),
+        "Enforcement levels of cases."},
+       {"coordinates", Choices(&Rule::coordinates, NamesOf<Coordinates>, "a coordinate set"),
         "Coordinates of cases."},
-       {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>(), "a solver"), "Solvers."}});
+       {"solver", Choices(&Rule::solvers, NamesOf<SolverKind>, "a solver"), "Solvers."}});
   return fields;
 }
-
-}  // namespace
-
-Json EnsemblesSchema() { return ArraySchema(EnsembleFields().Schema(), 0, kMaxRules); }
 
 void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
   const std::vector<JsonNode> elements = node.Elements("ensemble rules");
@@ -168,9 +157,8 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
   if (CountCases(experiment) > kMaxHeldCases) return;  // reported by the count
   const std::vector<Case> cases = Expand(experiment);
   for (const JsonNode& element : elements) {
-    RuleOfExperiment rule;
-    rule.experiment = &experiment;
-    EnsembleFields().Read(element, &rule);
+    EnsembleRule rule;
+    EnsembleFields().Read(element, &rule, experiment);
     const bool used = std::any_of(cases.begin(), cases.end(),
                                   [&rule](const Case& one) { return Matches(rule, one); });
     // After other errors, this error may be a consequence.
@@ -184,8 +172,6 @@ void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment) {
 
 // Families of mechanisms (mechanism/description/library.h) as problems: {"family": "chain", "bars":
 // 10}.
-
-namespace {
 
 constexpr std::int64_t kMaxUnits = 100'000;  ///< bars, windows, storeys
 
@@ -263,7 +249,6 @@ MechanismFile MakeChain(const Family& family, int bars, int) {
   MechanismFile made{Chain(bars), {}, {}};
   if (family.speed != 0.0) made.description.initial.speeds.push_back({0, {family.speed}});
   HoldNamed(&made.description, "J", "", static_cast<std::size_t>(bars) - 2);
-  made.canonical = Json{{"family", "chain"}, {"bars", bars}, {"speed", family.speed}}.dump();
   return made;
 }
 
@@ -271,12 +256,6 @@ MechanismFile MakeLadder(const Family& family, int windows, int) {
   MechanismFile made{Ladder(windows, family.angle, family.speed), {}, {}};
   HoldNamed(&made.description, "O", "", 1);
   made.observe.closed_form = PendulumOfLadder(made.description);
-  made.canonical = Json{
-      {"family", "ladder"},
-      {"windows", windows},
-      {"angle", family.angle},
-      {"speed",
-       family.speed}}.dump();
   return made;
 }
 
@@ -284,51 +263,48 @@ MechanismFile MakeGrid(const Family& family, int windows, int storeys) {
   MechanismFile made{Grid(storeys, windows, family.angle, family.speed), {}, {}};
   // the first crank of each storey, an independent coordinate: Jcrank1.0, Jcrank2.0, ...
   HoldNamed(&made.description, "Jcrank", ".0", static_cast<std::size_t>(storeys));
-  made.canonical = Json{
-      {"family", "grid"},
-      {"storeys", storeys},
-      {"windows", windows},
-      {"angle", family.angle},
-      {"speed",
-       family.speed}}.dump();
   return made;
 }
 
-/// Member of a family used as a mechanism, with its counts.
-struct FamilyMember {
-  MechanismFile mechanism;
-  std::string counts;  ///< "10", "3x4"
-};
 Json FamilySchema() {
   return Named("family", EitherSchema({ChainFields().Schema(), LadderFields().Schema(),
                                        GridFields().Schema()}));
 }
 
-/// Returns all members of {"family": ...}; `room` is the maximum number of bodies.
-std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
+/// Returns all members of {"family": ...}, each with its counts as its name: "10", "3x4". `room` is
+/// the maximum number of bodies.
+std::vector<ExperimentProblem> ReadFamilyMembers(const JsonNode& node, std::size_t room) {
+  static const NameList kNames = {"chain", "ladder", "grid"};
   constexpr auto kMake = std::array{MakeChain, MakeLadder, MakeGrid};
   const auto name = node.Required("family", "a family");
-  const auto kind = name ? name->Choice({"chain", "ladder", "grid"}, "a family") : std::nullopt;
+  const auto kind = name ? name->Choice(kNames, "a family") : std::nullopt;
   if (!kind) return {};
+  const bool is_chain = *kind == 0, is_grid = *kind == 2;
   Family family;
-  if (*kind == 0) {
+  if (is_chain) {
     ChainFamily chain;
     ChainFields().Read(node, &chain);
     family = chain;
   } else {
-    (*kind == 1 ? LadderFields() : GridFields()).Read(node, &family);
+    (is_grid ? GridFields() : LadderFields()).Read(node, &family);
   }
-  const bool is_grid = *kind == 2;
   if (!is_grid) family.storeys = {1};
-  std::vector<FamilyMember> members;
+  std::vector<ExperimentProblem> members;
   std::size_t bodies = 0;
   for (const std::int64_t storeys : family.storeys) {
     for (const std::int64_t size : family.sizes) {
-      bodies += static_cast<std::size_t>(*kind == 0 ? size : storeys * (2 * size + 1));
+      bodies += static_cast<std::size_t>(is_chain ? size : storeys * (2 * size + 1));
       if (bodies > room) continue;  // before a large member is built
-      const auto make = kMake[static_cast<std::size_t>(*kind)];
-      members.push_back({make(family, static_cast<int>(size), static_cast<int>(storeys)),
-                         is_grid ? fmt::format("{}x{}", storeys, size) : fmt::format("{}", size)});
+      ExperimentProblem& member = members.emplace_back();
+      member.name = is_grid ? fmt::format("{}x{}", storeys, size) : fmt::format("{}", size);
+      member.mechanism = kMake[static_cast<std::size_t>(*kind)](family, static_cast<int>(size),
+                                                                static_cast<int>(storeys));
+      Json canonical = {{"family", kNames.all()[static_cast<std::size_t>(*kind)]}};
+      if (is_grid) canonical["storeys"] = storeys;
+      canonical[is_chain ? "bars" : "windows"] = size;
+      if (!is_chain) canonical["angle"] = family.angle;
+      canonical["speed"] = family.speed;
+      member.mechanism.canonical = canonical.dump();
     }
   }
   if (bodies > room) {
@@ -338,35 +314,25 @@ std::vector<FamilyMember> ReadFamilyMembers(const JsonNode& node, std::size_t ro
   return members;
 }
 
-// "problems" of an experiment file and their mechanisms.
-
 /// Reads the mechanism file of a problem; its errors are added to the experiment's errors.
 void LoadMechanism(const JsonNode& node, MechanismFiles& files, ExperimentProblem* problem) {
   const std::string named = node.Text();
   if (named.empty()) return;
   problem->path = files.Resolve(named);
-  if (!ExpectFile(node, problem->path, "a mechanism file")) return;
-  try {
-    problem->mechanism = files.Mechanism(problem->path);
-  } catch (const ConfigError& mistakes) {
-    node.errors().AddText(mistakes.what());
-  }
+  ReadNamedFile(node, problem->path, "a mechanism file",
+                [&] { problem->mechanism = files.Mechanism(problem->path); });
 }
 
 /// Returns a problem without name for each mechanism of "mechanism".
 std::vector<ExperimentProblem> ReadMechanisms(const JsonNode& node, MechanismFiles& files,
                                               std::size_t room) {
-  std::vector<ExperimentProblem> problems;
   if (node.value().is_object() && node.value().contains("family")) {
-    for (FamilyMember& member : ReadFamilyMembers(node, room)) {
-      ExperimentProblem& problem = problems.emplace_back();
-      problem.name = std::move(member.counts);
-      problem.mechanism = std::move(member.mechanism);
-    }
-    if (problems.size() == 1) problems.front().name.clear();
-    return problems;
+    std::vector<ExperimentProblem> members = ReadFamilyMembers(node, room);
+    if (members.size() == 1) members.front().name.clear();
+    return members;
   }
-  ExperimentProblem& problem = problems.emplace_back();
+  std::vector<ExperimentProblem> problems(1);
+  ExperimentProblem& problem = problems.front();
   if (node.value().is_object()) {
     problem.mechanism = ReadMechanismObject(node);
   } else if (node.value().is_string()) {
@@ -469,12 +435,18 @@ void ReadProblems(const JsonNode& node, ExperimentFile& experiment) {
 
 }  // namespace
 
-bool ExpectFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what) {
+void ReadNamedFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what,
+                   const std::function<void()>& read) {
   std::error_code error;
-  if (std::filesystem::is_regular_file(path, error)) return true;
+  if (std::filesystem::is_regular_file(path, error)) {
+    try {
+      return read();
+    } catch (const ConfigError& mistakes) {
+      return node.errors().AddText(mistakes.what());
+    }
+  }
   if (std::filesystem::exists(path, error)) {
-    node.Fail(fmt::format("{} ({} is none)", what, path.string()));
-    return false;
+    return node.Fail(fmt::format("{} ({} is none)", what, path.string()));
   }
   std::vector<std::string> beside;
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
@@ -486,7 +458,6 @@ bool ExpectFile(const JsonNode& node, const std::filesystem::path& path, std::st
   const std::filesystem::path named = node.Text();
   node.Fail(fmt::format("{} ({} does not exist)", what, path.string()),
             nearest.empty() ? "" : (named.parent_path() / nearest).string());
-  return false;
 }
 
 const std::string& MechanismFiles::Text(const std::filesystem::path& path) {
@@ -511,6 +482,10 @@ const MechanismFile& MechanismFiles::Mechanism(const std::filesystem::path& path
   }
   if (!known->second.mistakes.empty()) throw ConfigError(known->second.mistakes);
   return known->second.mechanism;
+}
+
+FieldValue<ExperimentFile> EnsemblesValue() {
+  return By(ArraySchema(EnsembleFields().Schema(), 0, kMaxRules), ReadEnsembles);
 }
 
 FieldValue<ExperimentFile> ProblemsValue() {

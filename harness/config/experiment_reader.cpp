@@ -2,294 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <ranges>
+#include <set>
 
-#include "harness/base/fields.h"
-#include "harness/base/json_document.h"
 #include "harness/base/text.h"
 #include "harness/config/experiment_sections.h"
 #include "harness/config/file_schemas.h"
-#include "harness/config/options.h"
 
 namespace loopbench::harness {
-namespace {
-
-/// Reads one combination. Errors are added to the root's list.
-Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
-  ExperimentFile experiment;
-  experiment.files = &files;
-  if (ExpectDocument(root, FileKind::kExperiment))
-    ExperimentFileFields().ReadRows(root, &experiment);
-  return experiment;
-}
-
-}  // namespace
-
-/// Records which rules of "exclude" have matched, and whether any case is left.
-class ExclusionUse {
- public:
-  explicit ExclusionUse(const std::vector<Selection>& rules) : rules_(rules), used_(rules.size()) {}
-
-  /// Returns true if the experiment has a case that no rule excludes.
-  bool Look(Experiment* experiment) {
-    if (rules_.empty()) return any_left_ = true;
-    std::vector<Selection> own;
-    own.swap(experiment->exclusions);
-    bool any = false;
-    for (const Case& one : Expand(*experiment)) {
-      bool excluded = false;
-      for (std::size_t i = 0; i < rules_.size(); ++i) {
-        if (!Matches(one.keys, rules_[i])) continue;
-        used_[i] = true;
-        excluded = true;
-      }
-      any = any || !excluded;
-    }
-    own.swap(experiment->exclusions);
-    any_left_ = any_left_ || any;
-    return any;
-  }
-
-  bool is_sure() const {
-    return any_left_ && std::ranges::all_of(used_, [](bool used) { return used; });
-  }
-
-  void Report(ErrorList* errors) const {
-    for (std::size_t i = 0; i < rules_.size(); ++i) {
-      if (used_[i]) continue;
-      errors->Add(fmt::format("/exclude/{}", i), "a rule that matches no case",
-                  "conditions that match at least one case");
-    }
-    if (!any_left_) errors->Add("/exclude", "rules that match every case", "at least one case");
-  }
-
- private:
-  std::vector<Selection> rules_;
-  std::vector<bool> used_;
-  bool any_left_ = false;
-};
-
-/// The file and its sweep.
-class ExperimentSource::Document {
- public:
-  Document(std::string text, const std::filesystem::path& path,
-           const std::vector<Setting>& settings)
-      : text_(std::move(text)),
-        path_(path),
-        document_(ParseDocument(text_, path.string())),
-        origins_(path.string(), text_),
-        files_(path.parent_path()),
-        fields_(document_, origins_, files_) {
-    Apply(settings);
-    ReadSweep();
-  }
-
-  const std::filesystem::path& path() const { return path_; }
-  const Sweep& sweep() const { return *sweep_; }
-  std::string Text() const {
-    return document_.dump(-1, ' ', false, Json::error_handler_t::replace);
-  }
-
-  Experiment Read(std::size_t index) {
-    sweep_->Apply(index, fields_);
-    ErrorList errors(origins_);
-    const JsonNode root(document_, "", errors);
-    Experiment experiment = ReadOne(root, files_);
-    experiment.path = path_;
-    experiment.parameters = sweep_->Parameters(index);
-    experiment.exclusions = ReadExclusions(root, CaseKeys(experiment, Case()));
-    errors.ThrowIfAny(index == 0 ? ""
-                                 : fmt::format("{}: the above in combination {} of {}: {}",
-                                               path_.string(), index + 1, sweep_->count(),
-                                               experiment.parameters.Described()));
-    return experiment;
-  }
-
-  std::vector<Experiment> ReadAll() {
-    Refuse(sweep_->count() > kMaxInMemory, "/sweep",
-           fmt::format("{} combinations", sweep_->count()),
-           fmt::format("at most {} to be held at once", kMaxInMemory));
-    std::vector<Experiment> experiments;
-    std::size_t cases = 0, bodies = 0;
-    for (std::size_t i = 0; i < sweep_->count(); ++i) {
-      experiments.push_back(Read(i));
-      cases += CountCases(experiments.back());
-      Refuse(cases > kMaxHeldCases, "", fmt::format("{} cases so far", cases),
-             fmt::format("at most {} to be held at once", kMaxHeldCases));
-      for (const ExperimentProblem& problem : experiments.back().problems) {
-        bodies += problem.mechanism.description.bodies.size();
-      }
-      constexpr std::size_t kMaxAllBodies = 2'000'000;  // about 1 GB
-      Refuse(bodies > kMaxAllBodies, "", fmt::format("mechanisms with {} bodies so far", bodies),
-             fmt::format("at most {} in all combinations", kMaxAllBodies));
-    }
-    return WithoutExcluded(std::move(experiments));
-  }
-
-  /// Reports rules that exclude nothing, and rules that exclude all cases.
-  void CheckExclusions(const std::vector<std::size_t>& sample) {
-    ExclusionUse use(Read(0).exclusions);
-    const auto look = [&](std::size_t i) {
-      Experiment experiment = Read(i);
-      use.Look(&experiment);
-    };
-    for (const std::size_t i : sample) look(i);
-    for (std::size_t i = 0; i < sweep_->count() && !use.is_sure(); ++i) look(i);
-    Report(use);
-  }
-
- private:
-  void Apply(const std::vector<Setting>& settings) {
-    std::string mistakes;
-    for (const Setting& setting : settings) {
-      const FieldTargets found = fields_.Find(setting.pointer);
-      if (found.fault) {
-        mistakes += (mistakes.empty() ? "" : "\n") + Explained(setting, *found.fault);
-        continue;
-      }
-      const Json value = Parsed(setting);
-      for (const std::string& pointer : found.pointers) fields_.Set(pointer, value);
-      for (const std::string& made : found.made) origins_.Note(made, "from --set", "");
-      set_.insert(set_.end(), found.pointers.begin(), found.pointers.end());
-    }
-    if (!mistakes.empty()) throw ConfigError(mistakes);
-  }
-
-  void ReadSweep() {
-    // Errors of the sweep are reported with errors of the unchanged file.
-    Origins origins = origins_;
-    ErrorList errors(std::move(origins));
-    const JsonNode root(document_, "", errors);
-    sweep_ = std::make_unique<Sweep>(root, fields_, set_);
-    if (!sweep_->sound()) {
-      ErrorList all(origins_);  // with the files included by the sweep
-      const JsonNode again(document_, "", all);
-      Sweep(again, fields_, set_);
-      ReadOne(again, files_);
-      all.ThrowIfAny();
-    }
-    sweep_->Note(&origins_);
-  }
-
-  std::string Explained(const Setting& setting, const FieldFault& fault) const {
-    if (!fault.text.empty()) return fault.text;
-    return fmt::format(
-        "{}: --set {}: found {}, expected {}{}", path_.string(), setting.pointer, fault.found,
-        fault.expected,
-        fault.suggestion.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", fault.suggestion));
-  }
-
-  /// Returns JSON if valid, otherwise a string: names need no quotes on the command line.
-  static Json Parsed(const Setting& setting) {
-    const std::string where = "--set " + setting.pointer;
-    if (const std::string fault = EncodingFault(setting.value); !fault.empty()) {
-      throw ConfigError(fmt::format("{}: {}", where, fault));
-    }
-    if (Json::accept(setting.value)) return ParseDocument(setting.value, where);
-    return setting.value;
-  }
-
-  void Refuse(bool refused, const std::string& pointer, const std::string& found,
-              const std::string& expected) const {
-    if (!refused) return;
-    ErrorList errors(origins_);
-    errors.Add(pointer, found, expected);
-    errors.ThrowIfAny();
-  }
-
-  void Report(const ExclusionUse& use) const {
-    ErrorList errors(origins_);
-    use.Report(&errors);
-    errors.ThrowIfAny();
-  }
-
-  std::vector<Experiment> WithoutExcluded(std::vector<Experiment> experiments) {
-    ExclusionUse use(experiments.front().exclusions);
-    std::erase_if(experiments, [&use](Experiment& one) { return !use.Look(&one); });
-    Report(use);
-    return experiments;
-  }
-
-  std::string text_;
-  std::filesystem::path path_;
-  Json document_;
-  Origins origins_;
-  MechanismFiles files_;
-  ExperimentFields fields_;
-  std::vector<std::string> set_;
-  std::unique_ptr<Sweep> sweep_;
-};
-
-std::size_t CountCases(const Experiment& experiment) {
-  std::size_t horizons = 0;
-  for (const ExperimentProblem& problem : experiment.problems) horizons += problem.horizons.size();
-  return horizons * experiment.methods.size() * experiment.integrators.size() *
-         (experiment.tolerances.size() + experiment.fixed_steps.size());
-}
-
-Setting ParseSetting(std::string_view text) {
-  const std::size_t equals = text.find('=');
-  if (equals == std::string_view::npos || text.front() != '/') {
-    throw ConfigError(fmt::format(
-        "--set: found \"{}\", expected /json/pointer=value, such as /problems/0/horizon=20", text));
-  }
-  return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
-}
-
-ExperimentSource::ExperimentSource(const std::filesystem::path& path,
-                                   const std::vector<Setting>& settings)
-    : ExperimentSource(ReadTextFile(path), path, settings) {}
-
-ExperimentSource::ExperimentSource(std::string text, const std::filesystem::path& path,
-                                   const std::vector<Setting>& settings)
-    : document_(std::make_unique<Document>(std::move(text), path, settings)) {}
-
-ExperimentSource::~ExperimentSource() = default;
-ExperimentSource::ExperimentSource(ExperimentSource&&) noexcept = default;
-
-const std::filesystem::path& ExperimentSource::path() const { return document_->path(); }
-std::size_t ExperimentSource::count() const { return document_->sweep().count(); }
-std::vector<std::pair<std::string, std::size_t>> ExperimentSource::axes() const {
-  return document_->sweep().Axes();
-}
-Record ExperimentSource::Parameters(std::size_t combination) const {
-  return document_->sweep().Parameters(combination);
-}
-Experiment ExperimentSource::Read(std::size_t combination) { return document_->Read(combination); }
-std::vector<std::size_t> ExperimentSource::EachValue(std::size_t most) const {
-  return document_->sweep().EachValue(most);
-}
-std::string ExperimentSource::Text() const { return document_->Text(); }
-std::vector<Experiment> ExperimentSource::ReadAll() { return document_->ReadAll(); }
-void ExperimentSource::CheckExclusions(const std::vector<std::size_t>& sample) {
-  document_->CheckExclusions(sample);
-}
-
-std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
-                                        const std::vector<Setting>& settings) {
-  return ExperimentSource(path, settings).ReadAll();
-}
-
-std::vector<Experiment> ParseExperiments(std::string_view text, const std::filesystem::path& path,
-                                         const std::vector<Setting>& settings) {
-  return ExperimentSource(std::string(text), path, settings).ReadAll();
-}
-
-Experiment ReadExperiment(const std::filesystem::path& path) {
-  return ParseExperiment(ReadTextFile(path), path);
-}
-
-Experiment ParseExperiment(std::string_view text, const std::filesystem::path& path) {
-  std::vector<Experiment> experiments = ParseExperiments(text, path);
-  if (experiments.size() > 1) {
-    throw ConfigError(fmt::format("{}: /sweep: found {} combinations, expected one experiment",
-                                  path.string(), experiments.size()));
-  }
-  return std::move(experiments.front());
-}
-
-// The top level of an experiment file.
-
 namespace {
 
 using File = ExperimentFile;
@@ -337,15 +57,6 @@ void ReadPrecision(const JsonNode& node, File& file) {
   node.FailAs("no \"tolerances\", and none in the experiment", "tolerances of the ladders");
 }
 
-FieldValue<File> Integrators() {
-  return {IntegratorsSchema(), ReadIntegrators,
-          [](const File& file) { return Json(file.integrators.front()); }};
-}
-
-void ReadOutputOptions(const JsonNode& node, File& file) {
-  OutputFields().Read(node, &file.output.emplace());
-}
-
 /// Reports levels without the derivative that an implicit profile needs.
 void RequireDerivatives(const JsonNode& node, File& file) {
   const auto integrator = node.Optional("integrator");
@@ -366,9 +77,7 @@ void RequireDerivatives(const JsonNode& node, File& file) {
   }
 }
 
-}  // namespace
-
-const Fields<ExperimentFile>& ExperimentFileFields() {
+const Fields<File>& FileFields() {
   static const Json some_or_none = EitherSchema(
       {NumberListSchema(kTolerances), {{"type", "array"}, {"maxItems", 0}, {"words", "[]"}}});
   static const Json one_of_both = {
@@ -395,7 +104,7 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
             "Fixed step lengths [s]: each adds cases in which all steps have this length (the "
             "last step is clipped) and no error test is made. Not for peers."},
            {"", By(one_of_both, RequireSteps)},
-           {"atol", By(AtolSchema(), ReadAtol),
+           {"atol", AtolValue(),
             "Absolute tolerance of every component of the state, or by quantity; default: as the "
             "relative tolerance."},
            {"integration", Object(&File::integration, IntegrationFields())},
@@ -404,7 +113,7 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
             "then contain refinement_difference, the largest difference of final poses. A "
             "difference above 1000 tolerances, or above 0.01 with fixed steps, sets the warning "
             "refinement. Cases with fixed steps and no reference always run again."},
-           {"integrator", Integrators(),
+           {"integrator", IntegratorsValue(),
             "Integrators: profiles (Runge-Kutta pairs with norm and controller), tables of ARKODE "
             "by "
             "their names (loopbench integrators), Butcher tables, or files of such tables relative "
@@ -417,10 +126,10 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
            {"timing", Object(&File::timing, TimingFields())},
            {"", By(Json::object(), RequireNoPeerOfOptions)},
            {"precision", By(PrecisionFields().Schema(), ReadPrecision)},
-           {"reference", By(ReferenceFields().Schema(), ReadReferenceOptions)},
-           {"output", By(OutputFields().Schema(), ReadOutputOptions)},
+           {"reference", ReferenceValue()},
+           {"output", OptionalObject(&File::output, OutputFields())},
            {"", By(Json::object(), RequireOutput)},
-           {"ensembles", By(EnsemblesSchema(), ReadEnsembles), "Perturbed repetitions of cases."},
+           {"ensembles", EnsemblesValue(), "Perturbed repetitions of cases."},
            {"sweep", SweepSchema(),
             "Sweep axes, crossed with the first axis slowest. Each combination of values is run "
             "as if the values were in this file. Axes in a zip advance together. At most "
@@ -434,7 +143,258 @@ const Fields<ExperimentFile>& ExperimentFileFields() {
   return fields;
 }
 
-Json ExperimentSchema() { return ExperimentFileFields().OwnSchema(); }
+/// Reads one combination. Errors are added to the root's list.
+Experiment ReadOne(const JsonNode& root, MechanismFiles& files) {
+  ExperimentFile experiment;
+  experiment.files = &files;
+  if (ExpectDocument(root, FileKind::kExperiment)) FileFields().ReadRows(root, &experiment);
+  return experiment;
+}
+
+/// Records which rules of "exclude" have matched, and whether any case is left.
+class ExclusionUse {
+ public:
+  explicit ExclusionUse(const std::vector<Selection>& rules) : rules_(rules), used_(rules.size()) {}
+
+  /// Returns true if the experiment has a case that no rule excludes.
+  bool Look(Experiment& experiment) {
+    if (rules_.empty()) return any_left_ = true;
+    const std::vector<Selection> own = std::exchange(experiment.exclusions, {});
+    bool any = false;
+    for (const Case& one : Expand(experiment)) {
+      bool excluded = false;
+      for (std::size_t i = 0; i < rules_.size(); ++i) {
+        if (!Matches(one.keys, rules_[i])) continue;
+        used_[i] = true;
+        excluded = true;
+      }
+      any = any || !excluded;
+    }
+    experiment.exclusions = own;
+    any_left_ = any_left_ || any;
+    return any;
+  }
+
+  bool is_sure() const { return any_left_ && std::ranges::find(used_, false) == used_.end(); }
+
+  /// Throws ConfigError for rules that exclude nothing, and rules that exclude all cases.
+  void Require(const Origins& origins) const {
+    ErrorList errors(origins);
+    for (std::size_t i = 0; i < rules_.size(); ++i) {
+      if (used_[i]) continue;
+      errors.Add(fmt::format("/exclude/{}", i), "a rule that matches no case",
+                 "conditions that match at least one case");
+    }
+    if (!any_left_) errors.Add("/exclude", "rules that match every case", "at least one case");
+    errors.ThrowIfAny();
+  }
+
+ private:
+  std::vector<Selection> rules_;
+  std::vector<bool> used_;
+  bool any_left_ = false;
+};
+
+/// Returns JSON if valid, otherwise a string: names need no quotes on the command line.
+Json Parsed(const Setting& setting) {
+  const std::string where = "--set " + setting.pointer;
+  if (const std::string fault = EncodingFault(setting.value); !fault.empty()) {
+    throw ConfigError(fmt::format("{}: {}", where, fault));
+  }
+  if (Json::accept(setting.value)) return ParseDocument(setting.value, where);
+  return setting.value;
+}
+
+/// Applies settings and returns the pointers of the fields.
+std::vector<std::string> Apply(const std::vector<Setting>& settings, ExperimentDocument& document) {
+  std::vector<std::string> set, mistakes;
+  for (const Setting& setting : settings) {
+    const FieldTargets found = document.Find(setting.pointer);
+    if (const auto& fault = found.fault) {
+      mistakes.push_back(
+          !fault->text.empty()
+              ? fault->text
+              : fmt::format("{}: --set {}: found {}, expected {}{}", document.path.string(),
+                            setting.pointer, fault->found, fault->expected,
+                            fault->suggestion.empty()
+                                ? ""
+                                : fmt::format(" (did you mean \"{}\"?)", fault->suggestion)));
+      continue;
+    }
+    const Json value = Parsed(setting);
+    for (const std::string& pointer : found.pointers) document.Set(pointer, value);
+    for (const std::string& made : found.made) document.origins.Note(made, "from --set", "");
+    set.insert(set.end(), found.pointers.begin(), found.pointers.end());
+  }
+  if (!mistakes.empty()) throw ConfigError(fmt::format("{}", fmt::join(mistakes, "\n")));
+  return set;
+}
+
+/// Reads the sweep. Its errors are reported with errors of the unchanged file.
+Sweep ReadSweep(ExperimentDocument& document, const std::vector<std::string>& set) {
+  ErrorList errors(document.origins);
+  Sweep sweep(JsonNode(document.json, "", errors), document, set);
+  if (!sweep.is_sound) {
+    ErrorList all(document.origins);  // with the files included by the sweep
+    const JsonNode again(document.json, "", all);
+    Sweep(again, document, set);
+    ReadOne(again, document.files);
+    all.ThrowIfAny();
+  }
+  sweep.Note(&document.origins);
+  return sweep;
+}
+
+}  // namespace
+
+std::size_t CountCases(const Experiment& experiment) {
+  std::size_t horizons = 0;
+  for (const ExperimentProblem& problem : experiment.problems) horizons += problem.horizons.size();
+  return horizons * experiment.methods.size() * experiment.integrators.size() *
+         (experiment.tolerances.size() + experiment.fixed_steps.size());
+}
+
+Setting ParseSetting(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || text.front() != '/') {
+    throw ConfigError(fmt::format(
+        "--set: found \"{}\", expected /json/pointer=value, such as /problems/0/horizon=20", text));
+  }
+  return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
+}
+
+/// The file and its sweep.
+struct ExperimentSource::Document : ExperimentDocument {
+  using ExperimentDocument::ExperimentDocument;
+  Sweep sweep;
+};
+
+ExperimentSource::ExperimentSource(const std::filesystem::path& path,
+                                   const std::vector<Setting>& settings)
+    : ExperimentSource(ReadTextFile(path), path, settings) {}
+
+ExperimentSource::ExperimentSource(std::string text, const std::filesystem::path& path,
+                                   const std::vector<Setting>& settings)
+    : document_(std::make_unique<Document>(std::move(text), path)) {
+  document_->sweep = ReadSweep(*document_, Apply(settings, *document_));
+}
+
+ExperimentSource::~ExperimentSource() = default;
+ExperimentSource::ExperimentSource(ExperimentSource&&) noexcept = default;
+
+const std::filesystem::path& ExperimentSource::path() const { return document_->path; }
+
+std::size_t ExperimentSource::count() const { return document_->sweep.count; }
+
+std::vector<std::pair<std::string, std::size_t>> ExperimentSource::axes() const {
+  std::vector<std::pair<std::string, std::size_t>> axes;
+  for (const SweepGroup& group : document_->sweep.groups) {
+    for (const SweepAxis& axis : group.axes) axes.emplace_back(axis.name, axis.values.size());
+  }
+  return axes;
+}
+
+Record ExperimentSource::Parameters(std::size_t combination) const {
+  return document_->sweep.Parameters(combination);
+}
+
+std::vector<std::size_t> ExperimentSource::EachValue(std::size_t most) const {
+  std::set<std::size_t> combinations = {0, count() - 1};
+  std::size_t stride = 1;  // between neighbouring values of the group
+  for (const SweepGroup& group : document_->sweep.groups | std::views::reverse) {
+    const std::size_t values = group.count(), taken = std::min(values, most);
+    for (std::size_t k = 1; k < taken; ++k) {
+      combinations.insert(stride * (k * (values - 1) / (taken - 1)));
+    }
+    stride *= values;
+  }
+  return {combinations.begin(), combinations.end()};
+}
+
+std::string ExperimentSource::Text() const {
+  return document_->json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Experiment ExperimentSource::Read(std::size_t combination) {
+  document_->sweep.Apply(combination, *document_);
+  ErrorList errors(document_->origins);
+  const JsonNode root(document_->json, "", errors);
+  Experiment experiment = ReadOne(root, document_->files);
+  experiment.path = path();
+  experiment.parameters = Parameters(combination);
+  experiment.exclusions = ReadExclusions(root, CaseKeys(experiment, Case()));
+  errors.ThrowIfAny(combination == 0
+                        ? ""
+                        : fmt::format("{}: the above in combination {} of {}: {}", path().string(),
+                                      combination + 1, count(), experiment.parameters.Described()));
+  return experiment;
+}
+
+std::vector<Experiment> ExperimentSource::ReadAll() {
+  const auto refuse_if = [this](bool refused, const char* pointer, const std::string& found,
+                                const std::string& expected) {
+    if (!refused) return;
+    ErrorList errors(document_->origins);
+    errors.Add(pointer, found, expected);
+    errors.ThrowIfAny();
+  };
+  refuse_if(count() > kMaxInMemory, "/sweep", fmt::format("{} combinations", count()),
+            fmt::format("at most {} to be held at once", kMaxInMemory));
+  std::vector<Experiment> experiments;
+  std::size_t cases = 0, bodies = 0;
+  for (std::size_t i = 0; i < count(); ++i) {
+    experiments.push_back(Read(i));
+    cases += CountCases(experiments.back());
+    refuse_if(cases > kMaxHeldCases, "", fmt::format("{} cases so far", cases),
+              fmt::format("at most {} to be held at once", kMaxHeldCases));
+    for (const ExperimentProblem& problem : experiments.back().problems) {
+      bodies += problem.mechanism.description.bodies.size();
+    }
+    constexpr std::size_t kMaxAllBodies = 2'000'000;  // about 1 GB
+    refuse_if(bodies > kMaxAllBodies, "", fmt::format("mechanisms with {} bodies so far", bodies),
+              fmt::format("at most {} in all combinations", kMaxAllBodies));
+  }
+  ExclusionUse use(experiments.front().exclusions);
+  std::erase_if(experiments, [&use](Experiment& one) { return !use.Look(one); });
+  use.Require(document_->origins);
+  return experiments;
+}
+
+void ExperimentSource::CheckExclusions(const std::vector<std::size_t>& sample) {
+  ExclusionUse use(Read(0).exclusions);
+  const auto look = [&](std::size_t i) {
+    Experiment experiment = Read(i);
+    use.Look(experiment);
+  };
+  for (const std::size_t i : sample) look(i);
+  for (std::size_t i = 0; i < count() && !use.is_sure(); ++i) look(i);
+  use.Require(document_->origins);
+}
+
+std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
+                                        const std::vector<Setting>& settings) {
+  return ExperimentSource(path, settings).ReadAll();
+}
+
+std::vector<Experiment> ParseExperiments(std::string_view text, const std::filesystem::path& path,
+                                         const std::vector<Setting>& settings) {
+  return ExperimentSource(std::string(text), path, settings).ReadAll();
+}
+
+Experiment ReadExperiment(const std::filesystem::path& path) {
+  return ParseExperiment(ReadTextFile(path), path);
+}
+
+Experiment ParseExperiment(std::string_view text, const std::filesystem::path& path) {
+  std::vector<Experiment> experiments = ParseExperiments(text, path);
+  if (experiments.size() > 1) {
+    throw ConfigError(fmt::format("{}: /sweep: found {} combinations, expected one experiment",
+                                  path.string(), experiments.size()));
+  }
+  return std::move(experiments.front());
+}
+
+Json ExperimentSchema() { return FileFields().OwnSchema(); }
 
 std::string ExperimentText(const SingleRun& run) {
   Json method = {{"formulation", run.method.formulation},

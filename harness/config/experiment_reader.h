@@ -12,12 +12,6 @@
 
 namespace loopbench::harness {
 
-// Combinations of an experiment file, read one at a time.
-//
-// A file without "sweep" is one experiment. A sweep varies fields of the file or of its mechanisms.
-// Each combination of values is a separate experiment, read as if the values were in the file, with
-// the values as parameters. Memory does not grow with the number of combinations.
-
 /// "--set /json/pointer=value": the value of one field, set before anything is read. A pointer may
 /// go through a problem's mechanism path into that file ("/problems/0/mechanism/gravity"); "*"
 /// stands for all elements of an array. Keys missing in the file may be set; unknown keys are
@@ -35,6 +29,9 @@ inline constexpr std::size_t kMaxCases = 10'000'000;         ///< of a file, all
 inline constexpr std::size_t kMaxInMemory = 100'000;         ///< combinations in memory at once
 inline constexpr std::size_t kMaxHeldCases = 1'000'000;      ///< cases in memory at once
 
+/// Combinations of an experiment file, read one at a time. A file without "sweep" is one
+/// experiment. A sweep varies fields of the file or of its mechanisms. Each combination of values
+/// is a separate experiment, read as if the values were in the file, with the values as parameters.
 class ExperimentSource {
  public:
   /// Reads the file, applies settings and reads the sweep; mechanism paths are relative to the
@@ -83,12 +80,9 @@ class ExperimentSource {
   void CheckExclusions(const std::vector<std::size_t>& sample);
 
  private:
-  class Document;
+  struct Document;
   std::unique_ptr<Document> document_;
 };
-
-// Experiments and their mechanisms, read completely from JSON
-// (configs/schema/experiment.schema.json).
 
 /// Reads all combinations of a file (ExperimentSource::ReadAll()).
 std::vector<Experiment> ReadExperiments(const std::filesystem::path& path,
@@ -104,8 +98,7 @@ Experiment ReadExperiment(const std::filesystem::path& path);
 /// Reads an experiment from text.
 Experiment ParseExperiment(std::string_view text, const std::filesystem::path& path);
 
-// Text of an experiment of one run, for recommended settings.
-
+/// Experiment of one run, for recommended settings.
 struct SingleRun {
   std::string name, comment;
   std::filesystem::path mechanism;  ///< relative to the experiment's folder
@@ -120,8 +113,7 @@ struct SingleRun {
 /// Returns the experiment with a certified reference and timing of its case.
 std::string ExperimentText(const SingleRun& run);
 
-// Experiment that runs all models of a ladder equally (mechanism/simplify/model.h).
-
+/// Experiment that runs all models of a ladder equally (mechanism/simplify/model.h).
 struct LadderFile {
   std::string name, comment;
   std::vector<std::string> mechanisms;  ///< paths as written in the experiment

@@ -58,49 +58,44 @@ class MechanismFiles {
   std::map<std::filesystem::path, File> files_;
 };
 
-/// Returns true if the file `path` named by a node exists; otherwise reports it with the nearest
-/// name in the folder. `what` is the expected kind: "a mechanism file".
-bool ExpectFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what);
+/// Calls `read` if the file `path` named by a node exists, and adds errors of that file to those of
+/// the node's file. Reports a missing file with the nearest name in the folder. `what` is the
+/// expected kind: "a mechanism file".
+void ReadNamedFile(const JsonNode& node, const std::filesystem::path& path, std::string_view what,
+                   const std::function<void()>& read);
 
 /// Experiment being read, with its mechanism files.
 struct ExperimentFile : Experiment {
   MechanismFiles* files = nullptr;
 };
-/// Fields of an experiment file.
-const Fields<ExperimentFile>& ExperimentFileFields();
-
-/// Reader of "problems" with their mechanisms; a family with several counts gives several problems.
+/// Fields of the sections of the same names. A problem contains its mechanism; a family with
+/// several counts gives several problems.
 FieldValue<ExperimentFile> ProblemsValue();
-/// Returns a list of methods, each entry expanded.
-std::vector<Method> ReadMethods(const JsonNode& node);
-Json MethodsSchema();
+FieldValue<ExperimentFile> IntegratorsValue();
+FieldValue<ExperimentFile> AtolValue();
+/// "reference" after the problems: options of certified references, or published data.
+FieldValue<ExperimentFile> ReferenceValue();
+/// "ensembles" after all sections that they select from.
+FieldValue<ExperimentFile> EnsemblesValue();
 /// Fields of the sections of the same names, and of "series".
 const Fields<Limits>& LimitsFields();
 const Fields<CompileOptions>& CompileFields();
 const Fields<AbsoluteTolerances>& AtolFields();
 const Fields<Integration>& IntegrationFields();
-/// Reads "integrator": names, and Butcher tables as objects or files, which are registered.
-void ReadIntegrators(const JsonNode& node, ExperimentFile& experiment);
-Json IntegratorsSchema();
-void ReadAtol(const JsonNode& node, ExperimentFile& experiment);
-Json AtolSchema();
-/// Reports tables without embedding that would need one, and options without effect.
-void RequireUseOfIntegrators(const JsonNode& node, ExperimentFile& experiment);
 const Fields<Experiment>& SeriesFields();
 const Fields<Timing>& TimingFields();
 const Fields<Precision>& PrecisionFields();
-const Fields<ReferenceOptions>& ReferenceFields();
 const Fields<OutputOptions>& OutputFields();
-/// Reports output options that conflict with the rest of the experiment.
-void RequireOutput(const JsonNode& node, ExperimentFile& experiment);
-/// Reads "reference" after the problems: options of certified references, or published data.
-void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment);
-/// Reads "ensembles", after all sections that they select from.
-void ReadEnsembles(const JsonNode& node, ExperimentFile& experiment);
-Json EnsemblesSchema();
+/// Returns a list of methods, each entry expanded.
+std::vector<Method> ReadMethods(const JsonNode& node);
+Json MethodsSchema();
 /// Schemas of "sweep" and "exclude".
 Json SweepSchema();
 Json ExclusionsSchema();
+/// Reports tables without embedding that would need one, and options without effect.
+void RequireUseOfIntegrators(const JsonNode& node, ExperimentFile& experiment);
+/// Reports output options that conflict with the rest of the experiment.
+void RequireOutput(const JsonNode& node, ExperimentFile& experiment);
 /// Returns the number of cases before exclusion.
 std::size_t CountCases(const Experiment& experiment);
 
@@ -111,43 +106,11 @@ const NameList& NamesOf() {
   return known;
 }
 
-/// Returns one or several registered names, looked up when a file is read, or the enum values of
-/// their indices.
-template <class T, class Chosen>
-FieldValue<T> RegisteredChoices(std::vector<Chosen> T::*member, std::vector<std::string> (*names)(),
-                                std::string what) {
-  return {OneOrMoreSchema(ChoiceSchema(names()), true), [=](const JsonNode& node, T& owner) {
-            const NameList known(names());
-            (owner.*member).clear();
-            for (const std::size_t index : node.Choices(known, what)) {
-              if constexpr (std::same_as<Chosen, std::string>) {
-                (owner.*member).push_back(known.all()[index]);
-              } else {
-                (owner.*member).push_back(static_cast<Chosen>(index));
-              }
-            }
-          }};
-}
-template <class T>
-FieldValue<T> FormulationChoices(std::vector<std::string> T::*member) {
-  return RegisteredChoices(member, FormulationNames, "a formulation");
-}
-template <class T>
-FieldValue<T> LevelChoices(std::vector<Enforcement> T::*member) {
-  return RegisteredChoices(member, LevelNames, "a level of enforcement");
-}
-
 template <class T>
 FieldValue<T> Methods(std::vector<Method> T::*member) {
   return {MethodsSchema(),
           [=](const JsonNode& node, T& owner) { owner.*member = ReadMethods(node); }};
 }
-
-// Fields of an experiment's document by JSON Pointer, for sweeps and --set.
-//
-// A pointer may go through the path of a problem's mechanism; the file is then included in the
-// document. "*" as an index stands for all elements of an array. Missing keys are created, since
-// they have defaults; unknown keys are rejected by the reader. Internal to harness/config.
 
 /// Reason why a pointer names no field: parts of a message, or a complete text.
 struct FieldFault {
@@ -163,11 +126,18 @@ struct FieldTargets {
   std::optional<FieldFault> fault;
 };
 
-class ExperimentFields {
- public:
-  /// `document` and `origins` are modified when files are included and values are set.
-  ExperimentFields(Json& document, Origins& origins, MechanismFiles& files)
-      : document_(document), origins_(origins), files_(files) {}
+/// Document of an experiment file, with included mechanism files and values that were set.
+///
+/// Fields are found by JSON Pointer, for sweeps and --set. A pointer may go through the path of a
+/// problem's mechanism; the file is then included. "*" as an index stands for all elements of an
+/// array. Missing keys are created, since they have defaults; the reader rejects unknown keys.
+struct ExperimentDocument {
+  ExperimentDocument(std::string file_text, const std::filesystem::path& file)
+      : text(std::move(file_text)),
+        path(file),
+        json(ParseDocument(text, path.string())),
+        origins(path.string(), text),
+        files(path.parent_path()) {}
 
   /// Finds the fields, and includes files on the way. The document is otherwise unchanged.
   FieldTargets Find(const std::string& pointer);
@@ -175,24 +145,14 @@ class ExperimentFields {
   /// Sets one field from Find().
   void Set(const std::string& pointer, const Json& value);
 
- private:
-  void Walk(Json& node, const std::vector<std::string>& tokens, std::size_t depth,
-            const std::string& pointer, FieldTargets* found);
-  bool TakeIn(Json& node, const std::string& pointer, FieldTargets* found);
-
-  Json& document_;
-  Origins& origins_;
-  MechanismFiles& files_;
+  std::string text;  ///< of the file
+  std::filesystem::path path;
+  Json json;
+  Origins origins;
+  MechanismFiles files;
 };
 
-// "sweep" of an experiment file: axes that are crossed, each the values of one field.
-//
-//   "sweep": [{"name": "mass", "field": "/problems/0/mechanism/bodies/1/mass", "values": [1, 2,
-//   3]},
-//             {"zip": [{"name": "stiffness", ...}, {"name": "damping", ...}]}]
-//
-// gives 3 n combinations: the axes of a zip advance together. Internal to harness/config.
-
+/// Axis of "sweep": the values of one field.
 struct SweepAxis {
   std::string name;
   std::string source;             ///< pointer of the axis in the experiment file
@@ -207,42 +167,29 @@ struct SweepGroup {
   std::size_t count() const { return axes.front().values.size(); }
 };
 
-class Sweep {
- public:
+/// "sweep" of an experiment file: groups that are crossed.
+struct Sweep {
+  Sweep() = default;
   /// Reads "sweep" and finds the fields; errors go to the root's list. `settings` are the fields
   /// set by --set, which a sweep must not overwrite.
-  Sweep(const JsonNode& root, ExperimentFields& fields, const std::vector<std::string>& settings);
-
-  /// Returns false if the sweep or an included mechanism file has errors.
-  bool sound() const { return sound_; }
-
-  /// Returns the number of combinations; 1 without a sweep.
-  std::size_t count() const { return count_; }
+  Sweep(const JsonNode& root, ExperimentDocument& document,
+        const std::vector<std::string>& settings);
 
   /// Sets the fields of one combination; the last group is the fastest.
-  void Apply(std::size_t combination, ExperimentFields& fields) const;
+  void Apply(std::size_t combination, ExperimentDocument& document) const;
 
   /// Returns the values of a combination by axis name.
   Record Parameters(std::size_t combination) const;
 
-  /// Returns names of axes and numbers of values.
-  std::vector<std::pair<std::string, std::size_t>> Axes() const;
-
-  /// See ExperimentSource::EachValue().
-  std::vector<std::size_t> EachValue(std::size_t most) const;
+  /// Returns the index of each group's values in a combination.
+  std::vector<std::size_t> Indices(std::size_t combination) const;
 
   /// Records the origin of values, for messages.
   void Note(Origins* origins) const;
 
- private:
-  void Read(const JsonNode& node, ExperimentFields& fields,
-            const std::vector<std::string>& settings);
-  void CheckOverlaps(const JsonNode& node, const std::vector<std::string>& settings) const;
-  std::vector<std::size_t> Indices(std::size_t combination) const;
-
-  std::vector<SweepGroup> groups_;
-  std::size_t count_ = 1;
-  bool sound_ = true;
+  std::vector<SweepGroup> groups;
+  std::size_t count = 1;  ///< number of combinations; 1 without a sweep
+  bool is_sound = true;   ///< false if the sweep or an included mechanism file has errors
 };
 
 /// "exclude": returns conditions on case keys and axis names; excluded cases match one of them.

@@ -1,17 +1,12 @@
 // Sections of an experiment: tolerances, limits, output, reference; and fields by pointer.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
-#include <limits>
 
 #include "harness/base/text.h"
 #include "harness/config/benchmarks.h"
-#include "harness/config/experiment.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/config/published_series.h"
 
 namespace loopbench::harness {
 namespace {
@@ -73,6 +68,244 @@ const Fields<TimingFamily>& TimingFamilyFields() {
        {"methods", Methods(&TimingFamily::methods), "Methods to be timed.", "an array of methods"},
        {"", Json::object({{"allOf", ranges}})}});
   return fields;
+}
+
+// "output" of an experiment file: rows of a trajectory.
+
+constexpr int kMaxRows = 100'000'000;  // about 50 GB for a small mechanism
+constexpr const char* kOneWay =
+    "one of \"step\", \"number\", \"times\" and \"accepted_steps\": true";
+
+int WaysOf(const OutputOptions& output) {
+  return (output.step > 0.0) + (output.number > 0) + !output.times.empty() + output.accepted_steps;
+}
+
+/// Reports times that are given twice, missing or not ascending.
+void RequireOneWay(const JsonNode& node, OutputOptions& output) {
+  // invalid values are already reported
+  const bool said = node.Optional("step") || node.Optional("number") || node.Optional("times");
+  if (WaysOf(output) > 1) return node.FailAs("several definitions of times", kOneWay);
+  if (WaysOf(output) == 0 && !said) return node.FailAs("no times", kOneWay);
+  if (!std::ranges::is_sorted(output.times, std::ranges::less_equal())) {
+    node.Optional("times")->FailAs("times that do not rise", "each later than the one before");
+  }
+  if (output.exact && output.accepted_steps) {
+    node.FailAs("\"exact\" beside \"accepted_steps\"",
+                "one of them: the ends of steps are exact as they are");
+  }
+}
+
+Json OneWaySchema() {
+  Json ways = Json::array();
+  for (const char* key : {"step", "number", "times"}) ways.push_back(Requires({key}));
+  ways.push_back(
+      {{"required", {"accepted_steps"}}, {"properties", {{"accepted_steps", {{"const", true}}}}}});
+  return {{"oneOf", ways}};
+}
+
+// "reference" of an experiment file: reference solution of the motion.
+
+/// Reads published data of one problem; its errors are added to the experiment's errors.
+void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentProblem* problem) {
+  const std::string named = node.Text();
+  if (named.empty()) return;
+  const std::filesystem::path path = files.Resolve(named);
+  // names of an unreadable mechanism are unknown
+  const MechanismDescription& mechanism = problem->mechanism.description;
+  ReadNamedFile(node, path, "a published series", [&] {
+    problem->series = ReadPublishedSeries(path, mechanism.bodies.size() > 1 ? &mechanism : nullptr);
+  });
+}
+
+void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
+  std::vector<ExperimentProblem>& problems = experiment.problems;
+  if (node.value().is_string()) {
+    if (problems.size() == 1) {
+      ReadSeriesOf(node, *experiment.files, &problems.front());
+    } else if (problems.size() > 1) {
+      node.FailAs(fmt::format("one file for {} problems", problems.size()),
+                  "an object with the file of each problem that has one, by the problem's name");
+    }
+    return;
+  }
+  if (!node.value().is_object()) {
+    node.Fail("the path of a published series, or an object with one for each problem by its name");
+    return;
+  }
+  NameList names;
+  for (const ExperimentProblem& problem : problems) names.Add(problem.name);
+  if (!node.ExpectObject(names)) return;
+  if (node.value().empty()) node.Fail("at least one problem with its file");
+  for (ExperimentProblem& problem : problems) {
+    if (const auto file = node.Optional(problem.name)) {
+      ReadSeriesOf(*file, *experiment.files, &problem);
+    }
+  }
+}
+
+const Fields<ReferenceOptions>& ReferenceFields() {
+  static const NameList scalars({"as-needed", "long-double", "float128"});
+  static const Fields<ReferenceOptions> fields(
+      "reference",
+      "Reference solution of each mechanism and horizon, at high order in a wide floating-point "
+      "type, from three integrations: multipliers at two tolerances, O-DCA at one between them. "
+      "Runs are compared with it where the three agree. Stored next to the store. Or published "
+      "data.",
+      {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
+        "Floating-point type. float128 has 33 digits, takes about 50 times as long, and is for "
+        "planar mechanisms; as-needed adds it if long-double does not certify to the end."},
+       {"points", Integer(&ReferenceOptions::points, 2, kMaxPoints),
+        "Number of times with errors, evenly from the start to the end."},
+       {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
+        "CPU time of each integration [s]. If it is exceeded, only the completed part is "
+        "certified."},
+       {"published_data", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
+        "Instead of a computed reference: path of published data (series.schema.json), relative "
+        "to this file. For several problems, an object of paths by problem name. Problems "
+        "without a path have no reference."},
+       {"", Alone<ReferenceOptions>("published_data", false, {"scalar", "points", "cpu_s"},
+                                    "what was published is not made")}});
+  return fields;
+}
+
+void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment) {
+  ReferenceFields().Read(node, &experiment.reference.emplace());
+  const auto series = node.Optional("published_data");
+  if (!series) return;
+  experiment.reference.reset();
+  ReadSeries(*series, experiment);
+}
+
+// Fields of the document by JSON Pointer.
+
+/// Returns an index of a JSON Pointer.
+std::optional<std::size_t> IndexOf(const std::string& token) {
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), index);
+  const bool number = error == std::errc() && end == token.data() + token.size();
+  if (!number || (token.size() > 1 && token.front() == '0')) return std::nullopt;
+  return index;
+}
+
+std::string PlaceName(const std::string& pointer) { return pointer.empty() ? "the file" : pointer; }
+
+std::vector<std::string> KeysOf(const Json& object) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.push_back(key);
+  return keys;
+}
+
+FieldFault NoElement(const Json& array, const std::string& token, const std::string& pointer) {
+  return {fmt::format("no element \"{}\" in {}", token, PlaceName(pointer)),
+          array.empty() ? "another field: the array is empty"
+                        : fmt::format("an index from 0 to {} or \"*\"", array.size() - 1),
+          "", ""};
+}
+
+FieldFault NoKey(const Json& object, const std::string& token, const std::string& pointer) {
+  const std::vector<std::string> keys = KeysOf(object);
+  return {fmt::format("no \"{}\" in {}", token, PlaceName(pointer)),
+          keys.empty() ? "another field: the object is empty"
+                       : fmt::format("one of \"{}\"", fmt::join(keys, "\", \"")),
+          NearestSpelling(token, keys), ""};
+}
+
+/// Returns the name of a field in "limits": "wall_s" is the former name of "cpu_s".
+std::string NameInLimits(const Json& limits, const std::string& token) {
+  const std::string other = token == "wall_s" ? "cpu_s" : token == "cpu_s" ? "wall_s" : token;
+  return limits.contains(token) || !limits.contains(other) ? token : other;
+}
+
+/// Returns the tokens of a JSON Pointer, or nothing if it is invalid (no leading "/", "~" without 0
+/// or 1).
+std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) {
+  if (pointer.empty() || pointer.front() != '/') return std::nullopt;
+  std::vector<std::string> tokens;
+  for (std::size_t i = 0; i < pointer.size(); ++i) {
+    if (pointer[i] == '/') {
+      tokens.emplace_back();
+    } else if (pointer[i] != '~') {
+      tokens.back() += pointer[i];
+    } else if (i + 1 < pointer.size() && (pointer[i + 1] == '0' || pointer[i + 1] == '1')) {
+      tokens.back() += pointer[++i] == '0' ? '~' : '/';
+    } else {
+      return std::nullopt;
+    }
+  }
+  return tokens;
+}
+
+/// Replaces the path of a mechanism file by the file's document.
+bool TakeIn(ExperimentDocument& document, Json& node, const std::string& pointer,
+            FieldTargets* found) {
+  const std::filesystem::path path = document.files.Resolve(node.get<std::string>());
+  try {
+    if (!std::filesystem::is_regular_file(path)) {
+      found->fault = {fmt::format("\"{}\" at {}", node.get<std::string>(), pointer),
+                      fmt::format("a mechanism file ({} is none)", path.string()), "", "", true};
+      return false;
+    }
+    node = document.files.Document(path);
+    document.origins.TakeIn(pointer, path.string(), document.files.Text(path));
+    return true;
+  } catch (const ConfigError& mistakes) {
+    found->fault = FieldFault{"", "", "", mistakes.what(), true};
+    return false;
+  }
+}
+
+/// Follows the tokens of a pointer from `node`, which is at `depth`.
+void Walk(ExperimentDocument& document, Json& node, const std::vector<std::string>& tokens,
+          std::size_t depth, const std::string& pointer, FieldTargets* found) {
+  if (found->fault) return;
+  if (depth == tokens.size()) {
+    found->pointers.push_back(pointer);
+    found->made.push_back(pointer);
+    return;
+  }
+  const bool at_mechanism = depth == 3 && tokens[0] == "problems" && tokens[2] == "mechanism";
+  if (at_mechanism && node.is_string() && !TakeIn(document, node, pointer, found)) return;
+  const bool of_limits = depth == 1 && tokens[0] == "limits" && node.is_object();
+  const std::string token = of_limits ? NameInLimits(node, tokens[depth]) : tokens[depth];
+  if (node.is_array()) {
+    const auto index = IndexOf(token);
+    if (token == "*" && !node.empty()) {
+      for (std::size_t i = 0; i < node.size(); ++i) {
+        Walk(document, node[i], tokens, depth + 1, fmt::format("{}/{}", pointer, i), found);
+      }
+    } else if (index && *index < node.size()) {
+      Walk(document, node[*index], tokens, depth + 1, pointer + "/" + token, found);
+    } else {
+      found->fault = NoElement(node, token, pointer);
+    }
+    return;
+  }
+  if (!node.is_object()) {
+    found->fault = FieldFault{
+        fmt::format("no \"{}\" in {}, which is {}", token, PlaceName(pointer),
+                    node.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, 60)),
+        "a field of an object or array", "", ""};
+    return;
+  }
+  const std::string below = pointer + "/" + PointerToken(token);
+  if (const auto member = node.find(token); member != node.end()) {
+    Walk(document, *member, tokens, depth + 1, below, found);
+    return;
+  }
+  // Points may have any name: a misspelt name would be created without effect. The content of a
+  // missing array is unknown.
+  const bool free_names = depth > 0 && tokens[depth - 1] == "points";
+  const bool in_array = std::any_of(
+      tokens.begin() + static_cast<std::ptrdiff_t>(depth) + 1, tokens.end(),
+      [](const std::string& later) { return later == "*" || IndexOf(later).has_value(); });
+  if (free_names || in_array) {
+    found->fault = NoKey(node, token, pointer);
+    return;
+  }
+  std::string whole = below;
+  for (std::size_t i = depth + 1; i < tokens.size(); ++i) whole += "/" + PointerToken(tokens[i]);
+  found->pointers.push_back(whole);
+  found->made.push_back(below);
 }
 
 }  // namespace
@@ -152,7 +385,7 @@ const Fields<Precision>& PrecisionFields() {
       "precision",
       "Runs of the methods in several floating-point types with one integrator (ode45), compared "
       "with a reference in float128. Planar mechanisms; one horizon per problem.",
-      {{"scalars", Choices(&Precision::scalars, NamesOf<Scalar>(), "a scalar"),
+      {{"scalars", Choices(&Precision::scalars, NamesOf<Scalar>, "a scalar"),
         "Floating-point types, usually narrowest first.", "a list of scalars"},
        {"tolerances", NumberList(&Precision::tolerances, kTolerancesOfLadders),
         "Tolerances rtol = atol; default: as in the experiment."},
@@ -161,43 +394,6 @@ const Fields<Precision>& PrecisionFields() {
        {"reference", Number(&Precision::reference, kReferences), "Tolerance of the reference."}});
   return fields;
 }
-
-// "output" of an experiment file: rows of a trajectory.
-
-namespace {
-
-constexpr int kMaxRows = 100'000'000;  // about 50 GB for a small mechanism
-constexpr const char* kOneWay =
-    "one of \"step\", \"number\", \"times\" and \"accepted_steps\": true";
-
-int WaysOf(const OutputOptions& output) {
-  return (output.step > 0.0) + (output.number > 0) + !output.times.empty() + output.accepted_steps;
-}
-
-/// Reports times that are given twice, missing or not ascending.
-void RequireOneWay(const JsonNode& node, OutputOptions& output) {
-  // invalid values are already reported
-  const bool said = node.Optional("step") || node.Optional("number") || node.Optional("times");
-  if (WaysOf(output) > 1) return node.FailAs("several definitions of times", kOneWay);
-  if (WaysOf(output) == 0 && !said) return node.FailAs("no times", kOneWay);
-  if (!std::ranges::is_sorted(output.times, std::ranges::less_equal())) {
-    node.Optional("times")->FailAs("times that do not rise", "each later than the one before");
-  }
-  if (output.exact && output.accepted_steps) {
-    node.FailAs("\"exact\" beside \"accepted_steps\"",
-                "one of them: the ends of steps are exact as they are");
-  }
-}
-
-Json OneWaySchema() {
-  Json ways = Json::array();
-  for (const char* key : {"step", "number", "times"}) ways.push_back(Requires({key}));
-  ways.push_back(
-      {{"required", {"accepted_steps"}}, {"properties", {{"accepted_steps", {{"const", true}}}}}});
-  return {{"oneOf", ways}};
-}
-
-}  // namespace
 
 const Fields<OutputOptions>& OutputFields() {
   static const Fields<OutputOptions> fields(
@@ -215,7 +411,7 @@ const Fields<OutputOptions>& OutputFields() {
         "If true, integrator steps end at the times, which changes the run. If false, rows are "
         "taken from dense output, and the run is unchanged."},
        {"quantities",
-        Choices(&OutputOptions::quantities, NamesOf<OutputPart>(), "a part of a trajectory"),
+        Choices(&OutputOptions::quantities, NamesOf<OutputPart>, "a part of a trajectory"),
         "Quantities in each row; default: all."},
        {"axes", Choice(&OutputOptions::axes, NamesOf<OutputAxes>(), "axes"),
         "Axes of reactions: ground axes, or each joint's frame on its first body."},
@@ -278,218 +474,11 @@ std::string ToString(const OutputOptions& output) {
   return text + fmt::format(" {}", kNames<OutputAxes>[static_cast<std::size_t>(output.axes)]);
 }
 
-// "reference" of an experiment file: reference solution of the motion.
-
-namespace {
-
-/// Reads published data of one problem; its errors are added to the experiment's errors.
-void ReadSeriesOf(const JsonNode& node, const MechanismFiles& files, ExperimentProblem* problem) {
-  const std::string named = node.Text();
-  if (named.empty()) return;
-  const std::filesystem::path path = files.Resolve(named);
-  if (!ExpectFile(node, path, "a published series")) return;
-  // names of an unreadable mechanism are unknown
-  const MechanismDescription& mechanism = problem->mechanism.description;
-  try {
-    problem->series = ReadPublishedSeries(path, mechanism.bodies.size() > 1 ? &mechanism : nullptr);
-  } catch (const ConfigError& mistakes) {
-    node.errors().AddText(mistakes.what());
-  }
+FieldValue<ExperimentFile> ReferenceValue() {
+  return By(ReferenceFields().Schema(), ReadReferenceOptions);
 }
 
-void ReadSeries(const JsonNode& node, ExperimentFile& experiment) {
-  std::vector<ExperimentProblem>& problems = experiment.problems;
-  if (node.value().is_string()) {
-    if (problems.size() == 1) {
-      ReadSeriesOf(node, *experiment.files, &problems.front());
-    } else if (problems.size() > 1) {
-      node.FailAs(fmt::format("one file for {} problems", problems.size()),
-                  "an object with the file of each problem that has one, by the problem's name");
-    }
-    return;
-  }
-  if (!node.value().is_object()) {
-    node.Fail("the path of a published series, or an object with one for each problem by its name");
-    return;
-  }
-  NameList names;
-  for (const ExperimentProblem& problem : problems) names.Add(problem.name);
-  if (!node.ExpectObject(names)) return;
-  if (node.value().empty()) node.Fail("at least one problem with its file");
-  for (ExperimentProblem& problem : problems) {
-    if (const auto file = node.Optional(problem.name)) {
-      ReadSeriesOf(*file, *experiment.files, &problem);
-    }
-  }
-}
-
-}  // namespace
-
-const Fields<ReferenceOptions>& ReferenceFields() {
-  static const NameList scalars({"as-needed", "long-double", "float128"});
-  static const Fields<ReferenceOptions> fields(
-      "reference",
-      "Reference solution of each mechanism and horizon, at high order in a wide floating-point "
-      "type, from three integrations: multipliers at two tolerances, O-DCA at one between them. "
-      "Runs are compared with it where the three agree. Stored next to the store. Or published "
-      "data.",
-      {{"scalar", Choice(&ReferenceOptions::scalar, scalars, "a wide scalar"),
-        "Floating-point type. float128 has 33 digits, takes about 50 times as long, and is for "
-        "planar mechanisms; as-needed adds it if long-double does not certify to the end."},
-       {"points", Integer(&ReferenceOptions::points, 2, kMaxPoints),
-        "Number of times with errors, evenly from the start to the end."},
-       {"cpu_s", Number(&ReferenceOptions::cpu_s, kPositive),
-        "CPU time of each integration [s]. If it is exceeded, only the completed part is "
-        "certified."},
-       {"published_data", EitherSchema({TextSchema(), MapSchema(TextSchema(), 1)}),
-        "Instead of a computed reference: path of published data (series.schema.json), relative "
-        "to this file. For several problems, an object of paths by problem name. Problems "
-        "without a path have no reference."},
-       {"", Alone<ReferenceOptions>("published_data", false, {"scalar", "points", "cpu_s"},
-                                    "what was published is not made")}});
-  return fields;
-}
-
-void ReadReferenceOptions(const JsonNode& node, ExperimentFile& experiment) {
-  ReferenceFields().Read(node, &experiment.reference.emplace());
-  const auto series = node.Optional("published_data");
-  if (!series) return;
-  experiment.reference.reset();
-  ReadSeries(*series, experiment);
-}
-namespace {
-
-/// Returns an index of a JSON Pointer.
-std::optional<std::size_t> IndexOf(const std::string& token) {
-  std::size_t index = 0;
-  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), index);
-  const bool number = error == std::errc() && end == token.data() + token.size();
-  if (!number || (token.size() > 1 && token.front() == '0')) return std::nullopt;
-  return index;
-}
-
-std::string PlaceName(const std::string& pointer) { return pointer.empty() ? "the file" : pointer; }
-
-std::vector<std::string> KeysOf(const Json& object) {
-  std::vector<std::string> keys;
-  for (const auto& [key, value] : object.items()) keys.push_back(key);
-  return keys;
-}
-
-FieldFault NoElement(const Json& array, const std::string& token, const std::string& pointer) {
-  return {fmt::format("no element \"{}\" in {}", token, PlaceName(pointer)),
-          array.empty() ? "another field: the array is empty"
-                        : fmt::format("an index from 0 to {} or \"*\"", array.size() - 1),
-          "", ""};
-}
-
-FieldFault NoKey(const Json& object, const std::string& token, const std::string& pointer) {
-  const std::vector<std::string> keys = KeysOf(object);
-  return {fmt::format("no \"{}\" in {}", token, PlaceName(pointer)),
-          keys.empty() ? "another field: the object is empty"
-                       : fmt::format("one of \"{}\"", fmt::join(keys, "\", \"")),
-          NearestSpelling(token, keys), ""};
-}
-
-/// Returns the name of a field in "limits": "wall_s" is the former name of "cpu_s".
-std::string NameInLimits(const Json& limits, const std::string& token) {
-  const std::string other = token == "wall_s" ? "cpu_s" : token == "cpu_s" ? "wall_s" : token;
-  return limits.contains(token) || !limits.contains(other) ? token : other;
-}
-
-/// Returns the tokens of a JSON Pointer, or nothing if it is invalid (no leading "/", "~" without 0
-/// or 1).
-std::optional<std::vector<std::string>> PointerTokens(const std::string& pointer) {
-  if (pointer.empty() || pointer.front() != '/') return std::nullopt;
-  std::vector<std::string> tokens;
-  for (std::size_t i = 0; i < pointer.size(); ++i) {
-    if (pointer[i] == '/') {
-      tokens.emplace_back();
-    } else if (pointer[i] != '~') {
-      tokens.back() += pointer[i];
-    } else if (i + 1 < pointer.size() && (pointer[i + 1] == '0' || pointer[i + 1] == '1')) {
-      tokens.back() += pointer[++i] == '0' ? '~' : '/';
-    } else {
-      return std::nullopt;
-    }
-  }
-  return tokens;
-}
-
-}  // namespace
-
-bool ExperimentFields::TakeIn(Json& node, const std::string& pointer, FieldTargets* found) {
-  const std::filesystem::path path = files_.Resolve(node.get<std::string>());
-  try {
-    if (!std::filesystem::is_regular_file(path)) {
-      found->fault = {fmt::format("\"{}\" at {}", node.get<std::string>(), pointer),
-                      fmt::format("a mechanism file ({} is none)", path.string()), "", "", true};
-      return false;
-    }
-    Json document = files_.Document(path);
-    node = std::move(document);
-    origins_.TakeIn(pointer, path.string(), files_.Text(path));
-    return true;
-  } catch (const ConfigError& mistakes) {
-    found->fault = FieldFault{"", "", "", mistakes.what(), true};
-    return false;
-  }
-}
-
-void ExperimentFields::Walk(Json& node, const std::vector<std::string>& tokens, std::size_t depth,
-                            const std::string& pointer, FieldTargets* found) {
-  if (found->fault) return;
-  if (depth == tokens.size()) {
-    found->pointers.push_back(pointer);
-    found->made.push_back(pointer);
-    return;
-  }
-  const bool at_mechanism = depth == 3 && tokens[0] == "problems" && tokens[2] == "mechanism";
-  if (at_mechanism && node.is_string() && !TakeIn(node, pointer, found)) return;
-  const bool of_limits = depth == 1 && tokens[0] == "limits" && node.is_object();
-  const std::string token = of_limits ? NameInLimits(node, tokens[depth]) : tokens[depth];
-  if (node.is_array()) {
-    const auto index = IndexOf(token);
-    if (token == "*" && !node.empty()) {
-      for (std::size_t i = 0; i < node.size(); ++i) {
-        Walk(node[i], tokens, depth + 1, fmt::format("{}/{}", pointer, i), found);
-      }
-    } else if (index && *index < node.size()) {
-      Walk(node[*index], tokens, depth + 1, pointer + "/" + token, found);
-    } else {
-      found->fault = NoElement(node, token, pointer);
-    }
-    return;
-  }
-  if (!node.is_object()) {
-    found->fault = FieldFault{
-        fmt::format("no \"{}\" in {}, which is {}", token, PlaceName(pointer),
-                    node.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, 60)),
-        "a field of an object or array", "", ""};
-    return;
-  }
-  const std::string below = pointer + "/" + PointerToken(token);
-  if (const auto member = node.find(token); member != node.end()) {
-    Walk(*member, tokens, depth + 1, below, found);
-    return;
-  }
-  // Points may have any name: a misspelt name would be created without effect. The content of a
-  // missing array is unknown.
-  const bool free_names = depth > 0 && tokens[depth - 1] == "points";
-  const bool in_array = std::any_of(
-      tokens.begin() + static_cast<std::ptrdiff_t>(depth) + 1, tokens.end(),
-      [](const std::string& later) { return later == "*" || IndexOf(later).has_value(); });
-  if (free_names || in_array) {
-    found->fault = NoKey(node, token, pointer);
-    return;
-  }
-  std::string whole = below;
-  for (std::size_t i = depth + 1; i < tokens.size(); ++i) whole += "/" + PointerToken(tokens[i]);
-  found->pointers.push_back(whole);
-  found->made.push_back(below);
-}
-
-FieldTargets ExperimentFields::Find(const std::string& pointer) {
+FieldTargets ExperimentDocument::Find(const std::string& pointer) {
   FieldTargets found;
   const auto tokens = PointerTokens(pointer);
   if (!tokens) {
@@ -497,12 +486,12 @@ FieldTargets ExperimentFields::Find(const std::string& pointer) {
                              "a JSON Pointer such as /problems/0/horizon", "", ""};
     return found;
   }
-  Walk(document_, *tokens, 0, "", &found);
+  Walk(*this, json, *tokens, 0, "", &found);
   return found;
 }
 
-void ExperimentFields::Set(const std::string& pointer, const Json& value) {
-  Json* node = &document_;
+void ExperimentDocument::Set(const std::string& pointer, const Json& value) {
+  Json* node = &json;
   const std::vector<std::string> tokens = PointerTokens(pointer).value();
   for (const std::string& token : tokens) {
     node = node->is_array() ? &(*node)[*IndexOf(token)] : &(*node)[token];

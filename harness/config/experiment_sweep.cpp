@@ -1,14 +1,11 @@
 // Sections of an experiment: sweep, methods, exclusions.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "harness/base/record.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/experiment_sections.h"
-#include "harness/config/formulations.h"
 
 namespace loopbench::harness {
 namespace {
@@ -50,26 +47,26 @@ std::vector<Value> AsParameters(const std::vector<Json>& values) {
   return parameters;
 }
 
-/// Axis being read.
-struct AxisOfSweep : SweepAxis {
-  ExperimentFields* experiment = nullptr;
-  std::set<std::string>* taken = nullptr;
+/// Document with the fields of axes, and names of axes so far.
+struct AxisContext {
+  ExperimentDocument& document;
+  std::set<std::string> taken = {};
 };
 
 /// Reads the name of an axis, which becomes a key of records.
-void ReadAxisName(const JsonNode& node, AxisOfSweep& axis) {
+void ReadAxisName(const JsonNode& node, SweepAxis& axis, AxisContext& context) {
   axis.name = node.Text();
   if (axis.name.empty()) return;
   if (!IsName(axis.name)) {
     node.Fail("a name of letters, digits, \"_\" and \"-\" that begins with a letter");
   } else if (IsReserved(axis.name)) {
     node.Fail("a name that records do not use already");
-  } else if (!axis.taken->insert(axis.name).second) {
+  } else if (!context.taken.insert(axis.name).second) {
     node.Fail("a name that no other axis has");
   }
 }
 
-void ReadField(const JsonNode& node, AxisOfSweep& axis) {
+void ReadField(const JsonNode& node, SweepAxis& axis, AxisContext& context) {
   const std::string pointer = node.Text();
   if (pointer.empty()) return;
   for (const char* own : {"/sweep", "/exclude"}) {
@@ -78,13 +75,13 @@ void ReadField(const JsonNode& node, AxisOfSweep& axis) {
       return;
     }
   }
-  axis.fields = axis.experiment->Find(pointer);
+  axis.fields = context.document.Find(pointer);
   if (!axis.fields.fault) return;
   const FieldFault& fault = *axis.fields.fault;
   if (!fault.of_file) node.FailAs(fault.found, fault.expected, fault.suggestion);
 }
 
-void ReadValues(const JsonNode& node, AxisOfSweep& axis) {
+void ReadValues(const JsonNode& node, SweepAxis& axis) {
   if (node.value().is_object()) {
     for (const double number : node.Spaced()) axis.values.emplace_back(number);
   } else if (!node.value().is_array() || node.value().empty()) {
@@ -95,10 +92,10 @@ void ReadValues(const JsonNode& node, AxisOfSweep& axis) {
   axis.parameters = AsParameters(axis.values);
 }
 
-const Fields<AxisOfSweep>& AxisFields() {
+const Fields<SweepAxis, AxisContext>& AxisFields() {
   static const Json values =
       EitherSchema({ArraySchema(Json::object(), 1), SpacedSchema(NumberSchema(), false)});
-  static const Fields<AxisOfSweep> fields(
+  static const Fields<SweepAxis, AxisContext> fields(
       "axis", "Values of one field.",
       {{"name", By(PatternSchema("^[A-Za-z][A-Za-z0-9_-]*$"), ReadAxisName),
         "Key in every record, for filters and tables. It differs from all other keys of records.",
@@ -113,12 +110,10 @@ const Fields<AxisOfSweep>& AxisFields() {
   return fields;
 }
 
-SweepAxis ReadAxis(const JsonNode& node, ExperimentFields& fields, std::set<std::string>* taken) {
-  AxisOfSweep axis;
+SweepAxis ReadAxis(const JsonNode& node, AxisContext& context) {
+  SweepAxis axis;
   axis.source = node.pointer();
-  axis.experiment = &fields;
-  axis.taken = taken;
-  AxisFields().Read(node, &axis);
+  AxisFields().Read(node, &axis, context);
   return axis;
 }
 
@@ -139,17 +134,17 @@ void CheckDistinct(const JsonNode& node, const SweepGroup& group) {
   }
 }
 
-SweepGroup ReadGroup(const JsonNode& node, ExperimentFields& fields, std::set<std::string>* taken) {
+SweepGroup ReadGroup(const JsonNode& node, AxisContext& context) {
   SweepGroup group;
   if (!node.value().is_object() || !node.value().contains("zip")) {
-    group.axes.push_back(ReadAxis(node, fields, taken));
+    group.axes.push_back(ReadAxis(node, context));
   } else if (node.ExpectObject({"zip"})) {
     const JsonNode zip = *node.Optional("zip");
     const std::vector<JsonNode> elements = zip.Elements("axes");
     if (zip.value().is_array() && elements.size() < 2)
       zip.FailAs(elements.empty() ? "no axes" : "one axis", "at least two axes");
     for (const JsonNode& element : elements) {
-      group.axes.push_back(ReadAxis(element, fields, taken));
+      group.axes.push_back(ReadAxis(element, context));
       const SweepAxis& first = group.axes.front();
       const std::size_t count = group.axes.back().values.size();
       if (count == 0 || first.values.empty() || count == first.values.size()) continue;
@@ -160,56 +155,12 @@ SweepGroup ReadGroup(const JsonNode& node, ExperimentFields& fields, std::set<st
   return group;
 }
 
-}  // namespace
-
-Json SweepSchema() {
-  const Json axis = AxisFields().Schema();
-  Json zip = ObjectSchema("", {{"zip", ArraySchema(axis, 2), "Axes that advance together.", true}});
-  zip["words"] = "`{\"zip\": [axis, ...]}`";
-  return ArraySchema(EitherSchema({axis, zip}), 0, kMaxAxes);
-}
-
-Sweep::Sweep(const JsonNode& root, ExperimentFields& fields,
-             const std::vector<std::string>& settings) {
-  const auto node = root.Optional("sweep");
-  if (!node) return;
-  Read(*node, fields, settings);
-  sound_ = sound_ && node->errors().empty();
-}
-
-void Sweep::Read(const JsonNode& node, ExperimentFields& fields,
-                 const std::vector<std::string>& settings) {
-  const std::vector<JsonNode> elements = node.Elements("axes");
-  if (elements.size() > kMaxAxes) node.Fail(fmt::format("at most {} axes", kMaxAxes));
-  if (elements.size() > kMaxAxes || node.errors().full()) return;
-  std::set<std::string> taken;
-  for (const JsonNode& element : elements) {
-    SweepGroup group = ReadGroup(element, fields, &taken);
-    const bool same = !group.axes.empty() && std::ranges::all_of(group.axes, [&](const auto& axis) {
-      return !axis.values.empty() && axis.values.size() == group.count();
-    });
-    sound_ = sound_ && same && std::ranges::none_of(group.axes, [](const auto& axis) {
-               return axis.fields.fault.has_value();
-             });
-    if (same) CheckDistinct(element, group);
-    if (same) groups_.push_back(std::move(group));
-  }
-  if (!sound_) return;
-  CheckOverlaps(node, settings);
-  double combinations = 1.0;
-  for (const SweepGroup& group : groups_) combinations *= static_cast<double>(group.count());
-  if (combinations > static_cast<double>(kMaxCombinations)) {
-    node.FailAs(fmt::format("{:.0f} combinations", combinations),
-                fmt::format("at most {}", kMaxCombinations));
-    return;
-  }
-  count_ = static_cast<std::size_t>(combinations);
-}
-
-void Sweep::CheckOverlaps(const JsonNode& node, const std::vector<std::string>& settings) const {
+/// Reports fields that two axes set, or that --set sets in a swept field.
+void CheckOverlaps(const JsonNode& node, const std::vector<SweepGroup>& groups,
+                   const std::vector<std::string>& settings) {
   // with a final "/" a pointer sorts directly before its children
-  std::vector<std::pair<std::string, std::string>> set, given;
-  for (const SweepGroup& group : groups_) {
+  std::vector<std::pair<std::string, std::string>> set;
+  for (const SweepGroup& group : groups) {
     for (const SweepAxis& axis : group.axes) {
       for (const std::string& pointer : axis.fields.pointers)
         set.emplace_back(pointer + "/", axis.name);
@@ -236,74 +187,37 @@ void Sweep::CheckOverlaps(const JsonNode& node, const std::vector<std::string>& 
   }
 }
 
-std::vector<std::size_t> Sweep::Indices(std::size_t combination) const {
-  std::vector<std::size_t> indices(groups_.size());
-  for (std::size_t i = groups_.size(); i-- > 0;) {
-    indices[i] = combination % groups_[i].count();
-    combination /= groups_[i].count();
+void ReadSweep(const JsonNode& node, ExperimentDocument& document,
+               const std::vector<std::string>& settings, Sweep* sweep) {
+  const std::vector<JsonNode> elements = node.Elements("axes");
+  if (elements.size() > kMaxAxes) node.Fail(fmt::format("at most {} axes", kMaxAxes));
+  if (elements.size() > kMaxAxes || node.errors().full()) return;
+  AxisContext context{document};
+  double combinations = 1.0;
+  for (const JsonNode& element : elements) {
+    SweepGroup group = ReadGroup(element, context);
+    const bool same = !group.axes.empty() && std::ranges::all_of(group.axes, [&](const auto& axis) {
+      return !axis.values.empty() && axis.values.size() == group.count();
+    });
+    sweep->is_sound = sweep->is_sound && same && std::ranges::none_of(group.axes, [](auto& axis) {
+                        return axis.fields.fault.has_value();
+                      });
+    if (!same) continue;
+    CheckDistinct(element, group);
+    combinations *= static_cast<double>(group.count());
+    sweep->groups.push_back(std::move(group));
   }
-  return indices;
-}
-
-void Sweep::Apply(std::size_t combination, ExperimentFields& fields) const {
-  const std::vector<std::size_t> indices = Indices(combination);
-  for (std::size_t i = 0; i < groups_.size(); ++i) {
-    for (const SweepAxis& axis : groups_[i].axes) {
-      for (const std::string& pointer : axis.fields.pointers) {
-        fields.Set(pointer, axis.values[indices[i]]);
-      }
-    }
+  if (!sweep->is_sound) return;
+  CheckOverlaps(node, sweep->groups, settings);
+  if (combinations > static_cast<double>(kMaxCombinations)) {
+    node.FailAs(fmt::format("{:.0f} combinations", combinations),
+                fmt::format("at most {}", kMaxCombinations));
+    return;
   }
-}
-
-Record Sweep::Parameters(std::size_t combination) const {
-  Record parameters;
-  const std::vector<std::size_t> indices = Indices(combination);
-  for (std::size_t i = 0; i < groups_.size(); ++i) {
-    for (const SweepAxis& axis : groups_[i].axes) {
-      parameters.Set(axis.name, axis.parameters[indices[i]]);
-    }
-  }
-  return parameters;
-}
-
-std::vector<std::pair<std::string, std::size_t>> Sweep::Axes() const {
-  std::vector<std::pair<std::string, std::size_t>> axes;
-  for (const SweepGroup& group : groups_) {
-    for (const SweepAxis& axis : group.axes) axes.emplace_back(axis.name, axis.values.size());
-  }
-  return axes;
-}
-
-std::vector<std::size_t> Sweep::EachValue(std::size_t most) const {
-  std::set<std::size_t> combinations = {0, count_ - 1};
-  std::size_t stride = 1;  // between neighbouring values of the group
-  for (std::size_t i = groups_.size(); i-- > 0;) {
-    const std::size_t count = groups_[i].count(), taken = std::min(count, most);
-    for (std::size_t k = 1; k < taken; ++k) {
-      combinations.insert(stride * (k * (count - 1) / (taken - 1)));
-    }
-    stride *= count;
-  }
-  return {combinations.begin(), combinations.end()};
-}
-
-void Sweep::Note(Origins* origins) const {
-  // two axes may have created one object: notes of fields follow notes of their parents
-  for (const bool whole : {true, false}) {
-    for (const SweepGroup& group : groups_) {
-      for (const SweepAxis& axis : group.axes) {
-        for (const std::string& pointer : whole ? axis.fields.made : axis.fields.pointers) {
-          origins->Note(pointer, fmt::format("a value of axis \"{}\"", axis.name), axis.source);
-        }
-      }
-    }
-  }
+  sweep->count = static_cast<std::size_t>(combinations);
 }
 
 // "methods" of an experiment file.
-
-namespace {
 
 /// Entry of "methods", expanded as a cross product.
 struct MethodLists {
@@ -373,19 +287,18 @@ void ReadGains(const JsonNode& node, MethodLists& lists) {
 const Fields<MethodLists>& MethodFields() {
   static const Fields<MethodLists> fields(
       "method", "Method that imposes the loop constraints. Lists expand as a cross product.",
-      {{"formulation", FormulationChoices(&MethodLists::formulations),
+      {{"formulation", Choices(&MethodLists::formulations, FormulationNames, "a formulation"),
         "Algorithm that imposes the constraints.", "a formulation"},
-       {"enforcement", LevelChoices(&MethodLists::enforcements),
+       {"enforcement", Choices(&MethodLists::enforcements, LevelNames, "a level of enforcement"),
         "Level at which constraints are enforced.", "a level of enforcement"},
-       {"coordinates",
-        Choices(&MethodLists::coordinates, NamesOf<Coordinates>(), "a coordinate set"),
+       {"coordinates", Choices(&MethodLists::coordinates, NamesOf<Coordinates>, "a coordinate set"),
         "Coordinates of the joints of a tree, or of every body."},
-       {"solver", Choices(&MethodLists::solvers, NamesOf<SolverKind>(), "a solver"),
+       {"solver", Choices(&MethodLists::solvers, NamesOf<SolverKind>, "a solver"),
         "Solver of the formulation. In reduction, plain uses the fixed independent set, "
         "rank-revealing the automatic partition."},
        {"threads", IntegerList(&MethodLists::threads, 1, kMaxThreads),
         "Threads for one right-hand side. Results are bitwise equal for any number."},
-       {"execution", Choices(&MethodLists::executions, NamesOf<Execution>(), "an execution"),
+       {"execution", Choices(&MethodLists::executions, NamesOf<Execution>, "an execution"),
         "Right-hand sides by the library, with or without fast paths (general), or by C code "
         "generated from it, without or with fused multiply-add (docs/operation-counts.md)."},
        {"alpha", NumberSchema(kNotNegative),
@@ -421,6 +334,65 @@ std::vector<Method> ReadMethodEntry(const JsonNode& node) {
 }
 
 }  // namespace
+
+Json SweepSchema() {
+  const Json axis = AxisFields().Schema();
+  Json zip = ObjectSchema("", {{"zip", ArraySchema(axis, 2), "Axes that advance together.", true}});
+  zip["words"] = "`{\"zip\": [axis, ...]}`";
+  return ArraySchema(EitherSchema({axis, zip}), 0, kMaxAxes);
+}
+
+Sweep::Sweep(const JsonNode& root, ExperimentDocument& document,
+             const std::vector<std::string>& settings) {
+  const auto node = root.Optional("sweep");
+  if (!node) return;
+  ReadSweep(*node, document, settings, this);
+  is_sound = is_sound && node->errors().empty();
+}
+
+std::vector<std::size_t> Sweep::Indices(std::size_t combination) const {
+  std::vector<std::size_t> indices(groups.size());
+  for (std::size_t i = groups.size(); i-- > 0;) {
+    indices[i] = combination % groups[i].count();
+    combination /= groups[i].count();
+  }
+  return indices;
+}
+
+void Sweep::Apply(std::size_t combination, ExperimentDocument& document) const {
+  const std::vector<std::size_t> indices = Indices(combination);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    for (const SweepAxis& axis : groups[i].axes) {
+      for (const std::string& pointer : axis.fields.pointers) {
+        document.Set(pointer, axis.values[indices[i]]);
+      }
+    }
+  }
+}
+
+Record Sweep::Parameters(std::size_t combination) const {
+  Record parameters;
+  const std::vector<std::size_t> indices = Indices(combination);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    for (const SweepAxis& axis : groups[i].axes) {
+      parameters.Set(axis.name, axis.parameters[indices[i]]);
+    }
+  }
+  return parameters;
+}
+
+void Sweep::Note(Origins* origins) const {
+  // two axes may have created one object: notes of fields follow notes of their parents
+  for (const bool whole : {true, false}) {
+    for (const SweepGroup& group : groups) {
+      for (const SweepAxis& axis : group.axes) {
+        for (const std::string& pointer : whole ? axis.fields.made : axis.fields.pointers) {
+          origins->Note(pointer, fmt::format("a value of axis \"{}\"", axis.name), axis.source);
+        }
+      }
+    }
+  }
+}
 
 Json MethodsSchema() { return Named("methods", OneOrMoreSchema(MethodFields().Schema())); }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <type_traits>
 
+#include "harness/base/text.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/description/registration.h"
 #include "odca/odca.h"
@@ -89,16 +90,12 @@ void RegisterFormulation(FormulationRow row, int alignment) {
 const std::deque<FormulationRow>& Formulations() { return Rows(); }
 
 std::vector<std::string> FormulationNames() {
-  std::vector<std::string> names;
-  for (const FormulationRow& row : Rows()) names.push_back(row.name);
-  return names;
+  return Mapped<std::string>(Rows(), &FormulationRow::name);
 }
 
 std::vector<std::string> FormulationNamesWithoutPeers() {
-  std::vector<std::string> names;
-  for (const FormulationRow& row : Rows()) {
-    if (!row.is_peer()) names.push_back(row.name);
-  }
+  std::vector<std::string> names = FormulationNames();
+  std::erase_if(names, [](const std::string& name) { return FindFormulation(name)->is_peer(); });
   return names;
 }
 

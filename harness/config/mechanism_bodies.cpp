@@ -27,7 +27,7 @@ Json WritePoints(const Points& points, const Draft& draft) {
   // names are unique: append, since written[name] would search the list
   auto& list = written.get_ref<Json::object_t&>();
   for (const auto& [name, at] : points) list.emplace_back(name, WriteVector(at, draft));
-  return written.empty() ? Json() : written;
+  return written;
 }
 
 Json PointsSchema() {
@@ -36,15 +36,13 @@ Json PointsSchema() {
   return Named("points", schema);
 }
 
-using Body = PartOf<BodyDescription>;
-
 /// Reads the inertia. One number I becomes diag(I, I, I): in the plane only Izz matters, in space
 /// it is isotropic. Six numbers are the elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] of the matrix as it
 /// stands.
 ///
 /// Principal moments satisfy the triangle inequality; for a thin rod or plate with equality. In the
 /// plane only Izz is used and the other moments are unknown.
-void ReadInertia(const JsonNode& node, Body& body) {
+void ReadInertia(const JsonNode& node, BodyDescription& body, const Draft& draft) {
   Eigen::Matrix3d& inertia = body.inertia;
   inertia.setIdentity();
   if (node.value().is_number()) inertia *= node.Number(kPositive);
@@ -66,7 +64,7 @@ void ReadInertia(const JsonNode& node, Body& body) {
   const bool positive = inertia.diagonal().minCoeff() > 0.0 &&
                         Eigen::LLT<Eigen::Matrix3d>(inertia).info() == Eigen::Success;
   if (!positive) node.Fail("a positive definite inertia");
-  if (!positive || body.draft->space == SpaceKind::kPlanar) return;
+  if (!positive || draft.space == SpaceKind::kPlanar) return;
   // Three significant digits, as data sheets print them, are off by up to 0.5 % in each moment.
   constexpr double kPrinted = 0.01;
   const Eigen::Vector3d moments = SymmetricEigenvalues(inertia);
@@ -76,7 +74,7 @@ void ReadInertia(const JsonNode& node, Body& body) {
 }
 
 /// Writes the shortest form without loss.
-Json WriteInertia(const Body& body) {
+Json WriteInertia(const BodyDescription& body, const Draft&) {
   const Eigen::Matrix3d& I = body.inertia;
   const bool is_diagonal = I(0, 1) == 0.0 && I(0, 2) == 0.0 && I(1, 2) == 0.0;
   if (is_diagonal && I(0, 0) == I(2, 2) && I(1, 1) == I(2, 2)) return I(2, 2);
@@ -87,74 +85,61 @@ Json WriteInertia(const Body& body) {
   return json;
 }
 
-const Fields<Body>& BodyFields() {
+const PartFields<BodyDescription>& BodyFields() {
+  using Body = BodyDescription;
   static const Json inertia =
       EitherSchema({NumberSchema(kPositive), ArraySchema(NumberSchema(kPositive), 3, 3),
                     ArraySchema(NumberSchema(), 6, 6)});
-  static const Fields<Body> fields(
+  static const PartFields<Body> fields(
       "body", "A rigid body.",
-      {{"name", NewName(&BodyDescription::name, &Draft::body_names), "Unique name of the body.",
-        "a name"},
-       {"mass", Number(&BodyDescription::mass, kPositive), "Mass [kg].", "a number > 0 [kg]"},
+      {{"name", NewName(&Body::name, &Draft::body_names), "Unique name of the body.", "a name"},
+       {"mass", Number(&Body::mass, kPositive), "Mass [kg].", "a number > 0 [kg]"},
        {"inertia", By(inertia, ReadInertia, WriteInertia),
         "Inertia about the centre of mass in body axes [kg m^2]: Izz (isotropic in space), [Ixx, "
         "Iyy, Izz] or the matrix elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz].",
         "the inertia about the centre of mass"},
-       {"com",
-        Coded<Body>(&BodyDescription::com, VectorSchema(), ReadVector, UnlessZero<WriteVector>),
+       {"com", Coded<Body>(&Body::com, VectorSchema(), ReadVector, UnlessZero<WriteVector>),
         "Centre of mass in body axes [m]; default: the body's origin."},
-       {"points", Coded<Body>(&BodyDescription::points, PointsSchema(), ReadPoints, WritePoints),
+       {"points", Coded<Body>(&Body::points, PointsSchema(), ReadPoints, WritePoints),
         "Named points in body axes, from the body's origin [m]."}});
   return fields;
 }
 
-const Fields<Draft>& GroundFields() {
+const PartFields<Draft>& GroundFields() {
   const auto points = [](auto& draft) -> auto& { return draft.bodies[kGround].points; };
-  static const Fields<Draft> fields(
+  static const PartFields<Draft> fields(
       "ground", "The fixed ground.",
       {{"points", Coded<Draft>(points, PointsSchema(), ReadPoints, WritePoints),
         "Named points in ground axes, from the origin [m]."}});
   return fields;
 }
 
-}  // namespace
-
-FieldValue<Draft> GroundValue() { return Section(GroundFields()); }
-
-FieldValue<Draft> BodiesValue() {
-  return PartList(&Draft::bodies, BodyFields(), &Draft::body_names,
-                  {.what = "bodies", .least = "at least one body", .first = kGround + 1});
-}
-
 // "joints" of a mechanism file.
 
-namespace {
+using Side = JointSide;
+using Joint = JointDescription;
 
-using Side = PartOf<JointSide>;
-using Joint = PartOf<JointDescription>;
-
-const Fields<Side>& SideFields() {
-  static const Fields<Side> fields(
+const PartFields<Side>& SideFields() {
+  static const PartFields<Side> fields(
       "side", "Frame of a joint, fixed to a body.",
-      {{"body", BodyOf<JointSide>(&JointSide::body, true), "Name of a body, or \"ground\".",
+      {{"body", BodyOf<Side>(&Side::body, true), "Name of a body, or \"ground\".",
         "the name of a body or \"ground\""},
-       {"at", PlaceOf<JointSide>(&JointSide::body, &JointSide::position),
+       {"at", PlaceOf<Side>(&Side::body, &Side::position),
         "Origin: a point of the body by name, or body coordinates [m]. Default: body origin."},
        {"rotation",
-        Coded<Side>(&JointSide::rotation, RotationSchema(), ReadRotation,
-                    UnlessZero<WriteRotation>),
+        Coded<Side>(&Side::rotation, RotationSchema(), ReadRotation, UnlessZero<WriteRotation>),
         "Rotation from body to frame [rad]: angle about z, or rotation vector; default: 0."}});
   return fields;
 }
 
-void ReadAxis(const JsonNode& node, Joint& joint) {
+void ReadAxis(const JsonNode& node, Joint& joint, const Draft& draft) {
   const Eigen::Vector3d axis = joint.axis = node.Vector();
   const JointType type = joint.type;
   if (TraitsOf(type).own_axis == '-') {
     node.Fail(fmt::format("no axis on a {} joint", ToString(type)));
   } else if (axis.isZero()) {
     if (node.value().is_array()) node.Fail("an axis that is not zero");
-  } else if (joint.draft->space == SpaceKind::kPlanar) {
+  } else if (draft.space == SpaceKind::kPlanar) {
     const bool along_z = axis.x() == 0.0 && axis.y() == 0.0 && axis.z() > 0.0;
     if (TraitsOf(type).own_axis == 'z' && !along_z) {
       node.FailWithCure(kSpatialCure, "an axis along +z in a planar mechanism");
@@ -165,7 +150,9 @@ void ReadAxis(const JsonNode& node, Joint& joint) {
   }
 }
 
-Json WriteAxis(const Joint& joint) { return UnlessZero<WriteVector>(joint.axis, *joint.draft); }
+Json WriteAxis(const Joint& joint, const Draft& draft) {
+  return UnlessZero<WriteVector>(joint.axis, draft);
+}
 
 Range RangeOf(const JointParameter& parameter) { return parameter.positive ? kPositive : Range{}; }
 
@@ -201,37 +188,36 @@ void ReadParameter(const JsonNode& node, Joint& joint) {
   }
 }
 
-/// Motion of a joint with `speeds` coordinates, of which `taken` are already prescribed.
-struct MotionOfJoint : PrescribedMotion {
-  int speeds = 1;
-  const std::vector<PrescribedMotion>* taken = nullptr;
-};
+using MotionFields = Fields<PrescribedMotion, const Joint, const Draft>;
 
-void ReadCoordinate(const JsonNode& node, MotionOfJoint& motion) {
-  motion.coordinate = static_cast<int>(node.Integer(0, motion.speeds - 1));
-  for (const PrescribedMotion& other : *motion.taken) {
+void ReadCoordinate(const JsonNode& node, PrescribedMotion& motion, const Joint& joint,
+                    const Draft& draft) {
+  const int speeds = NumValues(joint.type, draft.space, true);
+  motion.coordinate = static_cast<int>(node.Integer(0, speeds - 1));
+  for (const PrescribedMotion& other : joint.motions) {
     if (other.coordinate == motion.coordinate) node.Fail("a coordinate not yet prescribed");
   }
 }
 
-Json WriteCoordinate(const MotionOfJoint& motion) { return motion.coordinate; }
+Json WriteCoordinate(const PrescribedMotion& motion, const Joint&, const Draft&) {
+  return motion.coordinate;
+}
 
-const Fields<MotionOfJoint>& MotionFields() {
+const MotionFields& FieldsOfMotion() {
   constexpr int kMaxCoordinates = 3;  // prescribable coordinates of a planar joint
-  static const Fields<MotionOfJoint> fields(
+  static const MotionFields fields(
       "motion", "Prescribed motion of one coordinate of a joint.",
       {{"coordinate", By(IntegerSchema(0, kMaxCoordinates - 1), ReadCoordinate, WriteCoordinate),
         "Index in the initial coordinates, from 0.", "the number of a coordinate"},
-       {"value", TimeFunctionOf(&PrescribedMotion::value), "Value [rad or m].",
+       {"value", TimeFunctionOf<PrescribedMotion>(&PrescribedMotion::value), "Value [rad or m].",
         "a number or a function of time"}});
   return fields;
 }
 
 /// Reads one function for a joint with one coordinate, otherwise a list with coordinates.
-void ReadMotions(const JsonNode& node, Joint& joint) {
-  const SpaceKind space = joint.draft->space;
-  const int speeds = NumValues(joint.type, space, true);
-  if (speeds == 0 || NumValues(joint.type, space, false) != speeds) {
+void ReadMotions(const JsonNode& node, Joint& joint, const Draft& draft) {
+  const int speeds = NumValues(joint.type, draft.space, true);
+  if (speeds == 0 || NumValues(joint.type, draft.space, false) != speeds) {
     node.FailAs(fmt::format("a motion of a {} joint", ToString(joint.type)),
                 "a joint whose coordinates are angles and shifts");
     return;
@@ -248,56 +234,52 @@ void ReadMotions(const JsonNode& node, Joint& joint) {
   }
   if (node.value().empty()) node.Fail("at least one motion");
   for (const JsonNode& element : node.Elements("motions")) {
-    MotionOfJoint motion{{0, Polynomial{{0.0}}}, speeds, &joint.motions};
-    MotionFields().Read(element, &motion);
+    PrescribedMotion motion{0, Polynomial{{0.0}}};
+    FieldsOfMotion().Read(element, &motion, joint, draft);
     joint.motions.push_back(motion);
   }
 }
 
-Json WriteMotions(const Joint& joint) {
-  if (joint.motions.empty()) return Json();
-  if (NumValues(joint.type, joint.draft->space, true) == 1) {
-    return WriteTimeFunction(joint.motions[0].value);
-  }
+Json WriteMotions(const Joint& joint, const Draft& draft) {
   Json motions = Json::array();
   for (const PrescribedMotion& motion : joint.motions) {
-    motions.push_back(MotionFields().Write(MotionOfJoint{motion}));
+    motions.push_back(FieldsOfMotion().Write(motion, joint, draft));
   }
-  return motions;
+  const bool has_one = NumValues(joint.type, draft.space, true) == 1 && !motions.empty();
+  return has_one ? WriteTimeFunction(joint.motions[0].value) : motions;
 }
 
-void ReadRotor(const JsonNode& node, Joint& joint) {
+void ReadRotor(const JsonNode& node, Joint& joint, const Draft& draft) {
   joint.rotor_inertia = node.Number(kNotNegative);
-  if (joint.rotor_inertia > 0.0 && NumValues(joint.type, joint.draft->space, false) != 1) {
+  if (joint.rotor_inertia > 0.0 && NumValues(joint.type, draft.space, false) != 1) {
     node.FailAs(fmt::format("a rotor of a {} joint", ToString(joint.type)),
                 "a joint with one coordinate (revolute, prismatic or helical)");
   }
 }
 
-Json WriteRotor(const Joint& joint) {
+Json WriteRotor(const Joint& joint, const Draft&) {
   return joint.rotor_inertia > 0.0 ? Json(joint.rotor_inertia) : Json();
 }
 
-bool IsMissingInPlane(const Joint& joint) {
-  return joint.draft->space == SpaceKind::kPlanar && !TraitsOf(joint.type).in_plane;
+bool IsMissingInPlane(const Joint& joint, const Draft& draft) {
+  return draft.space == SpaceKind::kPlanar && !TraitsOf(joint.type).in_plane;
 }
 
-void ReadType(const JsonNode& node, Joint& joint) {
+void ReadType(const JsonNode& node, Joint& joint, const Draft& draft) {
   joint.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
-  if (IsMissingInPlane(joint)) node.FailWithCure(kSpatialCure, "a joint of the plane");
+  if (IsMissingInPlane(joint, draft)) node.FailWithCure(kSpatialCure, "a joint of the plane");
 }
 
-Json WriteType(const Joint& joint) { return std::string(ToString(joint.type)); }
+Json WriteType(const Joint& joint, const Draft&) { return std::string(ToString(joint.type)); }
 
-void CheckSides(const JsonNode& node, Joint& joint) {
+void CheckSides(const JsonNode& node, Joint& joint, const Draft& draft) {
   if (joint.from.body < 0 || joint.from.body != joint.to.body) return;
-  node.FailAs(
-      fmt::format("a joint of \"{}\" with itself", joint.draft->bodies[joint.from.body].name),
-      "two different bodies");
+  node.FailAs(fmt::format("a joint of \"{}\" with itself", draft.bodies[joint.from.body].name),
+              "two different bodies");
 }
 
 /// Adds parameters that some joint types require and others do not allow, with their rule.
-void AddParameters(std::vector<Field<Joint>>* rows) {
+void AddParameters(std::vector<PartField<Joint>>* rows) {
   Json rules = Json::array();
   for (const auto& [parameter, types] : ParameterKeys()) {
     const std::string key(parameter.key);
@@ -314,16 +296,15 @@ void AddParameters(std::vector<Field<Joint>>* rows) {
   rows->push_back({"", By({{"allOf", rules}}, ReadParameter)});
 }
 
-Fields<Joint> MakeJointFields() {
-  const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(MotionFields().Schema())});
-  std::vector<Field<Joint>> rows = {
-      {"name", NewName(&JointDescription::name, &Draft::joint_names), "Unique name of the joint.",
-       "a name"},
+PartFields<Joint> MakeJointFields() {
+  const Json motions = EitherSchema({TimeFunctionSchema(), ArraySchema(FieldsOfMotion().Schema())});
+  std::vector<PartField<Joint>> rows = {
+      {"name", NewName(&Joint::name, &Draft::joint_names), "Unique name of the joint.", "a name"},
       {"type", By(ChoiceSchema(JointTypeNames().all()), ReadType, WriteType), "Type of the joint.",
        "a joint type", IsMissingInPlane},
-      {"from", Part(&JointDescription::from, SideFields()), "Frame F of the joint.",
+      {"from", Object(&Joint::from, SideFields()), "Frame F of the joint.",
        "an object with keys \"body\", \"at\", \"rotation\""},
-      {"to", Part(&JointDescription::to, SideFields()), "Frame M of the joint.",
+      {"to", Object(&Joint::to, SideFields()), "Frame M of the joint.",
        "an object with keys \"body\", \"at\", \"rotation\""},
       {"", By(Json::object(), CheckSides)},
       {"axis", By(VectorSchema(), ReadAxis, WriteAxis),
@@ -336,41 +317,22 @@ Fields<Joint> MakeJointFields() {
   rows.push_back({"rotor_inertia", By(NumberSchema(kNotNegative), ReadRotor, WriteRotor),
                   "Inertia of a rotor along the joint's one coordinate, times the square of its "
                   "gear ratio [kg m^2, or kg]; default: 0."});
-  rows.push_back({"cut", Bool(&JointDescription::cut),
+  rows.push_back({"cut", Bool(&Joint::cut),
                   "If true, the joint closes its loop and has no joint coordinate."});
   return {"joint", "Joint between frame F on one body and frame M on another.", std::move(rows)};
 }
 
-const Fields<Joint>& JointFields() {
-  static const Fields<Joint> fields = MakeJointFields();
+const PartFields<Joint>& JointFields() {
+  static const PartFields<Joint> fields = MakeJointFields();
   return fields;
-}
-
-}  // namespace
-
-const NameList& JointTypeNames() {
-  static const NameList kNames = [] {
-    return Mapped<std::string>(AllJointTraits(), &JointTraits::name);
-  }();
-  return kNames;
-}
-
-FieldValue<Draft> JointsValue() {
-  JointDescription unread;
-  unread.from.body = unread.to.body = -1;  // unknown: differs from every other side
-  return PartList(&Draft::joints, JointFields(), &Draft::joint_names,
-                  {.what = "joints", .start = unread});
 }
 
 // "couplings" of a mechanism file.
 
-namespace {
-
-using Coupling = PartOf<CouplingDescription>;
+using Coupling = CouplingDescription;
 
 /// Reads {"joint": coefficient, ...}; the reader of files rejects a joint that appears twice.
-void ReadCoefficients(const JsonNode& node, Coupling& coupling) {
-  const Draft& draft = *coupling.draft;
+void ReadCoefficients(const JsonNode& node, Coupling& coupling, const Draft& draft) {
   if (!node.ExpectObject(draft.joint_names)) return;
   bool all_driven = true;
   for (const auto& [name, value] : node.Members()) {
@@ -395,40 +357,66 @@ void ReadCoefficients(const JsonNode& node, Coupling& coupling) {
   }
 }
 
-Json WriteCoefficients(const Coupling& coupling) {
+Json WriteCoefficients(const Coupling& coupling, const Draft& draft) {
   Json written = Json::object();
   for (const auto& [joint, ratio] : coupling.parts) {
-    written[coupling.draft->joints[joint].name] = ratio;
+    written[draft.joints[joint].name] = ratio;
   }
   return written;
 }
 
-const Fields<Coupling>& CouplingFields() {
+const PartFields<Coupling>& CouplingFields() {
   Json ratio = NumberSchema();
   ratio["not"] = {{"const", 0}};
   Json coefficients = MapSchema(ratio);
   coefficients["minProperties"] = 2;
-  static const Fields<Coupling> fields(
+  static const PartFields<Coupling> fields(
       "coupling", "Linear relation of joint coordinates: sum of coefficient times q = offset.",
-      {{"name", NewName(&CouplingDescription::name, &Draft::coupling_names),
-        "Unique name of the coupling.", "a name"},
+      {{"name", NewName(&Coupling::name, &Draft::coupling_names), "Unique name of the coupling.",
+        "a name"},
        {"coefficients", By(coefficients, ReadCoefficients, WriteCoefficients),
         "Coefficients by joint: revolute, prismatic or helical joints, two or more.",
         "an object with a coefficient per joint"},
-       {"offset", Number(&CouplingDescription::offset),
+       {"offset", Number(&Coupling::offset),
         "Value of the sum [unit of coefficient times coordinate]."}});
   return fields;
 }
 
 }  // namespace
 
-FieldValue<Draft> CouplingsValue() {
-  FieldValue<Draft> list = PartList(&Draft::couplings, CouplingFields(), &Draft::coupling_names,
-                                    {.what = "couplings", .is_always_there = false});
-  list.read = [read = list.read](const JsonNode& node, Draft& draft) {
+PartValue<Draft> GroundValue() { return Section(GroundFields()); }
+
+PartValue<Draft> BodiesValue() {
+  PartValue<Draft> bodies =
+      PartList(&Draft::bodies, BodyFields(), &Draft::body_names, "bodies", "at least one body");
+  bodies.write = [write = bodies.write](const Draft& draft, const Draft& all) {
+    Json list = write(draft, all);
+    list.erase(kGround);
+    return list;
+  };
+  return bodies;
+}
+
+const NameList& JointTypeNames() {
+  static const NameList kNames = [] {
+    return Mapped<std::string>(AllJointTraits(), &JointTraits::name);
+  }();
+  return kNames;
+}
+
+PartValue<Draft> JointsValue() {
+  JointDescription unread;
+  unread.from.body = unread.to.body = -1;  // unknown: differs from every other side
+  return PartList(&Draft::joints, JointFields(), &Draft::joint_names, "joints", "", unread);
+}
+
+PartValue<Draft> CouplingsValue() {
+  PartValue<Draft> list =
+      PartList(&Draft::couplings, CouplingFields(), &Draft::coupling_names, "couplings");
+  list.read = [read = list.read](const JsonNode& node, Draft& draft, const Draft& all) {
     draft.coupling_names = draft.joint_names;  // records name both alike
     for (const CouplingDescription& known : draft.couplings) draft.coupling_names.Add(known.name);
-    read(node, draft);
+    read(node, draft, all);
   };
   return list;
 }

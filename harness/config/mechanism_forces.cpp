@@ -7,53 +7,37 @@
 namespace loopbench::harness {
 namespace {
 
-using Force = PartOf<ForceDescription>;
-using Rows = std::vector<Field<Force>>;
-
-/// Field for a value of a force, as Coded(): `get(parts)` refers to it.
-template <class Get, class Read, class Write>
-FieldValue<Force> OfForce(Get get, Json schema, Read read, Write write) {
-  return {
-      std::move(schema),
-      [=](const JsonNode& node, Force& force) { get(PartsOf(force)) = read(node, *force.draft); },
-      nullptr,
-      [=](const Force& force) {
-        ForceDescription copy = force;
-        return write(get(PartsOf(copy)), *force.draft);
-      }};
-}
+using Force = ForceDescription;
+using Rows = std::vector<PartField<Force>>;
 
 /// Reads the joint of a force, which must have exactly one coordinate.
-void ReadJoint(const JsonNode& node, Force& force) {
-  const auto index = ReadJointName(node, *force.draft);
-  if (!index) return;
-  *PartsOf(force).joint = *index;
-  const JointDescription& found = force.draft->joints[*index];
-  if (NumValues(found.type, force.draft->space, true) == 1) return;
-  node.FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
-              "a joint with one coordinate (revolute, prismatic or helical)");
+int ReadJoint(const JsonNode& node, const Draft& draft) {
+  const auto index = ReadJointName(node, draft);
+  if (!index) return 0;
+  const JointDescription& found = draft.joints[*index];
+  if (NumValues(found.type, draft.space, true) != 1) {
+    node.FailAs(fmt::format("\"{}\" ({})", found.name, ToString(found.type)),
+                "a joint with one coordinate (revolute, prismatic or helical)");
+  }
+  return *index;
 }
 
-Json WriteJoint(const Force& force) {
-  ForceDescription copy = force;
-  return force.draft->joints[*PartsOf(copy).joint].name;
-}
+Json WriteJoint(int joint, const Draft& draft) { return draft.joints[joint].name; }
 
 constexpr const char* kPlaceOnBody =
     "Name of a point of the body, or coordinates in body axes [m]; default: the body's origin.";
 
 /// Adds the body and point of a force on one body, without an enclosing object.
 void AddPoint(Rows* rows) {
-  const auto point = [](ForceDescription& force) { return PartsOf(force).points[0]; };
-  const auto body = [=](ForceDescription& force) -> int& { return point(force)->body; };
-  const auto at = [=](ForceDescription& force) -> Eigen::Vector3d& { return point(force)->at; };
-  rows->push_back({"body", BodyOf<ForceDescription>(body, false), "Name of a moving body.",
-                   "the name of a body"});
-  rows->push_back({"at", PlaceOf<ForceDescription>(body, at), kPlaceOnBody});
+  const auto body = [](Force& force) -> int& { return PartsOf(force).points[0]->body; };
+  const auto at = [](Force& force) -> Eigen::Vector3d& { return PartsOf(force).points[0]->at; };
+  rows->push_back(
+      {"body", BodyOf<Force>(body, false), "Name of a moving body.", "the name of a body"});
+  rows->push_back({"at", PlaceOf<Force>(body, at), kPlaceOnBody});
 }
 
-const Fields<PartOf<BodyPoint>>& EndFields() {
-  static const Fields<PartOf<BodyPoint>> fields(
+const PartFields<BodyPoint>& EndFields() {
+  static const PartFields<BodyPoint> fields(
       "end", "Point of a body.",
       {{"body", BodyOf<BodyPoint>(&BodyPoint::body, true), "Name of a body, or \"ground\".",
         "the name of a body or \"ground\""},
@@ -61,27 +45,27 @@ const Fields<PartOf<BodyPoint>>& EndFields() {
   return fields;
 }
 
-void CheckEnds(const JsonNode& node, Force& force) {
+void CheckEnds(const JsonNode& node, Force& force, const Draft& draft) {
   const ForceParts parts = PartsOf(force);
   const int from = parts.points[0]->body, to = parts.points[1]->body;
   if (from < 0 || from != to) return;
   std::string name(parts.name);
   std::ranges::replace(name, '_', '-');
-  node.FailAs(fmt::format("a {} of \"{}\" with itself", name, force.draft->bodies[from].name),
+  node.FailAs(fmt::format("a {} of \"{}\" with itself", name, draft.bodies[from].name),
               "two different bodies");
 }
 
 void AddEnds(Rows* rows) {
   constexpr const char* kEnd = "an object with keys \"body\", \"at\"";
   const auto end = [](std::size_t i) {
-    return OfForce(
-        [i](const ForceParts& parts) -> auto& { return *parts.points[i]; }, EndFields().Schema(),
+    return Coded<Force>(
+        [i](Force& force) -> BodyPoint& { return *PartsOf(force).points[i]; }, EndFields().Schema(),
         [](const JsonNode& node, const Draft& draft) {
-          return ReadPart(EndFields(), node, draft, {.body = -1});  // unknown
+          BodyPoint point{.body = -1};  // unknown
+          EndFields().Read(node, &point, draft);
+          return point;
         },
-        [](const BodyPoint& point, const Draft& draft) {
-          return WritePart(EndFields(), draft, point);
-        });
+        [](const BodyPoint& point, const Draft& draft) { return EndFields().Write(point, draft); });
   };
   rows->push_back({"from", end(0), "First end point.", kEnd});
   rows->push_back({"to", end(1), "Second end point, on another body.", kEnd});
@@ -101,15 +85,14 @@ FieldValue<Force> OneOf(const std::vector<std::string>& keys) {
 }
 
 void AddVector(Rows* rows) {
-  rows->push_back({"force",
-                   OfForce(
-                       [](const ForceParts& parts) -> auto& { return *parts.force; },
-                       VectorSchema(), ReadVector, WriteVector),
-                   "Force [N].", "an array of 2 or 3 numbers [N]"});
+  rows->push_back(
+      {"force",
+       Coded<Force>([](Force& force) -> Eigen::Vector3d& { return *PartsOf(force).force; },
+                    VectorSchema(), ReadVector, WriteVector),
+       "Force [N].", "an array of 2 or 3 numbers [N]"});
   static const NameList axes = {"ground", "body"};
-  FieldValue<Force> value = OfForce(
-      [](const ForceParts& parts) -> auto& { return *parts.in_body_axes; },
-      ChoiceSchema(axes.all()),
+  PartValue<Force> value = Coded<Force>(
+      [](Force& force) -> bool& { return *PartsOf(force).in_body_axes; }, ChoiceSchema(axes.all()),
       [](const JsonNode& node, const Draft&) {
         return node.Choice(axes, "the axes of the force").value_or(0) == 1;
       },
@@ -130,13 +113,12 @@ void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
   const double standard = *number.value;
   rows->push_back({std::string(number.key),
                    {NumberSchema(range),
-                    [=](const JsonNode& node, Force& force) {
+                    [=](const JsonNode& node, Force& force, const Draft&) {
                       *PartsOf(force).numbers[i].value = node.Number(range);
                     },
                     [=](const Force&) { return Json(standard); },
-                    [=](const Force& force) {
-                      ForceDescription copy = force;
-                      const ForceNumber written = PartsOf(copy).numbers[i];
+                    [=](Force force, const Draft&) {
+                      const ForceNumber written = PartsOf(force).numbers[i];
                       const bool may_lack = written.need != Need::kAlways;
                       return may_lack && *written.value == standard ? Json() : Json(*written.value);
                     }},
@@ -144,11 +126,12 @@ void AddNumber(const ForceParts& parts, std::size_t i, Rows* rows) {
                    number.need == Need::kAlways ? "a number" + range.Text() : ""});
 }
 
-Fields<Force> FieldsOf(ForceDescription kind) {
+PartFields<Force> FieldsOf(Force kind) {
   const ForceParts parts = PartsOf(kind);
   Rows rows = {{"type", Constant<Force>(std::string(parts.name)), "Force type.", "a force type"}};
   if (parts.joint != nullptr) {
-    rows.push_back({"joint", By(TextSchema(), ReadJoint, WriteJoint),
+    const auto joint = [](Force& force) -> int& { return *PartsOf(force).joint; };
+    rows.push_back({"joint", Coded<Force>(joint, TextSchema(), ReadJoint, WriteJoint),
                     "Revolute, prismatic or helical joint.", "the name of a joint"});
   }
   if (parts.points.size() == 1) AddPoint(&rows);
@@ -160,79 +143,59 @@ Fields<Force> FieldsOf(ForceDescription kind) {
   if (!one_of.empty()) rows.push_back({"", OneOf(one_of)});
   if (parts.force != nullptr) AddVector(&rows);
   if (parts.value != nullptr) {
-    rows.push_back(
-        {"value",
-         OfForce(
-             [](const ForceParts& of) -> auto& { return *of.value; }, TimeFunctionSchema(),
-             [](const JsonNode& node, const Draft&) { return ReadTimeFunction(node); },
-             [](const TimeFunctionDescription& value, const Draft&) {
-               return WriteTimeFunction(value);
-             }),
-         "Moment [N m] or force [N] on the joint's second body.",
-         "a number or a function of time"});
+    const auto value = [](Force& force) -> TimeFunctionDescription& {
+      return *PartsOf(force).value;
+    };
+    rows.push_back({"value", TimeFunctionOf<Force>(value),
+                    "Moment [N m] or force [N] on the joint's second body.",
+                    "a number or a function of time"});
   }
   for (std::size_t i = 0; i < parts.numbers.size(); ++i) AddNumber(parts, i, &rows);
   return {std::string(parts.name), std::string(parts.sentence), std::move(rows)};
 }
 
 /// Returns fields in the order of ForceKinds().
-const std::vector<Fields<Force>>& AllFields() {
-  static const std::vector<Fields<Force>> all = [] {
-    return Mapped<Fields<Force>>(ForceKinds(),
-                                 [](const ForceDescription& kind) { return FieldsOf(kind); });
-  }();
+const std::vector<PartFields<Force>>& AllFields() {
+  static const auto all = Mapped<PartFields<Force>>(ForceKinds(), FieldsOf);
   return all;
 }
 
-ForceDescription ReadForce(const JsonNode& node, const Draft& draft) {
-  static const NameList types = [] {
-    NameList names;
-    for (ForceDescription kind : ForceKinds()) names.Add(std::string(PartsOf(kind).name));
-    return names;
-  }();
-  std::optional<int> type;
-  if (!node.value().is_object()) {
-    node.Fail("an object that describes a force");
-  } else if (const auto name = node.Required("type", "a force type")) {
-    type = name->Choice(types, "a force type");
-  }
-  if (!type) return JointTorque{};
-  const auto kind = static_cast<std::size_t>(*type);
-  ForceDescription force = ForceKinds()[kind];
-  const std::vector<BodyPoint*> points = PartsOf(force).points;
-  // ends are unknown: -1 differs from every body
-  for (BodyPoint* end : points) end->body = points.size() > 1 ? -1 : end->body;
-  return ReadPart(AllFields()[kind], node, draft, force);
+/// Returns the names of types, in the same order.
+const NameList& TypesOfForces() {
+  static const NameList names =
+      Mapped<std::string>(ForceKinds(), [](Force kind) { return std::string(PartsOf(kind).name); });
+  return names;
 }
 
-void ReadForces(const JsonNode& node, Draft& draft) {
-  for (const JsonNode& element : node.Elements("forces")) {
-    draft.forces.push_back(ReadForce(element, draft));
+void ReadForces(const JsonNode& list, Draft& draft, const Draft& all) {
+  for (const JsonNode& node : list.Elements("forces")) {
+    draft.forces.emplace_back(JointTorque{});
+    if (!node.value().is_object()) {
+      node.Fail("an object that describes a force");
+      continue;
+    }
+    const auto name = node.Required("type", "a force type");
+    const auto type = name ? name->Choice(TypesOfForces(), "a force type") : std::nullopt;
+    if (!type) continue;
+    const auto kind = static_cast<std::size_t>(*type);
+    Force& force = draft.forces.back() = ForceKinds()[kind];
+    const std::vector<BodyPoint*> points = PartsOf(force).points;
+    // ends are unknown: -1 differs from every body
+    for (BodyPoint* end : points) end->body = points.size() > 1 ? -1 : end->body;
+    AllFields()[kind].Read(node, &force, all);
   }
 }
 
-Json WriteForces(const Draft& draft) {
+Json WriteForces(const Draft& draft, const Draft& all) {
   Json forces = Json::array();
-  for (ForceDescription force : draft.forces) {
-    const std::string_view name = PartsOf(force).name;
-    const auto kind = std::ranges::find_if(
-        ForceKinds(), [&](ForceDescription known) { return PartsOf(known).name == name; });
-    const auto index = static_cast<std::size_t>(kind - ForceKinds().begin());
-    forces.push_back(WritePart(AllFields()[index], draft, force));
+  for (Force force : draft.forces) {
+    const auto kind = TypesOfForces().Find(std::string(PartsOf(force).name)).value();
+    forces.push_back(AllFields()[static_cast<std::size_t>(kind)].Write(force, all));
   }
-  return forces.empty() ? Json() : forces;
-}
-
-}  // namespace
-
-FieldValue<Draft> ForcesValue() {
-  std::vector<Json> kinds = Mapped<Json>(AllFields(), &Fields<Force>::Schema);
-  return By(ArraySchema(Named("force", EitherSchema(kinds))), ReadForces, WriteForces);
+  return forces;
 }
 
 // Functions of time in a mechanism file.
-
-namespace {
 
 /// Returns an array with at least `least` numbers.
 template <class T>
@@ -324,6 +287,11 @@ Json Written(const Harmonic& function) { return HarmonicFields().Write(function)
 Json Written(const TimeTable& function) { return TableFields().Write(function); }
 
 }  // namespace
+
+PartValue<Draft> ForcesValue() {
+  const auto kinds = Mapped<Json>(AllFields(), &PartFields<Force>::Schema);
+  return By(ArraySchema(Named("force", EitherSchema(kinds))), ReadForces, WriteForces);
+}
 
 Json WriteTimeFunction(const TimeFunctionDescription& function) {
   return std::visit([](const auto& one) { return Written(one); }, function);

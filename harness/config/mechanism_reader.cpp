@@ -4,10 +4,7 @@
 
 #include <algorithm>
 #include <set>
-#include <utility>
 
-#include "harness/base/fields.h"
-#include "harness/base/json_document.h"
 #include "harness/base/text.h"
 #include "harness/config/file_schemas.h"
 #include "harness/config/mechanism_sections.h"
@@ -114,56 +111,57 @@ std::vector<double> ReadJointNumbers(const JsonNode& node, const JointDescriptio
   return {};
 }
 
+/// Returns the values of a section by joint; reports names of no joint.
+std::vector<std::pair<int, JsonNode>> ByJoint(const JsonNode& section, const Draft& draft) {
+  std::vector<std::pair<int, JsonNode>> values;
+  if (!section.ExpectObject(draft.joint_names)) return values;
+  for (const auto& [name, node] : section.Members()) {
+    if (const auto joint = draft.joint_names.Find(name)) values.emplace_back(*joint, node);
+  }
+  return values;
+}
+
 /// Reports zero quaternions. Other lengths are allowed: quaternions are normalised on use.
 void CheckQuaternion(const JsonNode& node, const std::vector<double>& values) {
   const auto zeros = std::count(values.begin(), std::min(values.begin() + 4, values.end()), 0.0);
   if (zeros == 4) node.Fail("a quaternion qw, qx, qy, qz that is not zero");
 }
 
-std::vector<JointValues> ReadJointValues(const JsonNode& section, const Draft& draft, bool speeds) {
-  std::vector<JointValues> result;
-  if (!section.ExpectObject(draft.joint_names)) return result;
-  for (const auto& [name, node] : section.Members()) {
-    const auto joint = draft.joint_names.Find(name);
-    if (!joint) continue;
-    const JointDescription& described = draft.joints[*joint];
-    const int expected = NumValues(described.type, draft.space, speeds);
-    if (expected == 1 && !described.motions.empty()) {
-      node.FailAs(fmt::format("a value of \"{}\", whose motion is prescribed", described.name),
-                  "none");
-      continue;
-    }
-    result.push_back({*joint, ReadJointNumbers(node, described, draft.space, speeds)});
-    const bool quaternion = expected > NumValues(described.type, draft.space, true);
-    if (quaternion) CheckQuaternion(node, result.back().values);
-  }
-  return result;
-}
-
-/// Writes one number or several. Values of joints with prescribed motion are left out.
-Json WriteJointValues(const Draft& draft, const std::vector<JointValues>& list, bool speeds) {
-  Json written = Json::object();
-  for (const JointValues& one : list) {
-    const JointDescription& joint = draft.joints[one.joint];
-    const int count = NumValues(joint.type, draft.space, speeds);
-    if (count == 1 && !joint.motions.empty()) continue;
-    written[joint.name] = count == 1 ? Json(one.values[0]) : Json(one.values);
-  }
-  return written.empty() ? Json() : written;
-}
-
-/// Returns the field of the coordinates or speeds of joints.
-FieldValue<Draft> JointValuesOf(std::vector<JointValues> InitialDescription::*list, bool speeds) {
+/// Returns the field of the coordinates or speeds of joints: one number or several by joint. Values
+/// of joints with prescribed motion are not written.
+PartValue<InitialDescription> JointValuesOf(std::vector<JointValues> InitialDescription::*list,
+                                            bool speeds) {
   constexpr std::size_t kMaxValues = 7;  // free joint in space
-  static const Json values =
+  static const Json schema =
       Named("jointValues",
             MapSchema(EitherSchema({NumberSchema(), ArraySchema(NumberSchema(), 1, kMaxValues)})));
-  return {values,
-          [=](const JsonNode& node, Draft& draft) {
-            draft.initial.*list = ReadJointValues(node, draft, speeds);
-          },
-          nullptr,
-          [=](const Draft& draft) { return WriteJointValues(draft, draft.initial.*list, speeds); }};
+  const auto read = [=](const JsonNode& section, const Draft& draft) {
+    std::vector<JointValues> result;
+    for (const auto& [joint, node] : ByJoint(section, draft)) {
+      const JointDescription& described = draft.joints[joint];
+      const int expected = NumValues(described.type, draft.space, speeds);
+      if (expected == 1 && !described.motions.empty()) {
+        node.FailAs(fmt::format("a value of \"{}\", whose motion is prescribed", described.name),
+                    "none");
+        continue;
+      }
+      result.push_back({joint, ReadJointNumbers(node, described, draft.space, speeds)});
+      const bool quaternion = expected > NumValues(described.type, draft.space, true);
+      if (quaternion) CheckQuaternion(node, result.back().values);
+    }
+    return result;
+  };
+  const auto write = [=](const std::vector<JointValues>& values, const Draft& draft) {
+    Json written = Json::object();
+    for (const JointValues& one : values) {
+      const JointDescription& joint = draft.joints[one.joint];
+      const int count = NumValues(joint.type, draft.space, speeds);
+      if (count == 1 && !joint.motions.empty()) continue;
+      written[joint.name] = count == 1 ? Json(one.values[0]) : Json(one.values);
+    }
+    return written;
+  };
+  return Coded<InitialDescription>(list, schema, read, write);
 }
 
 /// Names of speeds: joints with one speed, and owners of several speeds, named
@@ -209,22 +207,21 @@ void CheckIndependentName(const JsonNode& node, const std::string& name, const S
   }
 }
 
-using Form = PartOf<PendulumForm>;
-
-const Fields<Form>& PendulumFields() {
+const PartFields<PendulumForm>& PendulumFields() {
+  using Form = PendulumForm;
   const auto read_body = [](const JsonNode& node, const Draft& draft) {
     const auto index = ReadBodyName(node, draft);
     return index ? draft.bodies[*index].name : "";
   };
   const auto write_body = [](const std::string& body, const Draft&) { return Json(body); };
-  static const Fields<Form> fields(
+  static const PartFields<Form> fields(
       "closed_form", "Closed-form motion of one body: a simple pendulum.",
       {{"type", Constant<Form>("pendulum", "a closed form"), "Closed-form type.", "\"pendulum\""},
-       {"body", Coded<Form>(&PendulumForm::body, TextSchema(), read_body, write_body),
+       {"body", Coded<Form>(&Form::body, TextSchema(), read_body, write_body),
         "Body whose angle is theta.", "the name of a body"},
-       {"down_angle", Number(&PendulumForm::down_angle),
-        "Absolute angle of the body at theta = 0 [rad].", "a number [rad]"},
-       {"frequency_squared", Number(&PendulumForm::frequency_squared, kPositive),
+       {"down_angle", Number(&Form::down_angle), "Absolute angle of the body at theta = 0 [rad].",
+        "a number [rad]"},
+       {"frequency_squared", Number(&Form::frequency_squared, kPositive),
         "Factor in theta'' = -frequency_squared sin(theta) [1/s^2].", "a number > 0 [1/s^2]"}});
   return fields;
 }
@@ -239,26 +236,26 @@ AngleCombination ReadCombination(const JsonNode& node, const Draft& draft) {
   return combination;
 }
 
-void ReadHeld(const JsonNode& node, Draft& draft) {
+void ReadHeld(const JsonNode& node, InitialDescription& initial, const Draft& draft) {
   std::set<int> given, known;
-  for (const JointValues& values : draft.initial.coordinates) given.insert(values.joint);
+  for (const JointValues& values : initial.coordinates) given.insert(values.joint);
   for (const JsonNode& element : node.Elements("joint names")) {
     const auto joint = ReadJointName(element, draft);
     if (!joint) continue;
     if (!given.contains(*joint)) element.Fail("a joint with a value in /initial/coordinates");
     if (!known.insert(*joint).second) element.Fail("each joint once");
-    draft.initial.held.push_back(*joint);
+    initial.held.push_back(*joint);
   }
 }
 
-Json WriteHeld(const Draft& draft) {
+Json WriteHeld(const InitialDescription& initial, const Draft& draft) {
   Json held = Json::array();
-  for (const int index : draft.initial.held) {
+  for (const int index : initial.held) {
     const JointDescription& joint = draft.joints[index];
     const bool is_driven = !joint.motions.empty() && NumValues(joint.type, draft.space, false) == 1;
     if (!is_driven) held.push_back(joint.name);
   }
-  return held.empty() ? Json() : held;
+  return held;
 }
 
 void ReadIndependent(const JsonNode& node, Draft& draft) {
@@ -273,9 +270,7 @@ void ReadIndependent(const JsonNode& node, Draft& draft) {
   }
 }
 
-Json WriteIndependent(const Draft& draft) {
-  return draft.independent.empty() ? Json() : Json(draft.independent);
-}
+Json WriteIndependent(const Draft& draft) { return draft.independent; }
 
 /// Returns the schema of unique names.
 Json NamesSchema() {
@@ -284,13 +279,10 @@ Json NamesSchema() {
   return schema;
 }
 
-void ReadWeights(const JsonNode& node, Draft& draft) {
-  if (!node.ExpectObject(draft.joint_names)) return;
-  for (const auto& [name, weight] : node.Members()) {
-    const auto joint = draft.joint_names.Find(name);
-    if (!joint) continue;
-    const auto guess = std::ranges::find(draft.initial.coordinates, *joint, &JointValues::joint);
-    if (guess == draft.initial.coordinates.end()) {
+void ReadWeights(const JsonNode& node, InitialDescription& initial, const Draft& draft) {
+  for (const auto& [joint, weight] : ByJoint(node, draft)) {
+    const auto guess = std::ranges::find(initial.coordinates, joint, &JointValues::joint);
+    if (guess == initial.coordinates.end()) {
       weight.Fail("the weight of a joint with a value in /initial/coordinates");
     } else {
       guess->weight = weight.Number(kPositive);
@@ -298,80 +290,64 @@ void ReadWeights(const JsonNode& node, Draft& draft) {
   }
 }
 
-Json WriteWeights(const Draft& draft) {
+Json WriteWeights(const InitialDescription& initial, const Draft& draft) {
   Json weights = Json::object();
-  for (const JointValues& guess : draft.initial.coordinates) {
+  for (const JointValues& guess : initial.coordinates) {
     if (guess.weight != 1.0) weights[draft.joints[guess.joint].name] = guess.weight;
   }
-  return weights.empty() ? Json() : weights;
+  return weights;
 }
 
-using Target = PartOf<PoseTarget>;
-
-void CheckTarget(const JsonNode& node, Target& target) {
+void CheckTarget(const JsonNode& node, PoseTarget& target) {
   if (!target.at && !target.rotation) node.FailAs("neither", "\"at\", \"rotation\" or both");
 }
 
-const Fields<Target>& TargetFields() {
-  static const Fields<Target> fields(
+/// Writes a value that may be absent.
+template <Json (*write)(const Eigen::Vector3d&, const Draft&)>
+Json IfAny(const std::optional<Eigen::Vector3d>& vector, const Draft& draft) {
+  return vector ? write(*vector, draft) : Json();
+}
+
+const PartFields<PoseTarget>& TargetFields() {
+  using Target = PoseTarget;
+  static const PartFields<Target> fields(
       "pose", "Pose of a body at the start, or position of one of its points.",
-      {{"body", BodyOf<PoseTarget>(&PoseTarget::body, false), "Name of the body.",
-        "the name of a body"},
-       {"point", PlaceOf<PoseTarget>(&PoseTarget::body, &PoseTarget::point),
+      {{"body", BodyOf<Target>(&Target::body, false), "Name of the body.", "the name of a body"},
+       {"point", PlaceOf<Target>(&Target::body, &Target::point),
         "A point of the body by name, or body coordinates [m]. Default: body origin."},
-       {"at", Coded<Target>(&PoseTarget::at, VectorSchema(), ReadVector, IfAny<WriteVector>),
+       {"at", Coded<Target>(&Target::at, VectorSchema(), ReadVector, IfAny<WriteVector>),
         "Position of the point in ground axes [m]."},
        {"rotation",
-        Coded<Target>(&PoseTarget::rotation, RotationSchema(), ReadRotation, IfAny<WriteRotation>),
+        Coded<Target>(&Target::rotation, RotationSchema(), ReadRotation, IfAny<WriteRotation>),
         "Rotation of the body's axes from ground axes [rad]: angle about z, or rotation vector."},
-       {"fixed", Bool<Target>(&PoseTarget::fixed), "If true, the start meets it exactly."},
-       {"weight", Number<Target>(&PoseTarget::weight, kPositive),
+       {"fixed", Bool(&Target::fixed), "If true, the start meets it exactly."},
+       {"weight", Number(&Target::weight, kPositive),
         "Weight of the distance from a target that is not fixed."},
        {"", By(Json::object(), CheckTarget)}});
   return fields;
 }
 
-void ReadPoses(const JsonNode& node, Draft& draft) {
-  for (const JsonNode& element : node.Elements("poses")) {
-    draft.initial.poses.push_back(ReadPart(TargetFields(), element, draft));
-  }
-}
-
-Json WritePoses(const Draft& draft) {
-  Json poses = Json::array();
-  for (const PoseTarget& target : draft.initial.poses) {
-    poses.push_back(WritePart(TargetFields(), draft, target));
-  }
-  return poses.empty() ? Json() : poses;
-}
-
-void ReadBranch(const JsonNode& node, Draft& draft) {
+void ReadBranch(const JsonNode& node, ObservedQuantities& observe, const Draft& draft) {
   for (const JsonNode& element : node.Elements("combinations of body angles")) {
-    draft.branch_invariants.push_back(ReadCombination(element, draft));
+    observe.branch_invariants.push_back(ReadCombination(element, draft));
   }
 }
 
-Json WriteBranch(const Draft& draft) {
+Json WriteBranch(const ObservedQuantities& observe, const Draft&) {
   Json branch = Json::array();
-  for (const AngleCombination& combination : draft.branch_invariants) {
+  for (const AngleCombination& combination : observe.branch_invariants) {
     Json& written = branch.emplace_back(Json::object());
     for (const auto& [body, coefficient] : combination) written[body] = coefficient;
   }
-  return branch.empty() ? Json() : branch;
+  return branch;
 }
 
-std::optional<PendulumForm> ReadClosedForm(const JsonNode& node, const Draft& draft) {
-  return ReadPart(PendulumFields(), node, draft);
+void ReadLength(const JsonNode& node, ObservedQuantities& observe) {
+  observe.length = node.Number(kPositive);
 }
 
-Json WriteClosedForm(const std::optional<PendulumForm>& form, const Draft& draft) {
-  return form ? WritePart(PendulumFields(), draft, *form) : Json();
-}
-
-double ReadLength(const JsonNode& node, const Draft&) { return node.Number(kPositive); }
-
-Json WriteLength(double length, const Draft&) {
-  return length == ObservedQuantities{}.length ? Json() : Json(length);
+Json WriteLength(const ObservedQuantities& observe) {
+  return observe.length == ObservedQuantities{}.length ? Json() : Json(observe.length);
 }
 
 void ReadFreedom(const JsonNode& node, Expectation& expected) {
@@ -389,55 +365,8 @@ const Fields<Expectation>& ExpectationFields() {
   return fields;
 }
 
-std::optional<Expectation> ReadExpect(const JsonNode& node, const Draft&) {
-  Expectation expected;
-  ExpectationFields().Read(node, &expected);
-  return expected;
-}
-
-Json WriteExpect(const std::optional<Expectation>& expected, const Draft&) {
-  return expected ? ExpectationFields().Write(*expected) : Json();
-}
-
-}  // namespace
-
-const Fields<Draft>& InitialFields() {
-  static const Fields<Draft> fields(
-      "initial", "Initial coordinates and speeds. Missing values are found by assembly.",
-      {{"coordinates", JointValuesOf(&InitialDescription::coordinates, false),
-        "Guesses by joint, or exact values for \"fixed\" joints. Revolute [rad], prismatic [m], "
-        "free joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
-       {"speeds", JointValuesOf(&InitialDescription::speeds, true),
-        "Speeds by joint [rad/s or m/s]. The assembly of the loops keeps all of them."},
-       {"fixed", By(NamesSchema(), ReadHeld, WriteHeld),
-        "Joints whose coordinates the assembly keeps."},
-       {"weights", By(MapSchema(NumberSchema(kPositive)), ReadWeights, WriteWeights),
-        "Weights of guesses by joint; default: 1. The start minimises the sum of squares of weight "
-        "times difference [rad, or mean lengths of links]."},
-       {"poses", By(ArraySchema(TargetFields().Schema()), ReadPoses, WritePoses),
-        "Poses of bodies and positions of points that the start meets, or comes near to."}});
-  return fields;
-}
-
-const Fields<Draft>& ObservationFields() {
-  static const Fields<Draft> fields(
-      "known_solution", "Known exact properties of the motion, for error measures.",
-      {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch, WriteBranch),
-        "Linear combinations of absolute body angles, by body, that are constant on the correct "
-        "branch."},
-       {"closed_form", Coded<Draft>(&Draft::closed_form, PendulumFields().Schema(), ReadClosedForm,
-                                    WriteClosedForm)},
-       {"length", Coded<Draft>(&Draft::length, NumberSchema(kPositive), ReadLength, WriteLength),
-        "Characteristic bar length [m]; default: 1."}});
-  return fields;
-}
-
-// The whole file.
-
-namespace {
-
 // without bodies, every reference to a body would be a consequential error
-bool HasNoBodies(const Draft& draft) { return draft.bodies.size() < 2; }
+bool HasNoBodies(const Draft& draft, const Draft&) { return draft.bodies.size() < 2; }
 
 /// Assembles a file with targets and takes over the coordinates of the result.
 void MeetTargets(const JsonNode& root, Draft& draft) {
@@ -447,13 +376,13 @@ void MeetTargets(const JsonNode& root, Draft& draft) {
   root.Optional("initial")->Optional("poses")->FailAs(why, "targets that the loops allow");
 }
 
-const Fields<Draft>& MechanismFileFields() {
-  static const Fields<Draft> fields(
+const PartFields<Draft>& MechanismFileFields() {
+  static const PartFields<Draft> fields(
       "mechanism",
       "Bodies, joints, forces and initial values in SI units; angles in rad. The program also "
       "checks that names exist, that inertias are positive definite and physically possible, and "
       "that each joint has as many values as coordinates.",
-      DocumentRows<Draft>(
+      DocumentRows<Draft, const Draft>(
           {{"name", Text(&Draft::name), "Name of the mechanism.", "a name"},
            {"comment", Text(&Draft::comment), "Free text for readers."},
            {"space", Choice(&Draft::space, {"planar", "spatial"}, "a space"),
@@ -467,7 +396,7 @@ const Fields<Draft>& MechanismFileFields() {
            {"couplings", CouplingsValue(),
             "Linear relations of joint coordinates: gears, racks, differentials."},
            {"forces", ForcesValue(), "Forces other than gravity."},
-           {"initial", Section(InitialFields())},
+           {"initial", Object(&Draft::initial, InitialFields())},
            {"independent", By(NamesSchema(), ReadIndependent, WriteIndependent),
             "Independent speeds of the fixed coordinate reduction: joint names for joint "
             "coordinates, \"<body>.angle\", \"<body>.x\", ... for absolute coordinates."},
@@ -476,8 +405,7 @@ const Fields<Draft>& MechanismFileFields() {
             "Loops with smaller gaps are closed; constraints with smaller differences are "
             "redundant."},
            {"known_solution", Section(ObservationFields())},
-           {"expect", Coded<Draft>(&Draft::expected, ExpectationFields().Schema(), ReadExpect,
-                                   WriteExpect)}}));
+           {"expect", OptionalObject(&Draft::expected, ExpectationFields())}}));
   return fields;
 }
 
@@ -492,6 +420,36 @@ void RefuseReleased(const MechanismDescription& description) {
 }
 
 }  // namespace
+
+const PartFields<InitialDescription>& InitialFields() {
+  static const PartFields<InitialDescription> fields(
+      "initial", "Initial coordinates and speeds. Missing values are found by assembly.",
+      {{"coordinates", JointValuesOf(&InitialDescription::coordinates, false),
+        "Guesses by joint, or exact values for \"fixed\" joints. Revolute [rad], prismatic [m], "
+        "free joint [angle, x, y] in the plane, [qw, qx, qy, qz, x, y, z] in space."},
+       {"speeds", JointValuesOf(&InitialDescription::speeds, true),
+        "Speeds by joint [rad/s or m/s]. The assembly of the loops keeps all of them."},
+       {"fixed", By(NamesSchema(), ReadHeld, WriteHeld),
+        "Joints whose coordinates the assembly keeps."},
+       {"weights", By(MapSchema(NumberSchema(kPositive)), ReadWeights, WriteWeights),
+        "Weights of guesses by joint; default: 1. The start minimises the sum of squares of weight "
+        "times difference [rad, or mean lengths of links]."},
+       {"poses", ObjectList(&InitialDescription::poses, TargetFields(), "poses"),
+        "Poses of bodies and positions of points that the start meets, or comes near to."}});
+  return fields;
+}
+
+const PartFields<ObservedQuantities>& ObservationFields() {
+  static const PartFields<ObservedQuantities> fields(
+      "known_solution", "Known exact properties of the motion, for error measures.",
+      {{"branch", By(ArraySchema(MapSchema(NumberSchema(), 1)), ReadBranch, WriteBranch),
+        "Linear combinations of absolute body angles, by body, that are constant on the correct "
+        "branch."},
+       {"closed_form", OptionalObject(&ObservedQuantities::closed_form, PendulumFields())},
+       {"length", By(NumberSchema(kPositive), ReadLength, WriteLength),
+        "Characteristic bar length [m]; default: 1."}});
+  return fields;
+}
 
 Json MechanismSchema() { return MechanismFileFields().OwnSchema(); }
 
@@ -510,7 +468,7 @@ MechanismFile ReadMechanismObject(const JsonNode& root) {
   draft.bodies[kGround].name = "ground";
   draft.body_names.Add("ground");
   if (ExpectDocument(root, FileKind::kMechanism)) {
-    MechanismFileFields().ReadRows(root, &draft);
+    MechanismFileFields().ReadRows(root, &draft, draft);
     MeetTargets(root, draft);
   }
   result.observe = std::move(static_cast<ObservedQuantities&>(draft));
@@ -526,7 +484,7 @@ std::string MechanismText(const MechanismDescription& description,
   draft.bodies[kGround].name = "ground";
   static_cast<ObservedQuantities&>(draft) = observe;
   draft.comment = comment;
-  std::string text = JsonText(MechanismFileFields().Write(draft));
+  std::string text = JsonText(MechanismFileFields().Write(draft, draft));
   ParseMechanism(text, description.name + " (written)");
   return text;
 }

@@ -12,8 +12,6 @@
 
 namespace loopbench::harness {
 
-// Content of a mechanism file in addition to the mechanism: known exact properties of the motion.
-
 /// Linear combination of absolute body angles, as (body name, coefficient) pairs. It is constant on
 /// the initial branch; a run that changes it has left the branch.
 using AngleCombination = std::vector<std::pair<std::string, double>>;
@@ -49,26 +47,18 @@ struct MechanismFile {
   std::string canonical;  ///< document without spaces; equal for equal mechanisms
 };
 
-// Reads a mechanism from JSON (configs/schema/mechanism.schema.json; SI units, angles in rad).
-//
-// The reader checks the content of the file: existing names, ranges of numbers, one value per
-// coordinate of a joint, positive definite inertias. The assembly checks if the loops can be closed
-// from the initial values. In a planar file vectors may have a third component, which must be zero,
-// and frames turn about z only.
-
-/// Reads a file. Throws ConfigError with all errors, one per line.
+/// Reads a file (configs/schema/mechanism.schema.json; SI units, angles in rad). Checks names,
+/// ranges of numbers, one value per coordinate of a joint and inertias; the assembly checks if the
+/// loops can be closed. Throws ConfigError with all errors, one per line.
 MechanismFile ReadMechanism(const std::filesystem::path& path);
 
 /// Reads a mechanism from text; `file` is the name used in messages.
 MechanismFile ParseMechanism(std::string_view text, const std::string& file);
 
-// Writer of mechanisms as JSON files, which the reader reads to the same description.
-//
-// The writer uses the readers' lists of fields, so that no key is lost. Points of bodies that
-// joints and forces refer to keep their names.
-
-/// Returns the file. Reading it gives a bitwise equal description, with two exceptions: values of
-/// joints whose only coordinate is prescribed are left out, and the sign of default zeros is lost.
+/// Returns the file, written by the readers' lists of fields. Points of bodies that joints and
+/// forces refer to keep their names. Reading the file gives a bitwise equal description, with two
+/// exceptions. Values of joints whose only coordinate is prescribed are left out. Default zeros
+/// lose their sign.
 ///
 /// @throws ConfigError with the reader's messages, for a description that no file can represent:
 /// released directions of joints (redundancy.h), empty or repeated names, non-planar parts,

@@ -27,16 +27,13 @@ struct Draft : MechanismDescription, ObservedQuantities {
   std::string comment;
 };
 
-/// Part of a mechanism file, which refers to other parts by name.
+/// Fields of a part of a mechanism file, which refers to other parts by name.
 template <class T>
-struct PartOf : T {
-  const Draft* draft = nullptr;
-};
-inline const Draft& DraftOf(const Draft& draft) { return draft; }
+using PartFields = Fields<T, const Draft>;
 template <class T>
-const Draft& DraftOf(const PartOf<T>& part) {
-  return *part.draft;
-}
+using PartValue = FieldValue<T, const Draft>;
+template <class T>
+using PartField = Field<T, const Draft>;
 
 /// Cure for non-planar values in a file without "space".
 inline constexpr std::string_view kSpatialCure = "\"space\": \"spatial\" at the top level";
@@ -45,13 +42,13 @@ inline constexpr std::string_view kSpatialCure = "\"space\": \"spatial\" at the 
 MechanismFile ReadMechanismObject(const JsonNode& root);
 
 /// Fields of the sections of the same names.
-FieldValue<Draft> GroundValue();
-FieldValue<Draft> BodiesValue();
-FieldValue<Draft> JointsValue();
-FieldValue<Draft> CouplingsValue();
-FieldValue<Draft> ForcesValue();
-const Fields<Draft>& InitialFields();
-const Fields<Draft>& ObservationFields();
+PartValue<Draft> GroundValue();
+PartValue<Draft> BodiesValue();
+PartValue<Draft> JointsValue();
+PartValue<Draft> CouplingsValue();
+PartValue<Draft> ForcesValue();
+const PartFields<InitialDescription>& InitialFields();
+const PartFields<ObservedQuantities>& ObservationFields();
 
 // Readers and writers of values. Writers return null for values that a file leaves out.
 
@@ -80,141 +77,96 @@ Eigen::Vector3d ReadPoint(const JsonNode& node, int body, const Draft& draft);
 /// Writes the name of the body's point at this position, otherwise the vector.
 Json WritePoint(const Eigen::Vector3d& at, int body, const Draft& draft);
 
-/// Writers that leave out zeros, and values that are not there.
+/// Writer that leaves out zeros.
 template <Json (*write)(const Eigen::Vector3d&, const Draft&)>
 Json UnlessZero(const Eigen::Vector3d& vector, const Draft& draft) {
   return vector.isZero(0.0) ? Json() : write(vector, draft);
 }
-template <Json (*write)(const Eigen::Vector3d&, const Draft&)>
-Json IfAny(const std::optional<Eigen::Vector3d>& vector, const Draft& draft) {
-  return vector ? write(*vector, draft) : Json();
+
+/// Returns the value that `get(owner)` refers to. Accessors of forces need a mutable copy.
+template <class T, class Get>
+auto ValueOf(const T& owner, const Get& get) {
+  if constexpr (std::invocable<Get, const T&>) {
+    return std::invoke(get, owner);
+  } else {
+    T copy = owner;
+    return std::invoke(get, copy);
+  }
 }
 
 /// Field for the value that `get(owner)` refers to, by `read(node, draft)` and `write(value,
 /// draft)`.
 template <class T, class Get, class Read, class Write>
-FieldValue<T> Coded(Get get, Json schema, Read read, Write write) {
-  return {
-      std::move(schema),
-      [=](const JsonNode& node, T& owner) { std::invoke(get, owner) = read(node, DraftOf(owner)); },
-      nullptr, [=](const T& owner) { return write(std::invoke(get, owner), DraftOf(owner)); }};
-}
-
-/// Reads a part; `start` contains the defaults.
-template <class T>
-T ReadPart(const Fields<PartOf<T>>& fields, const JsonNode& node, const Draft& draft,
-           T start = {}) {
-  PartOf<T> part;
-  static_cast<T&>(part) = std::move(start);
-  part.draft = &draft;
-  fields.Read(node, &part);
-  return part;
-}
-
-/// Writes a part as in a file.
-template <class T>
-Json WritePart(const Fields<PartOf<T>>& fields, const Draft& draft, const T& whole) {
-  PartOf<T> part;
-  static_cast<T&>(part) = whole;
-  part.draft = &draft;
-  return fields.Write(part);
-}
-
-/// Field for an object within an object.
-template <class T, class Owner>
-FieldValue<PartOf<Owner>> Part(T Owner::*member, const Fields<PartOf<T>>& fields) {
-  return {fields.Schema(),
-          [member, &fields](const JsonNode& node, PartOf<Owner>& owner) {
-            owner.*member = ReadPart(fields, node, *owner.draft, owner.*member);
+PartValue<T> Coded(Get get, Json schema, Read read, Write write) {
+  return {std::move(schema),
+          [=](const JsonNode& node, T& owner, const Draft& draft) {
+            std::invoke(get, owner) = read(node, draft);
           },
           nullptr,
-          [member, &fields](const PartOf<Owner>& owner) {
-            return WritePart(fields, *owner.draft, owner.*member);
-          }};
+          [=](const T& owner, const Draft& draft) { return write(ValueOf(owner, get), draft); }};
 }
 
-/// Rules of a list of parts.
+/// Field for a list of parts, whose names are added to `names`. `least` as for
+/// JsonNode::Elements(). `start`: defaults of a part.
 template <class T>
-struct PartRules {
-  const char* what;             ///< the elements in messages: "joints"
-  const char* least = "";       ///< as for JsonNode::Elements()
-  std::size_t first = 0;        ///< index of the first part of a file
-  bool is_always_there = true;  ///< also without parts
-  T start = {};                 ///< defaults of a part
-};
-
-/// Field for a list of parts with names, which are added to `names`.
-template <class T>
-FieldValue<Draft> PartList(std::vector<T> MechanismDescription::*list,
-                           const Fields<PartOf<T>>& fields, NameList Draft::*names,
-                           const PartRules<T>& rules) {
-  return {ArraySchema(fields.Schema(), *rules.least == '\0' ? 0 : 1),
-          [=, &fields](const JsonNode& node, Draft& draft) {
-            for (const JsonNode& element : node.Elements(rules.what, rules.least)) {
-              (draft.*list).push_back(ReadPart(fields, element, draft, rules.start));
-              (draft.*names).Add((draft.*list).back().name);
-            }
-          },
-          nullptr,
-          [=, &fields](const Draft& draft) {
-            Json parts = Json::array();
-            for (std::size_t i = rules.first; i < (draft.*list).size(); ++i) {
-              parts.push_back(WritePart(fields, draft, (draft.*list)[i]));
-            }
-            return parts.empty() && !rules.is_always_there ? Json() : parts;
-          }};
+PartValue<Draft> PartList(std::vector<T> MechanismDescription::*list, const PartFields<T>& fields,
+                          NameList Draft::*names, const char* what, const char* least = "",
+                          const T& start = {}) {
+  PartValue<Draft> value = ObjectList(list, fields, what);
+  value.schema = ArraySchema(fields.Schema(), *least == '\0' ? 0 : 1);
+  value.read = [=, &fields](const JsonNode& node, Draft& draft, const Draft& all) {
+    for (const JsonNode& element : node.Elements(what, least)) {
+      T part = start;
+      fields.Read(element, &part, all);
+      (draft.*names).Add(part.name);
+      (draft.*list).push_back(std::move(part));
+    }
+  };
+  return value;
 }
 
 /// Field for a name that `taken` does not contain.
 template <class T>
-FieldValue<PartOf<T>> NewName(std::string T::*member, NameList Draft::*taken) {
-  return {TextSchema(),
-          [=](const JsonNode& node, PartOf<T>& owner) {
-            owner.*member = node.Text();
-            if ((owner.draft->*taken).Find(owner.*member))
-              node.Fail("a name that is not in use yet");
-          },
-          nullptr, [=](const PartOf<T>& owner) { return Json(owner.*member); }};
+PartValue<T> NewName(std::string T::*member, NameList Draft::*taken) {
+  const auto read = [=](const JsonNode& node, const Draft& draft) {
+    const std::string name = node.Text();
+    if ((draft.*taken).Find(name)) node.Fail("a name that is not in use yet");
+    return name;
+  };
+  return Coded<T>(member, TextSchema(), read,
+                  [](const std::string& name, const Draft&) { return Json(name); });
 }
 
-template <class T>
-FieldValue<T> TimeFunctionOf(TimeFunctionDescription T::*member) {
+template <class T, class Get>
+FieldValue<T> TimeFunctionOf(Get get) {
   return {TimeFunctionSchema(),
-          [=](const JsonNode& node, T& owner) { owner.*member = ReadTimeFunction(node); }, nullptr,
-          [=](const T& owner) { return WriteTimeFunction(owner.*member); }};
+          [=](const JsonNode& node, T& owner) { std::invoke(get, owner) = ReadTimeFunction(node); },
+          nullptr, [=](const T& owner) { return WriteTimeFunction(ValueOf(owner, get)); }};
 }
 
 /// Field for the index of a body, -1 for an unknown name; `get(owner)` is a reference to it.
 template <class T, class Get>
-FieldValue<PartOf<T>> BodyOf(Get get, bool may_be_ground) {
-  return {TextSchema(),
-          [=](const JsonNode& node, PartOf<T>& owner) {
-            int& body = std::invoke(get, static_cast<T&>(owner));
-            body = ReadBodyName(node, *owner.draft).value_or(-1);
-            if (body == kGround && !may_be_ground) node.Fail("a body that can move");
-          },
-          nullptr,
-          [=](const PartOf<T>& owner) {
-            T part = owner;  // accessors of forces need a mutable copy
-            const int body = std::invoke(get, part);
-            return Json(owner.draft->bodies[body].name);
-          }};
+PartValue<T> BodyOf(Get get, bool may_be_ground) {
+  const auto read = [=](const JsonNode& node, const Draft& draft) {
+    const int body = ReadBodyName(node, draft).value_or(-1);
+    if (body == kGround && !may_be_ground) node.Fail("a body that can move");
+    return body;
+  };
+  return Coded<T>(get, TextSchema(), read,
+                  [](int body, const Draft& draft) { return Json(draft.bodies[body].name); });
 }
 
 /// Field for a point of that body, in body axes from the body's origin.
 template <class T, class GetBody, class Get>
-FieldValue<PartOf<T>> PlaceOf(GetBody body, Get get) {
+PartValue<T> PlaceOf(GetBody body, Get get) {
   return {PlaceSchema(),
-          [=](const JsonNode& node, PartOf<T>& owner) {
-            T& part = owner;
-            const int index = std::invoke(body, part);
-            if (index < 0) return;
-            std::invoke(get, part) = ReadPoint(node, index, *owner.draft);
+          [=](const JsonNode& node, T& owner, const Draft& draft) {
+            const int index = std::invoke(body, owner);
+            if (index >= 0) std::invoke(get, owner) = ReadPoint(node, index, draft);
           },
           nullptr,
-          [=](const PartOf<T>& owner) {
-            T part = owner;
-            return WritePoint(std::invoke(get, part), std::invoke(body, part), *owner.draft);
+          [=](const T& owner, const Draft& draft) {
+            return WritePoint(ValueOf(owner, get), ValueOf(owner, body), draft);
           }};
 }
 

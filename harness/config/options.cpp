@@ -6,14 +6,12 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <utility>
 
 #include "harness/base/text.h"
 #include "mechanism/description/registration.h"
 
 namespace loopbench::harness {
-
 namespace {
 
 // ode45's values; the repeated-failure factor is MATLAB's halving.
@@ -78,98 +76,6 @@ std::deque<Profile>& Rows() {
   static std::deque<Profile> rows = BuiltIn();
   return rows;
 }
-
-}  // namespace
-
-const std::deque<Profile>& Profiles() { return Rows(); }
-
-const Profile* FindProfile(std::string_view name) {
-  const auto found = std::ranges::find(Rows(), name, &Profile::name);
-  return found == Rows().end() ? nullptr : &*found;
-}
-
-std::vector<std::string> ProfileNames() { return Mapped<std::string>(kNamed, &NamedProfile::name); }
-
-std::vector<std::string> IntegratorNames() { return Mapped<std::string>(Rows(), &Profile::name); }
-
-std::optional<TableFault> FaultOfIntegrator(const ButcherTable& table) {
-  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789_-";
-  if (table.name.empty() || table.name.front() == '-' ||
-      table.name.find_first_not_of(kLetters) != std::string::npos) {
-    return TableFault{"name", fmt::format("\"{}\"", table.name), "a word of a-z, 0-9, '-' and '_'"};
-  }
-  const Profile* taken = FindProfile(table.name);
-  if (taken != nullptr && !(taken->is_own && taken->table == table)) {
-    return TableFault{"name", fmt::format("\"{}\", the name of another integrator", table.name),
-                      "a name of its own"};
-  }
-  return FaultOf(table);
-}
-
-void RegisterIntegrator(const ButcherTable& table) {
-  if (const auto fault = FaultOfIntegrator(table)) {
-    RefuseRow("integrator", table.name, fmt::format("in {} {}", fault->key, fault->found),
-              fault->expected);
-  }
-  if (FindProfile(table.name) == nullptr) Rows().push_back(MakeProfile(table.name, table, true));
-}
-
-std::string Validate(const IntegratorOptions& options) {
-  // Negated comparisons, so that NaN is rejected too.
-  const Profile* profile = FindProfile(options.profile);
-  if (profile == nullptr) {
-    return fmt::format("profile is \"{}\"; accepted: {}, and tables of ARKODE by their names",
-                       options.profile, fmt::join(ProfileNames(), ", "));
-  }
-  if (!profile->has_embedding() && !(options.fixed_step > 0)) {
-    return fmt::format("profile is \"{}\", which has no embedding; it needs a fixed_step",
-                       options.profile);
-  }
-  if (!(options.rtol > kMinTolerance && options.rtol < 1)) {
-    return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol, kMinTolerance);
-  }
-  if (!(options.atol > 0 && options.atol <= std::numeric_limits<double>::max())) {
-    return fmt::format("atol is {}; it must be positive and finite", options.atol);
-  }
-  for (const double atol : options.atols) {
-    if (!(atol > 0 && atol <= std::numeric_limits<double>::max())) {
-      return fmt::format("atols contain {}; they must be positive and finite", atol);
-    }
-  }
-  if (options.step_limit < 1) {
-    return "step_limit is " + std::to_string(options.step_limit) + "; it must be at least 1";
-  }
-  if (!(options.time_limit_s > 0)) {
-    return "time_limit_s is " + std::to_string(options.time_limit_s) + "; it must be positive";
-  }
-  if (!(options.max_step >= 0)) {
-    return "max_step is " + std::to_string(options.max_step) + "; it must not be negative";
-  }
-  if (!(options.initial_step >= 0)) {
-    return fmt::format("initial_step is {}; it must not be negative", options.initial_step);
-  }
-  if (options.max_newton_iterations < 0) {
-    return fmt::format("max_newton_iterations is {}; it must not be negative",
-                       options.max_newton_iterations);
-  }
-  if (!(options.newton_coefficient > 0 && options.newton_coefficient <= 1)) {
-    return fmt::format("newton_coefficient is {}; it must lie between 0 and 1",
-                       options.newton_coefficient);
-  }
-  if (!(options.fixed_step >= 0)) {
-    return "fixed_step is " + std::to_string(options.fixed_step) + "; it must not be negative";
-  }
-  for (size_t i = 0; i < options.stop_times.size(); ++i) {
-    const double t = options.stop_times[i];
-    if (!std::isfinite(t) || (i > 0 && t < options.stop_times[i - 1])) {
-      return "stop_times[" + std::to_string(i) + "] is " + std::to_string(t) +
-             "; stop times must be finite and in order";
-    }
-  }
-  return "";
-}
-
-namespace {
 
 /// Rooted tree t: its order condition is sum_i b_i weights_i = 1 / density.
 struct Tree {
@@ -276,6 +182,94 @@ std::optional<TableFault> FaultOfShape(const ButcherTable& table) {
 }
 
 }  // namespace
+
+const std::deque<Profile>& Profiles() { return Rows(); }
+
+const Profile* FindProfile(std::string_view name) {
+  const auto found = std::ranges::find(Rows(), name, &Profile::name);
+  return found == Rows().end() ? nullptr : &*found;
+}
+
+std::vector<std::string> ProfileNames() { return Mapped<std::string>(kNamed, &NamedProfile::name); }
+
+std::vector<std::string> IntegratorNames() { return Mapped<std::string>(Rows(), &Profile::name); }
+
+std::optional<TableFault> FaultOfIntegrator(const ButcherTable& table) {
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+  if (table.name.empty() || table.name.front() == '-' ||
+      table.name.find_first_not_of(kLetters) != std::string::npos) {
+    return TableFault{"name", fmt::format("\"{}\"", table.name), "a word of a-z, 0-9, '-' and '_'"};
+  }
+  const Profile* taken = FindProfile(table.name);
+  if (taken != nullptr && !(taken->is_own && taken->table == table)) {
+    return TableFault{"name", fmt::format("\"{}\", the name of another integrator", table.name),
+                      "a name of its own"};
+  }
+  return FaultOf(table);
+}
+
+void RegisterIntegrator(const ButcherTable& table) {
+  if (const auto fault = FaultOfIntegrator(table)) {
+    RefuseRow("integrator", table.name, fmt::format("in {} {}", fault->key, fault->found),
+              fault->expected);
+  }
+  if (FindProfile(table.name) == nullptr) Rows().push_back(MakeProfile(table.name, table, true));
+}
+
+std::string Validate(const IntegratorOptions& options) {
+  // Negated comparisons, so that NaN is rejected too.
+  const Profile* profile = FindProfile(options.profile);
+  if (profile == nullptr) {
+    return fmt::format("profile is \"{}\"; accepted: {}, and tables of ARKODE by their names",
+                       options.profile, fmt::join(ProfileNames(), ", "));
+  }
+  if (!profile->has_embedding() && !(options.fixed_step > 0)) {
+    return fmt::format("profile is \"{}\", which has no embedding; it needs a fixed_step",
+                       options.profile);
+  }
+  if (!(options.rtol > kMinTolerance && options.rtol < 1)) {
+    return fmt::format("rtol is {}; it must lie between {:.2g} and 1", options.rtol, kMinTolerance);
+  }
+  if (!(options.atol > 0 && options.atol <= std::numeric_limits<double>::max())) {
+    return fmt::format("atol is {}; it must be positive and finite", options.atol);
+  }
+  for (const double atol : options.atols) {
+    if (!(atol > 0 && atol <= std::numeric_limits<double>::max())) {
+      return fmt::format("atols contain {}; they must be positive and finite", atol);
+    }
+  }
+  if (options.step_limit < 1) {
+    return "step_limit is " + std::to_string(options.step_limit) + "; it must be at least 1";
+  }
+  if (!(options.time_limit_s > 0)) {
+    return "time_limit_s is " + std::to_string(options.time_limit_s) + "; it must be positive";
+  }
+  if (!(options.max_step >= 0)) {
+    return "max_step is " + std::to_string(options.max_step) + "; it must not be negative";
+  }
+  if (!(options.initial_step >= 0)) {
+    return fmt::format("initial_step is {}; it must not be negative", options.initial_step);
+  }
+  if (options.max_newton_iterations < 0) {
+    return fmt::format("max_newton_iterations is {}; it must not be negative",
+                       options.max_newton_iterations);
+  }
+  if (!(options.newton_coefficient > 0 && options.newton_coefficient <= 1)) {
+    return fmt::format("newton_coefficient is {}; it must lie between 0 and 1",
+                       options.newton_coefficient);
+  }
+  if (!(options.fixed_step >= 0)) {
+    return "fixed_step is " + std::to_string(options.fixed_step) + "; it must not be negative";
+  }
+  for (size_t i = 0; i < options.stop_times.size(); ++i) {
+    const double t = options.stop_times[i];
+    if (!std::isfinite(t) || (i > 0 && t < options.stop_times[i - 1])) {
+      return "stop_times[" + std::to_string(i) + "] is " + std::to_string(t) +
+             "; stop times must be finite and in order";
+    }
+  }
+  return "";
+}
 
 bool ButcherTable::is_implicit() const {
   for (std::size_t i = 0; i < A.size(); ++i) {

@@ -11,8 +11,6 @@
 
 namespace loopbench::harness {
 
-// Butcher tables of Runge-Kutta methods, and the check of their order.
-
 /// Coefficients of an explicit or diagonally implicit Runge-Kutta method:
 ///   Y_i = y + h sum_j A_ij f(t + c_j h, Y_j),  y_new = y + h sum_i b_i f(t + c_i h, Y_i).
 /// The embedded solution has the weights b_embedded; their difference estimates the error.
@@ -53,8 +51,6 @@ std::string ToString(const ButcherTable& table);
 
 /// Returns the tables of the installed ARKODE, explicit ones first, by ARKODE's names.
 std::vector<ButcherTable> ArkodeTables();
-
-// Options and profiles of integrators.
 
 /// Options of the integrator. A profile is a Runge-Kutta pair with an error norm, a step-size
 /// controller and a first-step rule. All of them change drift (by factors of two to four), so a

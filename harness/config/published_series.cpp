@@ -26,10 +26,7 @@ struct SeriesDraft : PublishedSeries {
   const MechanismDescription* mechanism = nullptr;
 };
 
-/// Quantity with the series that it belongs to.
-struct QuantityDraft : PublishedQuantity {
-  const SeriesDraft* series = nullptr;
-};
+using Quantity = PublishedQuantity;
 
 void ReadTimes(const JsonNode& node, SeriesDraft& draft) {
   const std::vector<JsonNode> elements = node.Elements("times", "at least one time");
@@ -46,11 +43,12 @@ void ReadTimes(const JsonNode& node, SeriesDraft& draft) {
   }
 }
 
-void ReadValues(const JsonNode& node, QuantityDraft& draft) {
-  for (const JsonNode& element : node.Elements("values")) draft.values.push_back(element.Number());
-  const std::size_t wanted = draft.series->times.size();
-  if (!node.value().is_array() || wanted == 0 || draft.values.size() == wanted) return;
-  node.FailAs(fmt::format("{} values", draft.values.size()),
+void ReadValues(const JsonNode& node, Quantity& quantity, const SeriesDraft& series) {
+  for (const JsonNode& element : node.Elements("values"))
+    quantity.values.push_back(element.Number());
+  const std::size_t wanted = series.times.size();
+  if (!node.value().is_array() || wanted == 0 || quantity.values.size() == wanted) return;
+  node.FailAs(fmt::format("{} values", quantity.values.size()),
               fmt::format("one for each of the {} times", wanted));
 }
 
@@ -64,58 +62,58 @@ std::optional<int> Among(const JsonNode& node, const Things& things, Name name, 
   return found ? std::optional<int>(*found + static_cast<int>(first)) : std::nullopt;
 }
 
-void ReadBody(const JsonNode& node, QuantityDraft& draft) {
-  draft.body = node.Text();
-  const MechanismDescription* mechanism = draft.series->mechanism;
-  if (mechanism == nullptr || draft.body.empty()) return;
+void ReadBody(const JsonNode& node, Quantity& quantity, const SeriesDraft& series) {
+  quantity.body = node.Text();
+  const MechanismDescription* mechanism = series.mechanism;
+  if (mechanism == nullptr || quantity.body.empty()) return;
   const auto found = Among(node, mechanism->bodies, &BodyDescription::name, 1,
                            fmt::format("a body of mechanism \"{}\" that moves", mechanism->name));
-  if (found) draft.index = static_cast<std::size_t>(*found);
+  if (found) quantity.index = static_cast<std::size_t>(*found);
 }
 
-void ReadPoint(const JsonNode& node, QuantityDraft& draft) {
-  draft.point = node.Text();
-  if (draft.series->mechanism == nullptr || draft.index == 0) return;
-  const BodyDescription& body = draft.series->mechanism->bodies[draft.index];
+void ReadPoint(const JsonNode& node, Quantity& quantity, const SeriesDraft& series) {
+  quantity.point = node.Text();
+  if (series.mechanism == nullptr || quantity.index == 0) return;
+  const BodyDescription& body = series.mechanism->bodies[quantity.index];
   NameList known;
   for (const auto& [name, at] : body.points) known.Add(name);
   if (node.Choice(known, fmt::format("a point of body \"{}\"", body.name))) {
-    draft.at = body.points.at(draft.point);
+    quantity.at = body.points.at(quantity.point);
   }
 }
 
-void ReadAxis(const JsonNode& node, QuantityDraft& draft) {
+void ReadAxis(const JsonNode& node, Quantity& quantity, const SeriesDraft& series) {
   const auto found = node.Choice(Axes(), "an axis");
   if (!found) return;
-  draft.axis = Axes().all()[static_cast<std::size_t>(*found)];
-  draft.kind = *found == kTurning ? PublishedKind::kAngle : PublishedKind::kPoint;
-  draft.along = *found;
-  const MechanismDescription* mechanism = draft.series->mechanism;
+  quantity.axis = Axes().all()[static_cast<std::size_t>(*found)];
+  quantity.kind = *found == kTurning ? PublishedKind::kAngle : PublishedKind::kPoint;
+  quantity.along = *found;
+  const MechanismDescription* mechanism = series.mechanism;
   if (mechanism == nullptr) return;
   const bool in_plane = mechanism->space == SpaceKind::kPlanar;
   if (in_plane && *found == kAxisZ) node.Fail("x, y or angle: the mechanism is planar");
   if (!in_plane && *found == kTurning) node.Fail("x, y or z: the mechanism is spatial");
 }
 
-void ReadJoint(const JsonNode& node, QuantityDraft& draft) {
-  draft.joint = node.Text();
-  draft.kind = PublishedKind::kJoint;
-  const MechanismDescription* mechanism = draft.series->mechanism;
-  if (mechanism == nullptr || draft.joint.empty()) return;
+void ReadJoint(const JsonNode& node, Quantity& quantity, const SeriesDraft& series) {
+  quantity.joint = node.Text();
+  quantity.kind = PublishedKind::kJoint;
+  const MechanismDescription* mechanism = series.mechanism;
+  if (mechanism == nullptr || quantity.joint.empty()) return;
   const auto found = Among(node, mechanism->joints, &JointDescription::name, 0,
                            fmt::format("a joint of mechanism \"{}\"", mechanism->name));
   if (!found) return;
-  draft.index = static_cast<std::size_t>(*found);
-  const JointType type = mechanism->joints[draft.index].type;
+  quantity.index = static_cast<std::size_t>(*found);
+  const JointType type = mechanism->joints[quantity.index].type;
   const std::size_t count = ValueWords(type, mechanism->space, false).size();
   if (count != 1) {
-    node.FailAs(fmt::format("joint \"{}\" with {} coordinates", draft.joint, count),
+    node.FailAs(fmt::format("joint \"{}\" with {} coordinates", quantity.joint, count),
                 "a joint with one, or points of its bodies");
   }
 }
 
 /// A body's point along an axis, a body's angle, or a joint.
-void RequireOneThing(const JsonNode& node, QuantityDraft& draft) {
+void RequireOneThing(const JsonNode& node, Quantity& quantity) {
   const bool body = node.Optional("body").has_value(), joint = node.Optional("joint").has_value();
   const auto point = node.Optional("point"), axis = node.Optional("axis");
   if (body == joint) {
@@ -125,9 +123,9 @@ void RequireOneThing(const JsonNode& node, QuantityDraft& draft) {
     (point ? *point : *axis).Fail("none beside \"joint\"");
   } else if (body && !axis) {
     node.Required("axis", "x, y or z of a point, or angle");
-  } else if (body && draft.axis == "angle" && point) {
+  } else if (body && quantity.axis == "angle" && point) {
     point->Fail("none beside \"axis\": \"angle\": all points of a body turn alike");
-  } else if (body && !draft.axis.empty() && draft.axis != "angle" && !point) {
+  } else if (body && !quantity.axis.empty() && quantity.axis != "angle" && !point) {
     node.Required("point", "a named point of the body");
   }
 }
@@ -141,8 +139,8 @@ Json OneThingSchema() {
   return {{"oneOf", {of_joint, turning, of_point}}};
 }
 
-const Fields<QuantityDraft>& QuantityFields() {
-  static const Fields<QuantityDraft> fields(
+const Fields<Quantity, const SeriesDraft>& QuantityFields() {
+  static const Fields<Quantity, const SeriesDraft> fields(
       "quantity",
       "Values over time of a coordinate of a named point, of a planar body's angle, or of a "
       "joint.",
@@ -152,10 +150,10 @@ const Fields<QuantityDraft>& QuantityFields() {
         "Ground axis of the coordinate [m], or the angle of the body [rad]."},
        {"joint", By(TextSchema(), ReadJoint), "Name of a joint with one coordinate [rad or m]."},
        {"", By(OneThingSchema(), RequireOneThing)},
-       {"speed", Bool(&QuantityDraft::is_speed), "If true, the values are rates, per second."},
+       {"speed", Bool(&Quantity::is_speed), "If true, the values are rates, per second."},
        {"values", By(ArraySchema(NumberSchema(), 1, kMaxTimes), ReadValues), "One per time.",
         "a list of numbers, one for each time"},
-       {"uncertainty", Number(&QuantityDraft::accuracy, kPositive),
+       {"uncertainty", Number(&Quantity::accuracy, kPositive),
         "Absolute uncertainty of every value, in the unit of the values: at least half a unit of "
         "the last printed digit.",
         "a number > 0 in the unit of the values"}});
@@ -164,9 +162,8 @@ const Fields<QuantityDraft>& QuantityFields() {
 
 void ReadQuantities(const JsonNode& node, SeriesDraft& draft) {
   for (const JsonNode& element : node.Elements("quantities", "at least one quantity")) {
-    QuantityDraft quantity;
-    quantity.series = &draft;
-    QuantityFields().Read(element, &quantity);
+    Quantity quantity;
+    QuantityFields().Read(element, &quantity, draft);
     const auto same = [&](const PublishedQuantity& other) {
       return other.body == quantity.body && other.point == quantity.point &&
              other.axis == quantity.axis && other.joint == quantity.joint &&

@@ -1,5 +1,3 @@
-#include "harness/exchange/export_mechanism.h"
-
 #include <fmt/format.h>
 
 #include <variant>
@@ -82,14 +80,14 @@ class Maker {
     Joint made;
     made.name = mechanism.joint_names()[index];
     JointType type = JointType::kFree;  // default for a virtual joint
-    if (joint.description >= 0) type = description_.joints[joint.description].type;
+    if (joint.description >= 0) {
+      type = description_.joints[joint.description].type;
+      made.rotor_inertia = description_.joints[joint.description].rotor_inertia;
+    }
     if (joint.num_drives > 0) {
       Miss("joint \"{}\": a prescribed motion", made.name);
     } else if (!IsBuiltIn(type)) {
       Miss("joint \"{}\": {}", made.name, ToString(type));
-    }
-    if (joint.description >= 0) {
-      made.rotor_inertia = description_.joints[joint.description].rotor_inertia;
     }
     if (made.rotor_inertia > 0.0 && !joint.in_tree()) {
       Miss("rotor of joint \"{}\", which closes a loop", made.name);
@@ -194,9 +192,8 @@ Model Make(const MechanismDescription& description, bool at_start) {
 }
 
 /// Writes MJCF with all constraints, since MuJoCo regularizes redundant ones.
-ExportedFile WriteMjcf(const MechanismDescription& description, const ExportOptions& options) {
-  const Mjcf made =
-      MakeMjcf(MakeModelAtStart(description), {.time_step = options.time_step, .shapes = true});
+ExportedFile WriteMjcf(const MechanismDescription& description, double time_step) {
+  const Mjcf made = MakeMjcf(MakeModelAtStart(description), time_step, true);
   return {"<!--\n" +
               CommentLines("  ", "\"" + description.name +
                                      "\", a mechanism of Loopbench at its assembled start, for "
@@ -208,13 +205,11 @@ ExportedFile WriteMjcf(const MechanismDescription& description, const ExportOpti
 
 /// Writes a Simbody program without redundant constraints. Simbody determines the rank at each
 /// position and sometimes fails with many redundant constraints.
-ExportedFile WriteSimbody(const MechanismDescription& description, const ExportOptions&) {
+ExportedFile WriteSimbody(const MechanismDescription& description, double) {
   CompileOptions options = CompileOptions::None();
   options.redundancy = true;
   const Compiled compiled = Compile(description, options);
-  SimbodyProgramText made =
-      WriteSimbodyProgram(MakeModelAtStart(compiled.parts.front().description));
-  return {std::move(made.program), std::move(made.notes)};
+  return WriteSimbodyProgram(MakeModelAtStart(compiled.parts.front().description));
 }
 
 }  // namespace

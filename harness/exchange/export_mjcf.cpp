@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "harness/base/text.h"
 #include "harness/exchange/export_names.h"
 #include "mechanism/algebra/space.h"
 #include "mechanism/description/joint_frames.h"
@@ -162,9 +163,7 @@ std::vector<std::string> MissingInMjcf(const Model& model) {
 /// Returns ` name="1.0 2.0"`.
 template <class Range>
 std::string Attribute(const char* name, const Range& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : " ") + NumberText(value);
-  return fmt::format(" {}=\"{}\"", name, text);
+  return fmt::format(" {}=\"{}\"", name, harness::Joined(values, " ", NumberText));
 }
 std::string Attribute(const char* name, double value) {
   return Attribute(name, std::array<double, 1>{value});
@@ -226,13 +225,13 @@ std::string Section(const char* name, const std::string& elements) {
 
 class MjcfWriter {
  public:
-  MjcfWriter(const Model& model, const MjcfOptions& options)
+  MjcfWriter(const Model& model, double time_step, bool shapes)
       : model_(model),
-        options_(options),
+        time_step_(time_step),
+        has_shapes_(shapes),
         children_(model.bodies.size()),
-        sites_(model.bodies.size()),
-        shapes_(model.bodies.size()) {
-    if (options.shapes) shapes_ = ShapesOf(model);
+        contents_(model.bodies.size()) {
+    if (shapes) contents_ = ShapesOf(model);
     for (int i = 0; i < std::ssize(model.tree); ++i) {
       children_[model.tree[i].parent()].push_back(i);
     }
@@ -252,17 +251,15 @@ class MjcfWriter {
     std::string bodies, world;
     for (const int index : children_[0]) AddBody(index, 2, bodies);
     for (const Coupling& coupling : model_.couplings) AddCoupling(coupling);
-    for (const std::string& site : sites_[0]) world += "    " + site;
-    const double h = options_.time_step;
-    const std::string closures = Attribute("solref", std::array{2.0 * h, 1.0}) +
+    for (const std::string& site : contents_[0]) world += "    " + site;
+    const std::string closures = Attribute("solref", std::array{2.0 * time_step_, 1.0}) +
                                  Attribute("solimp", std::array{kHardest, kHardest, 1e-3});
     const std::string shapes =
-        options_.shapes ? "    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.55 0.6 0.7 1\"/>\n"
-                        : "";
+        has_shapes_ ? "    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.55 0.6 0.7 1\"/>\n" : "";
     made_.document =
         "<mujoco" + Named("model", Renamed("model", model_.name, XmlText(model_.name))) +
         ">\n  <compiler angle=\"radian\" autolimits=\"false\"/>\n  <option" +
-        Attribute("timestep", h) + Attribute("gravity", model_.gravity) +
+        Attribute("timestep", time_step_) + Attribute("gravity", model_.gravity) +
         " integrator=\"RK4\" solver=\"Newton\" cone=\"elliptic\" jacobian=\"auto\" "
         "tolerance=\"1e-15\">\n    <flag contact=\"disable\" warmstart=\"disable\"/>\n  "
         "</option>\n" +
@@ -280,20 +277,20 @@ class MjcfWriter {
 
  private:
   template <class... Values>
-  void Say(fmt::format_string<Values...> text, Values&&... values) {
+  void AddNote(fmt::format_string<Values...> text, Values&&... values) {
     made_.notes.push_back({false, fmt::format(text, std::forward<Values>(values)...)});
   }
 
   /// Returns `name`, which represents the user's `given`; adds a note if they differ.
   std::string Renamed(const char* what, const std::string& given, std::string name) {
-    if (name != given) Say("{} \"{}\" is called \"{}\".", what, given, name);
+    if (name != given) AddNote("{} \"{}\" is called \"{}\".", what, given, name);
     return name;
   }
 
   /// Adds a site and returns its name.
   std::string AddSite(int body, const Vector3d& at, const std::string& wanted) {
     const std::string name = site_names_.Take(XmlText(wanted));
-    sites_[body].push_back(
+    contents_[body].push_back(
         fmt::format("<site{}{}/>\n", Named("name", name), Attribute("pos", ToVec(at))));
     return name;
   }
@@ -317,8 +314,7 @@ class MjcfWriter {
                         Attribute("pos", ToVec(chain.pose.p)),
                         Attribute("quat", QuaternionOf(chain.pose.R)), within + Inertial(child));
     AddJoint(index, chain, within, text);
-    for (const std::string& shape : shapes_[child]) text += within + shape;
-    for (const std::string& site : sites_[child]) text += within + site;
+    for (const std::string& element : contents_[child]) text += within + element;
     for (const int next : children_[child]) AddBody(next, depth + 1, text);
     text += indent + "</body>\n";
   }
@@ -351,7 +347,7 @@ class MjcfWriter {
       AddCoordinate(joint, chain, part);
     }
     if (alone) alone_[index] = names.front();
-    SayParts(joint, names);
+    NoteParts(joint, names);
   }
 
   /// Names of joints are known. MuJoCo counts coordinates from the start (`ref`), where it holds.
@@ -394,7 +390,7 @@ class MjcfWriter {
     const double sign = joint.from_is_child ? -1.0 : 1.0;
     if (constant != 0.0) {
       actuators_ += "    <general" + Named("joint", name) + Constant(sign * constant) + "/>\n";
-      Say("The constant effort along joint \"{}\" is an actuator without control.", joint.name);
+      AddNote("The constant effort along joint \"{}\" is an actuator without control.", joint.name);
     }
     std::string text;
     if (stiffness != 0.0) {
@@ -428,26 +424,26 @@ class MjcfWriter {
     }
   }
 
-  void SayParts(const Joint& joint, const std::vector<std::string>& names) {
+  void NoteParts(const Joint& joint, const std::vector<std::string>& names) {
     if (names.empty()) {
-      Say("joint \"{}\" (weld) is body \"{}\" without a joint.", joint.name,
-          model_.bodies[joint.child()].name);
+      AddNote("joint \"{}\" (weld) is body \"{}\" without a joint.", joint.name,
+              model_.bodies[joint.child()].name);
     }
     if (names.size() > 1) {
-      Say("joint \"{}\" ({}) is written as joints \"{}\" of one body.", joint.name, joint.kind,
-          fmt::join(names, "\", \""));
+      AddNote("joint \"{}\" ({}) is written as joints \"{}\" of one body.", joint.name, joint.kind,
+              fmt::join(names, "\", \""));
     }
     if (joint.from_is_child && !names.empty()) {
-      Say("joint \"{}\" is seen from its second body: coordinates have the opposite sign.",
-          joint.name);
+      AddNote("joint \"{}\" is seen from its second body: coordinates have the opposite sign.",
+              joint.name);
     }
     if (joint.num_q > joint.num_u) {
-      Say("joint \"{}\": the quaternion is counted from the start.", joint.name);
+      AddNote("joint \"{}\": the quaternion is counted from the start.", joint.name);
     }
   }
 
   void AddNotes() {
-    if (model_.planar) Say(kPlaneNote);
+    if (model_.planar) AddNote(kPlaneNote);
     if (made_.closures.empty() && model_.couplings.empty()) return;
     made_.notes.push_back(
         {true,
@@ -479,8 +475,8 @@ class MjcfWriter {
     const std::string pairs = points.size() == 1
                                   ? "a pair of points is"
                                   : fmt::format("{} pairs of points are", points.size());
-    Say("joint \"{}\" ({}) closes a loop: {} held {}.", joint.name, kind, pairs,
-        kind == "rod" ? "at a distance, by a tendon" : "together");
+    AddNote("joint \"{}\" ({}) closes a loop: {} held {}.", joint.name, kind, pairs,
+            kind == "rod" ? "at a distance, by a tendon" : "together");
   }
 
   void AddClosure(const Joint& joint, const Vector3d& at, const std::string& name) {
@@ -524,7 +520,7 @@ class MjcfWriter {
     if (force.preload == 0.0) return;
     // positive tension shortens
     actuators_ += "    <general" + Named("tendon", name) + Constant(-force.preload) + "/>\n";
-    Say("The preload of {} is an actuator without control.", name);
+    AddNote("The preload of {} is an actuator without control.", name);
   }
 
   void AddPointForce(const PointForce& force) {
@@ -539,13 +535,14 @@ class MjcfWriter {
     actuators_ += "    <general" + sites +
                   Attribute("gear", std::array{F[0], F[1], F[2], 0.0, 0.0, 0.0}) + Constant(1.0) +
                   "/>\n";
-    Say("{} on body \"{}\" is an actuator without control.", name, model_.bodies[body].name);
+    AddNote("{} on body \"{}\" is an actuator without control.", name, model_.bodies[body].name);
   }
 
   const Model& model_;
-  const MjcfOptions options_;
-  std::vector<std::vector<int>> children_;                ///< tree joints below each body
-  std::vector<std::vector<std::string>> sites_, shapes_;  ///< by body
+  const double time_step_;
+  const bool has_shapes_;
+  std::vector<std::vector<int>> children_;          ///< tree joints below each body
+  std::vector<std::vector<std::string>> contents_;  ///< shapes, then sites, by body
   std::vector<std::string> body_names_;
   std::map<int, std::string> alone_;  ///< MuJoCo joint of a tree joint with one coordinate
   UniqueNames site_names_, joint_names_, closure_names_;
@@ -556,10 +553,10 @@ class MjcfWriter {
 
 }  // namespace
 
-Mjcf MakeMjcf(const Model& model, const MjcfOptions& options) {
+Mjcf MakeMjcf(const Model& model, double time_step, bool shapes) {
   std::vector<std::string> missing = MissingInMjcf(model);
   if (!missing.empty()) throw Unsupported(std::move(missing));
-  return MjcfWriter(model, options).Write();
+  return MjcfWriter(model, time_step, shapes).Write();
 }
 
 }  // namespace loopbench::exchange

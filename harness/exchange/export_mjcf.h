@@ -30,11 +30,6 @@ struct MjcfClosure {
   double rod = -1.0;  ///< distance [m]; negative: none
 };
 
-struct MjcfOptions {
-  double time_step = 1e-3;  ///< step [s], which limits the stiffness of closures
-  bool shapes = false;      ///< shapes for viewers; they slow down every step
-};
-
 struct Mjcf {
   std::string document;
   std::vector<MjcfCoordinate> coordinates;  ///< in the order of MuJoCo's joints
@@ -42,10 +37,11 @@ struct Mjcf {
   std::vector<Note> notes;
 };
 
-/// Makes the document at Model::q. Its closures hold there if they hold in the model. Throws
-/// Unsupported for parts that MJCF does not have: Model::missing, helical joints, closures other
-/// than revolute, spherical, weld and rod, inertias that no body can have, masses and moments below
-/// 1e-15.
-Mjcf MakeMjcf(const Model& model, const MjcfOptions& options = {});
+/// Makes the document at Model::q. Its closures hold there if they hold in the model. `time_step`:
+/// step [s], which limits their stiffness; `shapes`: shapes for viewers, which slow down every
+/// step. Throws Unsupported for parts that MJCF does not have: Model::missing, helical joints,
+/// closures other than revolute, spherical, weld and rod, inertias that no body can have, masses
+/// and moments below 1e-15.
+Mjcf MakeMjcf(const Model& model, double time_step = kTimeStep, bool shapes = false);
 
 }  // namespace loopbench::exchange

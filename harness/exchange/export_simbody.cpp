@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/exchange/export_names.h"
 
 namespace loopbench::exchange {
@@ -177,9 +178,7 @@ using fmt::format;
 
 template <class Range>
 std::string Numbers(const Range& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + NumberText(value);
-  return text;
+  return harness::Joined(values, ", ", NumberText);
 }
 
 std::string Point(const Vec& v) { return format("Vec3({})", Numbers(v)); }
@@ -209,7 +208,7 @@ class Writer {
     }
   }
 
-  SimbodyProgramText Write() {
+  ExportedFile Write() {
     std::string constructor = "Mechanism::Mechanism() {\n  body.push_back(matter.Ground());\n";
     for (const SimbodyMobilizer& one : parts_.mobilizers) constructor += Text(one);
     for (const SimbodyConstraint& one : parts_.constraints) constructor += Text(one);
@@ -218,7 +217,7 @@ class Writer {
     for (const SimbodyForce& one : parts_.forces) constructor += Text(one);
     constructor += "}\n\n";
     AddNotes();
-    made_.program =
+    made_.text =
         CommentLines("// ", "\"" + model_.name +
                                 "\", a mechanism of Loopbench at its assembled start, as a program "
                                 "for Simbody 3.7. SI units, angles in rad.") +
@@ -229,7 +228,7 @@ class Writer {
 
  private:
   template <class... Values>
-  void Say(fmt::format_string<Values...> text, Values&&... values) {
+  void AddNote(fmt::format_string<Values...> text, Values&&... values) {
     made_.notes.push_back({false, fmt::format(text, std::forward<Values>(values)...)});
   }
 
@@ -273,11 +272,9 @@ class Writer {
 
   std::string CouplerText(std::size_t index) const {
     const SimbodyCoupler& one = parts_.couplers[index];
-    std::string terms;
-    for (const auto& [body, factor] : one.terms) {
-      terms +=
-          format("{}{{{}, {}}}", terms.empty() ? "" : ", ", BodyText(body), NumberText(factor));
-    }
+    const std::string terms = harness::Joined(one.terms, ", ", [&](const auto& term) {
+      return format("{{{}, {}}}", BodyText(term.first), NumberText(term.second));
+    });
     const std::string what = index < model_.couplings.size()
                                  ? "coupling " + QuoteCpp(model_.couplings[index].name)
                                  : "a rotor and its joint";
@@ -346,17 +343,19 @@ class Writer {
   }
 
   void AddNotes() {
-    if (model_.planar) Say(kPlaneNote);
-    Say("Body frames have the user's axes and lie in centres of mass.");
+    if (model_.planar) AddNote(kPlaneNote);
+    AddNote("Body frames have the user's axes and lie in centres of mass.");
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
       if (one.sign > 0.0) continue;
-      Say("joint \"{}\" is a {} with coordinates of the opposite sign; what is printed has "
+      AddNote(
+          "joint \"{}\" is a {} with coordinates of the opposite sign; what is printed has "
           "the user's.",
           model_.tree[one.joint].name, one.type);
     }
     for (const SimbodyMobilizer& one : parts_.mobilizers) {
       if (!one.is_flywheel) continue;
-      Say("rotor_inertia of joint \"{}\" is a flywheel on Ground, whose angle is the "
+      AddNote(
+          "rotor_inertia of joint \"{}\" is a flywheel on Ground, whose angle is the "
           "coordinate of the joint.",
           model_.tree[one.joint].name);
     }
@@ -367,15 +366,15 @@ class Writer {
         released = format(", in {} directions; what it holds beyond these follows from the others",
                           joint.imposed.size());
       }
-      Say("joint \"{}\" ({}) closes a loop: it is made of constraints{}.", joint.name, joint.kind,
-          released);
+      AddNote("joint \"{}\" ({}) closes a loop: it is made of constraints{}.", joint.name,
+              joint.kind, released);
     }
   }
 
   const Model& model_;
   const SimbodyParts parts_;
   std::vector<std::size_t> number_;  ///< Simbody's number of each body of the model
-  SimbodyProgramText made_;
+  ExportedFile made_;
 };
 
 }  // namespace
@@ -409,6 +408,6 @@ SimbodyParts MakeSimbodyParts(const Model& model) {
   return parts;
 }
 
-SimbodyProgramText WriteSimbodyProgram(const Model& model) { return Writer(model).Write(); }
+ExportedFile WriteSimbodyProgram(const Model& model) { return Writer(model).Write(); }
 
 }  // namespace loopbench::exchange

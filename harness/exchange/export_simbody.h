@@ -1,13 +1,11 @@
-// A mechanism as a C++ program of Simbody.
+// A Model as Simbody's mobilizers, constraints and forces. The peer builds a System from this list,
+// and WriteSimbodyProgram() writes a program that builds the same System. C++17, as model.h.
 #pragma once
 
 #include "harness/exchange/model.h"
 
 namespace loopbench::exchange {
 
-// A Model as Simbody's mobilizers, constraints and forces. The peer builds a System from this list,
-// and export_simbody.h writes a program that builds the same System. C++17, as model.h.
-//
 // Body frames are at centres of mass. Names are those of Simbody's classes; arguments have the
 // order of their constructors.
 
@@ -76,18 +74,11 @@ struct SimbodyParts {
 /// axes, inertias that no body can have.
 SimbodyParts MakeSimbodyParts(const Model& model);
 
-// A Model as a standalone C++17 program for Simbody 3.7.
-
-struct SimbodyProgramText {
-  std::string program;  ///< one .cpp file
-  std::vector<Note> notes;
-};
-
-/// Without arguments the program prints the following as JSON at Model::q and Model::u:
-/// coordinates, speeds and accelerations of all joints, positions of all bodies and named points.
-/// With a time [s] and an accuracy it prints the same after integrating to that time. User names
-/// appear as string literals and comments, in ASCII or escaped. Throws Unsupported for unsupported
-/// parts (see above).
-SimbodyProgramText WriteSimbodyProgram(const Model& model);
+/// Returns a standalone C++17 program for Simbody 3.7, one .cpp file. Without arguments the program
+/// prints the following as JSON at Model::q and Model::u: coordinates, speeds and accelerations of
+/// all joints, positions of all bodies and named points. With a time [s] and an accuracy it prints
+/// the same after integrating to that time. User names appear as string literals and comments, in
+/// ASCII or escaped. Throws Unsupported for unsupported parts (see above).
+ExportedFile WriteSimbodyProgram(const Model& model);
 
 }  // namespace loopbench::exchange

@@ -11,40 +11,7 @@
 
 namespace loopbench::harness {
 
-const std::vector<std::string>& ImportFormats() {
-  static const std::vector<std::string> formats = {"mjcf", "urdf", "sdf"};
-  return formats;
-}
-
 namespace {
-
-/// Reads a text. `path`: its file, beside which others may be; nothing without one.
-Imported Import(std::string_view text, const std::string& file,
-                const std::optional<std::filesystem::path>& path, const ImportOptions& options) {
-  XmlDocument xml(text, file, path);
-  const XmlElement root = xml.root();
-  const std::string tag = root.tag(), format = tag == "mujoco"  ? "mjcf"
-                                               : tag == "robot" ? "urdf"
-                                               : tag == "sdf"   ? "sdf"
-                                                                : "";
-  if (format.empty()) root.Fail("this root element", "<mujoco> (MJCF), <robot> (URDF) or <sdf>");
-  if (!options.format.empty() && options.format != format) {
-    root.Fail(format, fmt::format("{}, as --input-format says", options.format));
-  }
-  if (options.floats && format != "urdf") {
-    root.Fail(format, "urdf with --floating: other formats say what is free");
-  }
-  ImportDraft draft(xml, options);
-  draft.description.name = std::filesystem::path(file).stem().string();
-  if (format == "mjcf") xml.Include();
-  if (format == "mjcf") ReadMjcf(root, &draft);
-  if (format == "urdf") ReadUrdf(root, options, &draft);
-  if (format == "sdf") ReadSdf(root, &draft);
-  if (draft.description.name.empty()) draft.description.name = "imported";
-  return draft.Finish(format);
-}
-
-// Steps common to all formats after the import.
 
 /// Reason why a body cannot move by itself, and the required values; "" if it can.
 using MassFault = std::pair<std::string, std::string>;
@@ -64,10 +31,9 @@ MassFault MassFaultOf(const BodyDescription& body) {
                   moments[0], moments[1], moments[2]);
   if (!(moments[0] > exchange::kMomentRoundOff * moments[2])) return {shown, "three that are > 0"};
   if (moments[2] > (1.0 + kPrinted) * (moments[0] + moments[1])) {
-    return {
-        shown,
-        "none larger than the sum of the other two, as no body's is (--balance-inertia replaces "
-        "them by their mean)"};
+    return {shown,
+            "none larger than the sum of the other two, as no body's is (--balance-inertia "
+            "replaces them by their mean)"};
   }
   return {};
 }
@@ -110,33 +76,29 @@ Cluster ClusterOf(const MechanismDescription& d, const BodyLoads& loads,
   return cluster;
 }
 
-// Sidecar: loops, forces and a start that the other format cannot express, with the keys of
-// mechanism files (docs/exchange.md).
-
-/// The present mechanism, and poses of its bodies in ground axes at zero coordinates, where loops
-/// given on one side close.
+/// Sidecar: loops, forces and a start that the other format cannot express. The present mechanism,
+/// and poses of its bodies in ground axes at zero coordinates, where loops given on one side close.
 struct Sidecar : Draft {
   std::vector<Frame> at_rest;
   bool has_gravity = false;
 };
 
 /// A joint given on one side: at rest its other frame coincides.
-struct Loop : JointDescription {};
-using LoopPart = PartOf<Loop>;
+using Loop = JointDescription;
 
-const Fields<LoopPart>& LoopFields() {
-  const auto read_type = [](const JsonNode& node, LoopPart& loop) {
+const PartFields<Loop>& LoopFields() {
+  const auto read_type = [](const JsonNode& node, Loop& loop) {
     loop.type = static_cast<JointType>(node.Choice(JointTypeNames(), "a joint type").value_or(0));
     if (!TraitsOf(loop.type).parameter.key.empty() || loop.type == JointType::kFree) {
       node.Fail("a type without a number of its own: others stand in \"joints\"");
     }
   };
-  const auto read_second = [](const JsonNode& node, LoopPart& loop) {
-    loop.to.body = ReadBodyName(node, *loop.draft).value_or(-1);
+  const auto read_second = [](const JsonNode& node, Loop& loop, const Draft& draft) {
+    loop.to.body = ReadBodyName(node, draft).value_or(-1);
     if (loop.to.body >= 0 && loop.to.body == loop.from.body) node.Fail("another body");
   };
-  const auto read_axis = [](const JsonNode& node, LoopPart& loop) {
-    loop.axis = ReadVector(node, *loop.draft);
+  const auto read_axis = [](const JsonNode& node, Loop& loop, const Draft& draft) {
+    loop.axis = ReadVector(node, draft);
     if (TraitsOf(loop.type).own_axis == '-') {
       node.Fail(fmt::format("no axis of a {} joint", ToString(loop.type)));
     } else if (loop.axis.isZero()) {
@@ -145,17 +107,17 @@ const Fields<LoopPart>& LoopFields() {
   };
   const auto body = [](Loop& loop) -> int& { return loop.from.body; };
   const auto at = [](Loop& loop) -> Eigen::Vector3d& { return loop.from.position; };
-  static const Fields<LoopPart> fields(
+  static const PartFields<Loop> fields(
       "loop", "A joint given on one side, which closes where all coordinates are 0.",
       {{"name", NewName<Loop>(&Loop::name, &Draft::joint_names), "One that no other joint has.",
         "a name"},
-       {"type", By<LoopPart>(ChoiceSchema(JointTypeNames().all()), read_type),
-        "What it leaves free.", "a joint type"},
+       {"type", By(ChoiceSchema(JointTypeNames().all()), +read_type), "What it leaves free.",
+        "a joint type"},
        {"from", BodyOf<Loop>(body, true), "A body's name or \"ground\".", "the name of a body"},
-       {"to", By<LoopPart>(TextSchema(), read_second), "Another.", "the name of a body"},
+       {"to", By(TextSchema(), +read_second), "Another.", "the name of a body"},
        {"at", PlaceOf<Loop>(body, at), "The joint in axes of `from` [m].",
         "a point of `from`, or coordinates in its axes"},
-       {"axis", By<LoopPart>(VectorSchema(), read_axis), "In axes of `from`."}});
+       {"axis", By(VectorSchema(), +read_axis), "In axes of `from`."}});
   return fields;
 }
 
@@ -163,7 +125,7 @@ void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
   for (const JsonNode& element : node.Elements("loops")) {
     Loop loop;
     loop.from.body = loop.to.body = -1;
-    loop = ReadPart(LoopFields(), element, sidecar, loop);
+    LoopFields().Read(element, &loop, sidecar);
     if (loop.from.body >= 0 && loop.to.body >= 0) {
       // the other side from the body poses
       const auto& rest = sidecar.at_rest;
@@ -178,20 +140,20 @@ void ReadLoops(const JsonNode& node, Sidecar& sidecar) {
   }
 }
 
-const Fields<Sidecar>& SidecarFields() {
+const Fields<Sidecar, const Draft>& SidecarFields() {
   const auto read_gravity = [](const JsonNode& node, Sidecar& sidecar) {
     sidecar.gravity = ReadVector(node, sidecar);
     sidecar.has_gravity = true;
   };
-  static const Fields<Sidecar> fields(
+  static const Fields<Sidecar, const Draft> fields(
       "sidecar", "What a description of another program cannot say.",
       {{"comment", Text(&Draft::comment), "Free text for readers."},
-       {"gravity", By<Sidecar>(VectorSchema(), read_gravity), "In place of the file's [m/s^2]."},
+       {"gravity", By(VectorSchema(), +read_gravity), "In place of the file's [m/s^2]."},
        {"loops", By(ArraySchema(LoopFields().Schema()), ReadLoops), "Joints given on one side."},
        {"joints", JointsValue(), "Joints given on both sides."},
        {"couplings", CouplingsValue(), "Linear relations of joint coordinates."},
        {"forces", ForcesValue(), "Besides gravity."},
-       {"initial", Section(InitialFields()), "In place of the file's start."},
+       {"initial", Object(&Draft::initial, InitialFields()), "In place of the file's start."},
        {"known_solution", Section(ObservationFields()),
         "Exact facts that observers compare with."}});
   return fields;
@@ -207,19 +169,38 @@ Sidecar ReadSidecar(const std::filesystem::path& path, const std::vector<Frame>&
   for (const BodyDescription& body : sidecar.bodies) sidecar.body_names.Add(body.name);
   for (const JointDescription& joint : sidecar.joints) sidecar.joint_names.Add(joint.name);
   ReadDocument(ReadTextFile(path), path.string(),
-               [&](const JsonNode& root) { return SidecarFields().Read(root, &sidecar); });
+               [&](const JsonNode& root) { return SidecarFields().Read(root, &sidecar, sidecar); });
   *description = static_cast<MechanismDescription&>(sidecar);
   return sidecar;
 }
 
 }  // namespace
 
-Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options) {
-  return Import(text, file, std::nullopt, options);
+Imported ImportText(std::string_view text, const std::string& file, const ImportOptions& options,
+                    const std::optional<std::filesystem::path>& path) {
+  const XmlElement root(xml::Parse(text, {file, path}));
+  const std::string format = root.tag() == "mujoco"  ? "mjcf"
+                             : root.tag() == "robot" ? "urdf"
+                             : root.tag() == "sdf"   ? "sdf"
+                                                     : "";
+  if (format.empty()) root.Fail("this root element", "<mujoco> (MJCF), <robot> (URDF) or <sdf>");
+  if (!options.format.empty() && options.format != format) {
+    root.Fail(format, fmt::format("{}, as --input-format says", options.format));
+  }
+  if (options.floats && format != "urdf") {
+    root.Fail(format, "urdf with --floating: other formats say what is free");
+  }
+  ImportDraft draft(root, options);
+  draft.description.name = std::filesystem::path(file).stem().string();
+  if (format == "mjcf") ReadMjcf(root, &draft);
+  if (format == "urdf") ReadUrdf(root, options, &draft);
+  if (format == "sdf") ReadSdf(root, &draft);
+  if (draft.description.name.empty()) draft.description.name = "imported";
+  return draft.Finish(format);
 }
 
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options) {
-  return Import(ReadTextFile(path), path.string(), path, options);
+  return ImportText(ReadTextFile(path), path.string(), options, path);
 }
 
 BodyLoads::BodyLoads(const MechanismDescription& d) : joints(d.bodies.size()) {
@@ -318,14 +299,12 @@ void ImportDraft::Attach(const std::vector<Attachment>& attachments) {
 /// A joint that follows one other joint has no effect on it. With a motion, or with several others,
 /// it moves them.
 bool ImportDraft::CouplesOthers(int joint) const {
-  std::size_t others = description.joints[joint].motions.size();
-  bool is_coupled = false;
+  std::size_t coupled = 0;
   for (const CouplingDescription& coupling : description.couplings) {
-    if (std::ranges::count(coupling.parts, joint, &CouplingDescription::Part::joint) == 0) continue;
-    is_coupled = true;
-    others += coupling.parts.size() - 1;
+    if (!Contains(coupling.parts, joint, &CouplingDescription::Part::joint)) continue;
+    coupled += coupling.parts.size() - 1;
   }
-  return is_coupled && others > 1;
+  return coupled > 0 && coupled + description.joints[joint].motions.size() > 1;
 }
 
 void ImportDraft::FixMasslessEnds() {
@@ -426,9 +405,9 @@ Imported ImportDraft::Finish(const std::string& format) {
   }
   if (options_.planar) GoToPlane();
   const std::string fault = Validate(description);
-  if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file_.name(), fault));
+  if (!fault.empty()) throw ConfigError(fmt::format("{}: {}", file(), fault));
   std::ranges::stable_sort(notes_, {}, [&](const ImportNote& note) {
-    return std::tuple(note.file != file_.name(), note.file, note.line);
+    return std::tuple(note.file != file(), note.file, note.line);
   });
   if (has_replicas) {
     std::set<std::tuple<std::string, int, std::string, std::string>> seen;

@@ -1,4 +1,4 @@
-// Import of mechanisms from MuJoCo (MJCF), URDF and SDF.
+// Import of mechanisms from MuJoCo (MJCF), URDF and SDF (docs/exchange.md).
 #pragma once
 
 #include <Eigen/Core>
@@ -12,8 +12,6 @@
 #include "mechanism/description/joint_frames.h"
 
 namespace loopbench::harness {
-
-// Result of an import.
 
 /// A part of the file that the mechanism does not have, or represents differently.
 struct ImportNote {
@@ -31,27 +29,26 @@ struct Imported {
   std::vector<ImportNote> notes;  ///< of the imported file first, by line
 };
 
-// Import of files for other programs: MuJoCo's MJCF, URDF and SDF (docs/exchange.md).
-
 struct ImportOptions {
-  std::string format;                      ///< of ImportFormats(); "": from the root element
-  std::filesystem::path sidecar;           ///< file with loops, forces and a start; "": none
-  bool planar = false;                     ///< import as a planar mechanism; rejects others
-  bool floats = false;                     ///< URDF: the root link is free, not fixed to the ground
-  bool balances_inertia = false;           ///< replace impossible moments by their mean
-  bool keeps_digits = false;               ///< keep rounded angles and directions as written
-  std::optional<Eigen::Vector3d> gravity;  ///< overrides the file's or format's [m/s^2]
+  std::string format = "";             ///< of ImportFormats(); "": from the root element
+  std::filesystem::path sidecar = {};  ///< file with loops, forces and a start; "": none
+  bool planar = false;                 ///< import as a planar mechanism; rejects others
+  bool floats = false;                 ///< URDF: the root link is free, not fixed to the ground
+  bool balances_inertia = false;       ///< replace impossible moments by their mean
+  bool keeps_digits = false;           ///< keep rounded angles and directions as written
+  std::optional<Eigen::Vector3d> gravity = {};  ///< overrides the file's or format's [m/s^2]
 };
 
-/// Returns mjcf, urdf, sdf.
-const std::vector<std::string>& ImportFormats();
+inline std::vector<std::string> ImportFormats() { return {"mjcf", "urdf", "sdf"}; }
 
 /// Reads a file. Throws ConfigError for invalid or inexpressible content, with file, line, element,
 /// found and expected value.
 Imported ImportMechanism(const std::filesystem::path& path, const ImportOptions& options = {});
 
-/// Reads a text, which includes no other files; `file` is the name used in messages.
+/// Reads a text; `file` is the name used in messages. Without the `path` of its file it includes no
+/// others.
 Imported ImportText(std::string_view text, const std::string& file,
-                    const ImportOptions& options = {});
+                    const ImportOptions& options = {},
+                    const std::optional<std::filesystem::path>& path = {});
 
 }  // namespace loopbench::harness

@@ -154,8 +154,8 @@ Eigen::Quaterniond TurnOfZ(const Eigen::Vector3d& to) {
   return {0.5 * root, -z.y() * inverse, z.x() * inverse, 0.0};
 }
 
-ImportDraft::ImportDraft(XmlDocument& file, const ImportOptions& options)
-    : at_rest(1), file_(file), options_(options), elements_{file.root()} {
+ImportDraft::ImportDraft(const XmlElement& root, const ImportOptions& options)
+    : at_rest(1), options_(options), elements_{root} {
   description.space = SpaceKind::kSpatial;
   description.bodies[kGround].name = "ground";
 }
@@ -253,14 +253,14 @@ void ImportDraft::AddMimic(const XmlElement& element, int follower,
 }
 
 void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
-  for (const auto& [element, attribute] : file_.Unread()) {
+  elements_[kGround].ForUnread([&](const XmlElement& element, const std::string& attribute) {
     const auto find = [&](const std::string& what) {
       return std::ranges::find_if(reasons, [&](const DroppedReason& row) { return row.Has(what); });
     };
     if (element.tag().starts_with("xacro:")) {
       element.Fail("an element of xacro", "plain XML, as `xacro FILE` writes it");
     }
-    if (attribute.starts_with("xmlns")) continue;
+    if (attribute.starts_with("xmlns")) return;
     auto known = find(element.tag() + (attribute.empty() ? "" : "@") + attribute);
     if (known == reasons.end() && !attribute.empty()) known = find("@" + attribute);
     if (known == reasons.end()) {
@@ -268,7 +268,7 @@ void ImportDraft::NoteUnread(std::span<const DroppedReason> reasons) {
     } else if (!known->reason.empty()) {
       Note(element, attribute, fmt::format("dropped: {}", known->reason), known->changes_motion);
     }
-  }
+  });
 }
 
 void ImportDraft::MakeBallsPins(const Vector3d& n) {
@@ -301,9 +301,8 @@ void ImportDraft::GoToPlane() {
   std::string why;
   const std::optional<InPlane> plane = ExpressInPlane(description, &why);
   if (!plane) {
-    throw ConfigError(
-        fmt::format("{}: --planar: found that {}, expected a mechanism that moves in one plane",
-                    file_.name(), why));
+    throw ConfigError(fmt::format(
+        "{}: --planar: found that {}, expected a mechanism that moves in one plane", file(), why));
   }
   const double least = kRounding * description.gravity.norm();
   if (std::abs(plane->gravity_dropped) > least) {

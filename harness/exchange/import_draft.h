@@ -11,6 +11,7 @@
 #include <numbers>
 #include <set>
 #include <span>
+#include <tuple>
 
 #include "harness/base/text.h"
 #include "harness/exchange/export_names.h"
@@ -20,12 +21,10 @@
 
 namespace loopbench::harness {
 
-// Pose of a frame in another one, and orientation notations of XML formats.
-//
-// Orientations are quaternions, so that a rotation about one axis stays exactly about that axis.
-
 inline constexpr double kDegree = std::numbers::pi / 180.0;  ///< [rad]
 
+/// Pose of a frame in another one. Its orientation is a quaternion, so that a rotation about one
+/// axis stays exactly about that axis.
 struct Placement {
   Placement() = default;
   explicit Placement(const Eigen::Vector3d& origin) : p(origin) {}
@@ -81,9 +80,7 @@ Eigen::Quaterniond FromEuler(const std::string& sequence, const Eigen::Vector3d&
 /// Returns the rotation onto perpendicular axes of unit length.
 inline Eigen::Quaterniond FromAxes(const Eigen::Vector3d& x, const Eigen::Vector3d& y,
                                    const Eigen::Vector3d& z) {
-  Eigen::Matrix3d R;
-  R << x, y, z;
-  return Eigen::Quaterniond(R);
+  return Eigen::Quaterniond((Eigen::Matrix3d() << x, y, z).finished());
 }
 
 /// Returns the shortest rotation from z to `to`; for -z half a turn about x, as in MuJoCo.
@@ -129,9 +126,6 @@ inline int Beyond(const JointDescription& joint, int body) {
 /// Returns, for each body, the first body that is fixed to it; Ground for those fixed to Ground.
 std::vector<int> FixedTogether(const MechanismDescription& description);
 
-// A mechanism during its import in any format: the format readers fill it, and Finish() completes
-// it.
-
 /// Reason why unread attributes ("@armature joint@ref") or tags ("visual") are dropped. Without a
 /// reason no note is made: they have no influence on the motion.
 struct DroppedReason {
@@ -145,8 +139,6 @@ struct DroppedReason {
 };
 
 inline constexpr const char* kDryFriction = "dry friction is no force of mechanism files";
-/// Reasons why springs, dampers, efforts and rotors of a joint with several coordinates are
-/// dropped.
 inline constexpr const char* kNoRotors = "only joints with one coordinate have rotors";
 inline constexpr const char* kNeedsOneCoordinate = "only joints with one coordinate have forces";
 inline constexpr const char* kNotCoupled =
@@ -169,7 +161,7 @@ const Entry& Named(const std::map<std::string, Entry>& entries, const std::strin
   value.Fail(std::string(expected) + cure);
 }
 
-// Joints in series without mass between them (import_chain.cpp, import_links.cpp).
+// Joints in series without mass between them (import_chains.cpp).
 
 /// A joint of a series, in the drawn axes of the last body.
 struct SerialJoint {
@@ -177,6 +169,8 @@ struct SerialJoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< [m]
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();     ///< of unit length
   double reference = 0.0;                              ///< its coordinate in the drawn position
+  bool leads_out = true;                               ///< from the inner body to the outer one
+  Eigen::Quaterniond q_CJ = Eigen::Quaterniond::Identity();  ///< its frame in the drawn axes
 
   int num_q() const { return NumValues(type, SpaceKind::kSpatial, false); }
   int num_u() const { return NumValues(type, SpaceKind::kSpatial, true); }
@@ -201,9 +195,11 @@ void SetComposed(const std::vector<SerialJoint>& series, const ComposedJoint& co
                  std::vector<double>* speeds);
 struct MasslessChain;
 
+/// A mechanism during its import in any format: the format readers fill it, and Finish() completes
+/// it.
 class ImportDraft {
  public:
-  ImportDraft(XmlDocument& file, const ImportOptions& options);
+  ImportDraft(const XmlElement& root, const ImportOptions& options);
 
   MechanismDescription description;
   bool has_replicas = false;       ///< elements are read repeatedly: equal notes count once
@@ -228,9 +224,8 @@ class ImportDraft {
   }
   /// Sets mass, centre of mass and inertia about it.
   void SetMass(int body, double mass, const Eigen::Vector3d& com, const Eigen::Matrix3d& inertia) {
-    description.bodies[body].mass = mass;
-    description.bodies[body].com = com;
-    description.bodies[body].inertia = inertia;
+    BodyDescription& made = description.bodies[body];
+    std::tie(made.mass, made.com, made.inertia) = std::tie(mass, com, inertia);
   }
   /// Returns the element of a body; the root element for Ground.
   const XmlElement& element(int body) const { return elements_[body]; }
@@ -321,7 +316,8 @@ class ImportDraft {
   void Note(const XmlElement& element, const std::string& attribute, std::string reason,
             bool changes_motion = false) {
     const std::string shown = element.Shown() + (attribute.empty() ? "" : " ") + attribute;
-    notes_.push_back({element.file(), element.line(), shown, std::move(reason), changes_motion});
+    notes_.push_back(
+        {element.file().name, element.line(), shown, std::move(reason), changes_motion});
   }
   /// Adds a note of an attribute that is not there, a change of the motion.
   void Drop(const XmlElement& element, const std::string& attribute, std::string_view reason) {
@@ -366,7 +362,9 @@ class ImportDraft {
   void MakeBallsPins(const Eigen::Vector3d& n);
   void GoToPlane();
 
-  XmlDocument& file_;
+  /// Returns the name of the main file.
+  const std::string& file() const { return element(kGround).file().name; }
+
   const ImportOptions& options_;
   std::vector<XmlElement> elements_;  ///< of bodies
   std::map<std::string, int> bodies_;

@@ -45,7 +45,10 @@ void RefuseMacros(const XmlElement& root) {
                                                   "equality", "tendon", "actuator", "keyframe"})) {
     std::vector<std::string_view> wrong = macros;
     if (section.tag() == "worldbody") std::erase(wrong, "replicate");
-    if (const auto macro = section.Within(wrong)) found.push_back(*macro);
+    const auto all = section.node()->Descendants();
+    const auto macro = std::ranges::find_if(
+        all, [&](const XmlNodePointer& one) { return Contains(wrong, one->tag); });
+    if (macro != all.end()) found.emplace_back(*macro);
   }
   if (found.empty()) return;
   found[0].Fail("an element that stands for other parts of a model",
@@ -56,12 +59,6 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
   constexpr XmlChoice<MjcfSettings::Inertia> kInertias[] = {{"false", MjcfSettings::kFromInertial},
                                                             {"true", MjcfSettings::kFromGeoms},
                                                             {"auto", MjcfSettings::kAuto}};
-  const auto flag = [&](const char* name, bool* value) {
-    *value = BoolOr(element.Attribute(name), *value);
-  };
-  const auto number = [&](const char* name, double* value, const Range& range) {
-    *value = element.Number(name, *value, range);
-  };
   if (const auto angle = element.Attribute("angle")) {
     settings->degrees = angle->Choice<bool>({{"radian", false}, {"degree", true}});
   }
@@ -85,13 +82,17 @@ void ReadCompiler(const XmlElement& element, MjcfSettings* settings) {
   for (const char* folder : {"assetdir", "meshdir"}) {
     if (const auto given = element.Attribute(folder)) settings->mesh_folder = given->text();
   }
-  flag("balanceinertia", &settings->balances_inertia);
-  flag("autolimits", &settings->limits_by_range);
-  flag("exactmeshinertia", &settings->has_exact_meshes);
-  flag("alignfree", &settings->aligns_free);
-  number("boundmass", &settings->least_mass, kNotNegative);
-  number("boundinertia", &settings->least_inertia, kNotNegative);
-  number("settotalmass", &settings->total_mass, {});
+  for (const auto& [name, flag] : {std::pair{"balanceinertia", &settings->balances_inertia},
+                                   {"autolimits", &settings->limits_by_range},
+                                   {"exactmeshinertia", &settings->has_exact_meshes},
+                                   {"alignfree", &settings->aligns_free}}) {
+    *flag = BoolOr(element.Attribute(name), *flag);
+  }
+  for (const auto& [name, least] : {std::pair{"boundmass", &settings->least_mass},
+                                    {"boundinertia", &settings->least_inertia}}) {
+    *least = element.Number(name, *least, kNotNegative);
+  }
+  settings->total_mass = element.Number("settotalmass", settings->total_mass);
 }
 
 void ReadOption(const XmlElement& element, MjcfModel* model) {
@@ -183,6 +184,7 @@ std::string DescribedBy(const std::string& tag) {
 }  // namespace
 
 void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
+  IncludeMjcf(root);
   MjcfModel model(draft);
   if (const auto name = root.Attribute("model")) draft->description.name = name->Name();
   draft->description.gravity = {0.0, 0.0, -9.81};
@@ -212,7 +214,7 @@ void ReadMjcf(const XmlElement& root, ImportDraft* draft) {
 void MjcfDefaults::Read(const XmlElement& element, const std::string& parent) {
   const auto given = element.Attribute("class");
   if (!given && !parent.empty()) element.Fail("no \"class\"", "a name: it is a nested class");
-  const bool is_main = parent.empty() && !element.is_attached_default();
+  const bool is_main = parent.empty() && !element.node()->is_attached_default;
   const std::string name = is_main ? kMain : given->Name();
   if (is_main) {
     // a second top-level <default> adds to the first

@@ -181,6 +181,12 @@ class MjcfModel {
   std::size_t num_copies_ = 0;
 };
 
+/// Resolves the elements that stand for other files, at most kMaxConfigBytes in all, or for copies.
+///   <include file="...">: the children of the root element of that file, which is read once.
+///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
+///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.
+///   Without `model`: a copy of a body of the file itself, then of tendons and so on.
+void IncludeMjcf(const XmlElement& root);
 /// Reads <worldbody>.
 void ReadMjcfWorld(const XmlElement& world, MjcfModel* model);
 /// Applies the total mass and the bounds of <compiler> to all bodies.

@@ -1,10 +1,7 @@
 // <include> and <attach> of MJCF: elements of other files, copies of elements.
-#include <fmt/format.h>
-
 #include <set>
 
-#include "harness/base/text.h"
-#include "harness/exchange/xml_document.h"
+#include "harness/exchange/import_mjcf.h"
 
 namespace loopbench::harness {
 
@@ -12,7 +9,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-using xml::Element;
+using Nodes = std::vector<XmlNodePointer>;
 
 /// Attributes that name another element, and its kind.
 constexpr std::pair<const char*, const char*> kReferences[] = {
@@ -35,59 +32,133 @@ constexpr std::pair<const char*, const char*> kSettings[] = {
 constexpr auto kReferring = {"tendon", "equality", "actuator"};
 
 /// Returns the value of an attribute without surrounding blanks, or "".
-std::string ValueOf(const Element* element, const char* key) {
-  const char* given = element->Attribute(key);
-  return given != nullptr ? std::string(xml::Trimmed(given)) : "";
+std::string ValueOf(XmlNode& node, std::string_view key) {
+  const XmlNode::Attribute* given = node.Find(key);
+  return given != nullptr ? std::string(xml::Trimmed(given->value)) : "";
 }
 
 /// Returns kind and name of an element, which identify it; "" without a name.
-std::string KindAndName(const Element* element, const std::string& prefix = "") {
-  const std::string name = ValueOf(element, "name"), tag = element->Name();
-  return name.empty() ? "" : (tag == "freejoint" ? "joint" : tag) + " " + prefix + name;
+std::string KindAndName(XmlNode& node, const std::string& prefix = "") {
+  const std::string name = ValueOf(node, "name");
+  return name.empty() ? "" : (node.tag == "freejoint" ? "joint" : node.tag) + " " + prefix + name;
+}
+
+Nodes Named(const XmlNode& root, std::string_view tag) {
+  Nodes named = root.children;
+  std::erase_if(named, [&](const XmlNodePointer& child) { return child->tag != tag; });
+  return named;
+}
+
+/// Calls `use` for the elements of these sections, with the tag of the section.
+template <class Use>
+void ForElements(const XmlNode& root, std::initializer_list<const char*> tags, const Use& use) {
+  for (const char* tag : tags) {
+    for (const XmlNodePointer& section : Named(root, tag)) {
+      for (const XmlNodePointer& one : section->children) use(*one, tag);
+    }
+  }
+}
+
+/// Returns an attribute of <compiler>, of the last one that has it.
+std::string Setting(const XmlNode& root, const char* name, std::string value) {
+  for (const XmlNodePointer& compiler : Named(root, "compiler")) {
+    if (compiler->Find(name) != nullptr) value = ValueOf(*compiler, name);
+  }
+  return value;
+}
+
+void Prefix(XmlNode& node, std::string_view key, const std::string& prefix) {
+  const std::string name = ValueOf(node, key);
+  const bool is_world = key.starts_with("body") && name == "world";
+  if (!name.empty() && !is_world) node.Find(key)->value = prefix + name;
+}
+void PrefixReferences(XmlNode& node, const std::string& prefix) {
+  for (const auto& [key, kind] : kReferences) Prefix(node, key, prefix);
+}
+
+/// Returns the number of references of an element and its contents into `inside`, or -1 if some are
+/// to other elements.
+int NumReferences(XmlNode& node, const std::set<std::string>& inside) {
+  int count = 0;
+  for (const auto& [key, kind] : kReferences) {
+    const std::string name = ValueOf(node, key);
+    if (name.empty()) continue;
+    if (!inside.contains(std::string(kind) + " " + name)) return -1;
+    ++count;
+  }
+  for (const XmlNodePointer& child : node.children) {
+    const int more = NumReferences(*child, inside);
+    if (more < 0) return -1;
+    count += more;
+  }
+  return count;
+}
+
+/// Returns a frame with this class and these contents, in place of an element.
+XmlNodePointer MakeFrame(const XmlNode& place, const std::string& childclass, Nodes contents) {
+  return std::make_shared<XmlNode>(XmlNode{.file = place.file,
+                                           .tag = "frame",
+                                           .attributes = {{"childclass", childclass}},
+                                           .children = std::move(contents)});
+}
+
+/// An element, and the index of the element around it.
+struct Placed {
+  XmlNodePointer node;
+  int parent;
+};
+
+/// Adds an element and its descendants in file order.
+void AddPlaced(const XmlNodePointer& node, int parent, std::vector<Placed>* found) {
+  const int index = static_cast<int>(found->size());
+  found->push_back({node, parent});
+  for (const XmlNodePointer& child : node->children) AddPlaced(child, index, found);
 }
 
 /// Resolves the <include> and <attach> elements of MJCF.
 class Includer {
  public:
-  explicit Includer(XmlDocument* document)
-      : document_(document), open_{xml::CanonicalOf(*document->path)} {
+  explicit Includer(const XmlFile& main) : main_(main), open_{xml::CanonicalOf(*main.main)} {
     known_.insert(open_[0]);
   }
 
   /// Resolves a model, whose file is in `folder`.
-  void Resolve(Element* root, const fs::path& folder) {
+  void Resolve(XmlNode& root, const fs::path& folder) {
     Include(root, folder);
     if (Setting(root, "strippath", "false") == "true") {
-      ForElements(root, {"asset"}, [](Element* one, const char*) {
+      ForElements(root, {"asset"}, [](XmlNode& one, const char*) {
         const std::string file = ValueOf(one, "file");
-        if (file.empty() || std::string_view(one->Name()) != "mesh") return;
-        one->SetAttribute("file", file.substr(file.find_last_of("/\\") + 1).c_str());
+        if (file.empty() || one.tag != "mesh") return;
+        one.Set("file", file.substr(file.find_last_of("/\\") + 1));
       });
     }
-    for (Element* place : InWorlds(root, "attach")) Attach(place, root, folder);
+    for (const XmlNodePointer& world : Named(root, "worldbody")) AttachIn(*world, root, folder);
   }
 
  private:
-  void Include(Element* element, const fs::path& folder) {
-    for (Element* child : xml::ChildrenIn(element)) {
-      if (std::string_view(child->Name()) != "include") {
-        Include(child, folder);
+  void Include(XmlNode& node, const fs::path& folder) {
+    Nodes children;
+    for (const XmlNodePointer& child : node.children) {
+      if (child->tag != "include") {
+        Include(*child, folder);
+        children.push_back(child);
         continue;
       }
-      const auto name =
-          XmlElement(document_, child).Required("file", "a file below the folder of the main file");
+      const XmlValue name =
+          XmlElement(child).Required("file", "a file below the folder of the main file");
       fs::path shown;
-      Element* root = Open(name, folder, &shown);
+      const XmlNodePointer root = Open(name, folder, &shown);
       if (!known_.insert(open_.back()).second) name.Fail("each file once");
-      document_->included.emplace(child, root);
-      Include(root, shown.parent_path());
+      Include(*root, shown.parent_path());
+      std::ranges::copy(root->children, std::back_inserter(children));
       open_.pop_back();
     }
+    node.children = std::move(children);
   }
 
   /// Reads a file, named from the folder of the main file or from `folder`, and returns its root
   /// element. It is the last of the open files.
-  Element* Open(const XmlValue& name, const fs::path& folder, fs::path* shown) {
+  XmlNodePointer Open(const XmlValue& name, const fs::path& folder, fs::path* shown) {
     constexpr std::size_t kMaxDepth = 16;
     *shown = name.File({}, folder);
     const fs::path path = xml::CanonicalOf(*shown);
@@ -103,74 +174,57 @@ class Includer {
       name.Fail(fmt::format("files of at most {} MiB in all", kMaxConfigBytes >> 20));
     }
     open_.push_back(path);
-    return document_->Parse(ReadTextFile(path), shown->string());
+    return xml::Parse(ReadTextFile(path), {shown->string(), main_.main});
   }
 
-  std::vector<Element*> Named(Element* root, std::string_view tag) const {
-    std::vector<Element*> named = document_->ChildrenOf(root);
-    std::erase_if(named, [&](Element* child) { return child->Name() != tag; });
-    return named;
-  }
-  /// Calls `use` for the elements of these sections, with the tag of the section.
-  template <class Use>
-  void ForElements(Element* root, std::initializer_list<const char*> tags, const Use& use) const {
-    for (const char* tag : tags) {
-      for (Element* section : Named(root, tag)) {
-        for (Element* one : document_->ChildrenOf(section)) use(one, tag);
+  void AttachIn(XmlNode& node, XmlNode& root, const fs::path& folder) {
+    for (XmlNodePointer& child : node.children) {
+      if (child->tag == "attach") {
+        child = Attach(child, root, folder);
+      } else {
+        AttachIn(*child, root, folder);
       }
     }
-  }
-  /// Returns the elements in <worldbody>, as XmlDocument::Within().
-  std::vector<Element*> InWorlds(Element* root, std::string_view tag = "") const {
-    std::vector<Element*> all;
-    for (Element* world : Named(root, "worldbody")) {
-      std::ranges::copy(document_->Within(world, tag), std::back_inserter(all));
-    }
-    return all;
-  }
-  /// Returns an attribute of <compiler>, of the last one that has it.
-  std::string Setting(Element* root, const char* name, const char* otherwise) const {
-    std::string value = otherwise;
-    for (Element* compiler : Named(root, "compiler")) {
-      if (const char* given = compiler->Attribute(name)) value = xml::Trimmed(given);
-    }
-    return value;
   }
 
   /// Returns the name of a <model> in <asset>: its own, or the one in its file.
   std::string NameOf(const XmlElement& model, const XmlValue& file, const fs::path& folder) {
     if (const auto name = model.Attribute("name")) return name->Name();
     fs::path shown;
-    const char* name = Open(file, folder, &shown)->Attribute("model");
+    const XmlNodePointer root = Open(file, folder, &shown);
     open_.pop_back();
-    return name != nullptr ? name : "";
+    const XmlNode::Attribute* name = root->Find("model");
+    return name != nullptr ? name->value : "";
   }
 
-  void Attach(Element* place, Element* root, const fs::path& folder) {
-    const XmlElement attach(document_, place);
-    for (const auto* given = place->FirstAttribute(); given != nullptr; given = given->Next()) {
-      const std::string_view key = given->Name();
-      if (key == "model" || key == "body" || key == "frame" || key == "prefix") continue;
+  /// Returns the contents in place of an <attach>.
+  XmlNodePointer Attach(const XmlNodePointer& place, XmlNode& root, const fs::path& folder) {
+    const XmlElement attach(place);
+    for (const auto& [key, value, is_read] : place->attributes) {
+      if (Contains(std::array{"model", "body", "frame", "prefix"}, key)) continue;
       attach.Fail(fmt::format("\"{}\"", key),
                   "\"model\", \"body\" or \"frame\", \"prefix\"; a <frame> around it moves it");
     }
-    if (!place->NoChildren()) attach.Fail("contents", "none; a <frame> around it moves it");
+    if (place->has_contents) attach.Fail("contents", "none; a <frame> around it moves it");
     if (attach.Attribute("body") && attach.Attribute("frame")) {
       attach.Fail("\"body\" and \"frame\"", "one of them");
     }
     const auto given_model = attach.Attribute("model");
-    if (!given_model) return AttachCopy(attach, place, root);
+    if (!given_model) return AttachCopy(attach, root);
     const XmlValue& model = *given_model;
     std::optional<XmlValue> file;
-    for (const XmlElement& given : XmlElement(document_, root).InSections("asset", {"model"})) {
-      const XmlValue path = given.Required("file", "a MJCF file");
-      if (NameOf(given, path, folder) == model.text()) file = path;
+    for (const XmlNodePointer& asset : Named(root, "asset")) {
+      for (const XmlElement& given : XmlElement(asset).Children({"model"})) {
+        const XmlValue path = given.Required("file", "a MJCF file");
+        if (NameOf(given, path, folder) == model.text()) file = path;
+      }
     }
     if (!file) model.Fail("the name of a <model> in <asset>");
     std::set<fs::path> known;
     std::swap(known, known_);
     fs::path shown;
-    Element* other = Open(*file, folder, &shown);
+    const XmlNodePointer pointer = Open(*file, folder, &shown);
+    XmlNode& other = *pointer;
     Resolve(other, shown.parent_path());
     open_.pop_back();
     std::swap(known, known_);
@@ -178,20 +232,20 @@ class Includer {
       const std::string wanted = Setting(root, name, otherwise);
       if (Setting(other, name, otherwise) == wanted) continue;
       model.Fail(fmt::format("a model with {}=\"{}\" in its <compiler>, as in {}", name, wanted,
-                             attach.file()));
+                             attach.file().name));
     }
     auto part = attach.Attribute("body");
     if (part && part->text() == "world") part.reset();
     if (!part) part = attach.Attribute("frame");
-    std::vector<Element*> contents;
-    for (Element* world : Named(other, "worldbody")) {
-      std::ranges::copy(document_->ChildrenOf(world), std::back_inserter(contents));
+    Nodes contents, all;
+    for (const XmlNodePointer& world : Named(other, "worldbody")) {
+      std::ranges::copy(world->children, std::back_inserter(contents));
+      std::ranges::copy(world->Descendants(), std::back_inserter(all));
     }
     if (part) {
-      const std::vector<Element*> all = InWorlds(other);
-      const auto named = std::ranges::find_if(all, [&](const Element* one) {
-        const char* name = one->Attribute("name");
-        return one->Name() == part->attribute() && name != nullptr && part->text() == name;
+      const auto named = std::ranges::find_if(all, [&](const XmlNodePointer& one) {
+        const XmlNode::Attribute* name = one->Find("name");
+        return one->tag == part->attribute() && name != nullptr && part->text() == name->value;
       });
       if (named == all.end()) {
         part->Fail(fmt::format("the name of a {} of {}", part->attribute(), shown.string()));
@@ -200,29 +254,18 @@ class Includer {
     }
     const auto prefix = attach.Attribute("prefix");
     const std::string main = Rename(other, prefix ? prefix->text() : "", shown.parent_path());
-    Element* frame = Insert(place, main, contents);
-    if (part) DropOutside(other, frame);
+    const XmlNodePointer frame = MakeFrame(*place, main, contents);
+    if (part) DropOutside(other, *frame);
     for (const char* tag : {"default", "asset", "contact", "tendon", "equality", "actuator",
                             "deformable", "extension"}) {
-      std::ranges::copy(Named(other, tag), std::back_inserter(document_->added[root]));
+      std::ranges::copy(Named(other, tag), std::back_inserter(root.children));
     }
-  }
-
-  /// Inserts elements in place of another one, in a frame with this class. Returns the frame.
-  Element* Insert(Element* place, const std::string& childclass,
-                  const std::vector<Element*>& contents) {
-    Element* frame = place->GetDocument()->NewElement("frame");
-    frame->SetAttribute("childclass", childclass.c_str());
-    Element* attached = place->GetDocument()->NewElement("attached");
-    document_->added[frame] = contents;
-    document_->added[attached] = {frame};
-    document_->included.emplace(place, attached);
     return frame;
   }
 
-  /// Inserts a copy of a body or frame of the model itself. As in MuJoCo, the original is complete
-  /// before `place`, and its default classes apply to the copy too.
-  void AttachCopy(const XmlElement& attach, Element* place, Element* root) {
+  /// Returns a copy of a body or frame of the model itself. As in MuJoCo, the original is complete
+  /// before the <attach>, and its default classes apply to the copy too.
+  XmlNodePointer AttachCopy(const XmlElement& attach, XmlNode& root) {
     auto part = attach.Attribute("body");
     if (!part) part = attach.Attribute("frame");
     if (!part) {
@@ -232,187 +275,151 @@ class Includer {
     const std::string kind = part->attribute(), name = part->Name();
     const XmlValue prefix = attach.Required("prefix", "the beginning of the names of the copy");
     std::vector<Placed> all;
-    for (Element* world : Named(root, "worldbody")) AddPlaced(world, -1, &all);
+    for (const XmlNodePointer& world : Named(root, "worldbody")) AddPlaced(world, -1, &all);
     visited_ += all.size();
-    const auto end = std::ranges::find(all, place, &Placed::element);
+    const auto end = std::ranges::find(all, attach.node(), &Placed::node);
     const auto original = std::find_if(all.begin(), end, [&](const Placed& one) {
-      return one.element->Name() == kind && ValueOf(one.element, "name") == name;
+      return one.node->tag == kind && ValueOf(*one.node, "name") == name;
     });
     if (original == end) part->Fail(fmt::format("the name of a {} before this <attach>", kind));
-    std::set<const Element*> around;  // the place
-    for (int i = end->parent; i >= 0; i = all[i].parent) around.insert(all[i].element);
-    if (around.contains(original->element)) {
+    std::set<XmlNodePointer> around;  // the place
+    for (int i = end->parent; i >= 0; i = all[i].parent) around.insert(all[i].node);
+    if (around.contains(original->node)) {
       part->Fail(fmt::format("no cycle: this {} contains the <attach>", kind));
     }
     std::string childclass;
     for (int i = original->parent; i >= 0; i = all[i].parent) {
-      const Element* outer = all[i].element;
-      if (childclass.empty()) childclass = ValueOf(outer, "childclass");
-      if (std::string_view(outer->Name()) == "replicate" && !around.contains(outer)) {
+      const XmlNodePointer& outer = all[i].node;
+      if (childclass.empty()) childclass = ValueOf(*outer, "childclass");
+      if (outer->tag == "replicate" && !around.contains(outer)) {
         part->Fail(fmt::format("a {} that is not in a <replicate>", kind));
       }
     }
-    std::vector<Element*> parts = document_->Within(original->element);
-    parts.push_back(original->element);
+    std::vector<Placed> parts;
+    AddPlaced(original->node, -1, &parts);
     std::set<std::string> inside, made;
-    for (const Element* one : parts) {
-      inside.insert(KindAndName(one));
-      made.insert(KindAndName(one, prefix.text()));
+    for (const auto& [one, parent] : parts) {
+      inside.insert(KindAndName(*one));
+      made.insert(KindAndName(*one, prefix.text()));
     }
-    for (const Placed& one : all) {
-      if (!ValueOf(one.element, "name").starts_with(prefix.text())) continue;
-      const std::string taken = KindAndName(one.element);
+    for (const auto& [one, parent] : all) {
+      if (!ValueOf(*one, "name").starts_with(prefix.text())) continue;
+      const std::string taken = KindAndName(*one);
       if (!taken.empty() && made.contains(taken)) {
         prefix.Fail(fmt::format("one that makes new names: there is a {}", taken));
       }
     }
     if (made.contains("body world")) prefix.Fail("one that makes no body \"world\"");
-    Insert(place, childclass.empty() ? "main" : childclass,
-           {Copy(original->element, prefix.text(), root->GetDocument(), attach)});
+    const XmlNodePointer frame = MakeFrame(*attach.node(), childclass.empty() ? "main" : childclass,
+                                           {Copy(*original->node, prefix.text(), attach)});
     CopyReferring(root, &inside, prefix.text(), attach);
-  }
-
-  struct Placed {
-    Element* element;
-    int parent;  ///< index of the element around it
-  };
-  /// Adds an element and its descendants in file order.
-  void AddPlaced(Element* element, int parent, std::vector<Placed>* found) const {
-    const int index = static_cast<int>(found->size());
-    found->push_back({element, parent});
-    for (Element* child : document_->ChildrenOf(element)) AddPlaced(child, index, found);
+    return frame;
   }
 
   /// Copies the tendons, constraints and actuators that refer to `inside` only, and adds their
   /// names there. As in MuJoCo, the world is outside.
-  void CopyReferring(Element* root, std::set<std::string>* inside, const std::string& prefix,
+  void CopyReferring(XmlNode& root, std::set<std::string>* inside, const std::string& prefix,
                      const XmlElement& attach) {
-    std::vector<Element*> sections;
-    ForElements(root, kReferring, [&](Element* one, const char* tag) {
+    Nodes sections;
+    ForElements(root, kReferring, [&](XmlNode& one, const char* tag) {
       ++visited_;
       if (NumReferences(one, *inside) <= 0) return;
       if (const std::string name = ValueOf(one, "name"); !name.empty()) {
         inside->insert(std::string(tag) + " " + name);
       }
-      sections.push_back(root->GetDocument()->NewElement(tag));
-      sections.back()->InsertEndChild(Copy(one, prefix, root->GetDocument(), attach));
+      sections.push_back(std::make_shared<XmlNode>(
+          XmlNode{.file = root.file, .tag = tag, .children = {Copy(one, prefix, attach)}}));
     });
-    std::ranges::copy(sections, std::back_inserter(document_->added[root]));
+    std::ranges::copy(sections, std::back_inserter(root.children));
     attach.RequireFew(visited_, 10000000, "elements to search for copies");
   }
 
   /// Returns a copy of an element and its contents, with prefixed names.
-  Element* Copy(Element* element, const std::string& prefix, tinyxml2::XMLDocument* document,
-                const XmlElement& attach, int depth = 1) {
+  XmlNodePointer Copy(const XmlNode& node, const std::string& prefix, const XmlElement& attach,
+                      int depth = 1) {
     attach.RequireFew(++copied_, 100000, "elements of copies");
-    if (depth > TINYXML2_MAX_ELEMENT_DEPTH) {
-      attach.Fail(fmt::format("a copy with more than {} elements within each other",
-                              TINYXML2_MAX_ELEMENT_DEPTH),
+    if (depth > kMaxXmlDepth) {
+      attach.Fail(fmt::format("a copy with more than {} elements within each other", kMaxXmlDepth),
                   "fewer");
     }
-    Element* copy = element->ShallowClone(document)->ToElement();
-    copy->SetUserData(xml::OriginalOf(element));
-    Prefix(copy, "name", prefix);
-    for (const auto& [key, kind] : kReferences) Prefix(copy, key, prefix);
-    for (Element* child : document_->ChildrenOf(element)) {
-      copy->InsertEndChild(Copy(child, prefix, document, attach, depth + 1));
-    }
+    const auto copy = std::make_shared<XmlNode>(node);
+    Prefix(*copy, "name", prefix);
+    PrefixReferences(*copy, prefix);
+    for (XmlNodePointer& child : copy->children) child = Copy(*child, prefix, attach, depth + 1);
     return copy;
-  }
-
-  void Prefix(Element* element, const char* key, const std::string& prefix) const {
-    const std::string name = ValueOf(element, key);
-    const bool is_world = std::string_view(key).starts_with("body") && name == "world";
-    if (name.empty() || is_world) return;
-    element->SetAttribute(key, (prefix + name).c_str());
-  }
-
-  /// Returns the number of references of an element and its contents into `inside`, or -1 if some
-  /// are to other elements.
-  int NumReferences(Element* element, const std::set<std::string>& inside) const {
-    std::vector<Element*> own = document_->Within(element);
-    own.push_back(element);
-    int count = 0;
-    for (const Element* one : own) {
-      for (const auto& [key, kind] : kReferences) {
-        const std::string name = ValueOf(one, key);
-        if (name.empty()) continue;
-        if (!inside.contains(std::string(kind) + " " + name)) return -1;
-        ++count;
-      }
-    }
-    return count;
   }
 
   /// Adds a prefix to all names of a model, and paths to its meshes. Returns the name of its
   /// default class, which no class of other models is.
-  std::string Rename(Element* root, const std::string& prefix, const fs::path& folder) {
+  std::string Rename(XmlNode& root, const std::string& prefix, const fs::path& folder) {
     constexpr const char* kNames[] = {"name",     "mesh",    "hfield", "actuator",
                                       "material", "texture", "target"};
-    const std::string main =
-        fmt::format("{}main ({})", prefix, document_->attached_defaults.size());
+    const std::string main = fmt::format("{}main ({})", prefix, num_defaults_);
     std::set<std::string> names_of_main = {"main"};
-    std::vector<Element*> defaults = Named(root, "default");
-    std::erase_if(defaults,
-                  [&](Element* one) { return document_->attached_defaults.contains(one); });
+    Nodes defaults = Named(root, "default");
+    std::erase_if(defaults, [](const XmlNodePointer& one) { return one->is_attached_default; });
     if (defaults.empty()) {
-      defaults.push_back(root->GetDocument()->NewElement("default"));
-      document_->added[root].push_back(defaults[0]);
+      defaults.push_back(std::make_shared<XmlNode>(XmlNode{.file = root.file, .tag = "default"}));
+      root.children.push_back(defaults[0]);
     }
-    for (Element* one : defaults) {
-      if (const char* name = one->Attribute("class")) names_of_main.insert(name);
-      one->SetAttribute("class", "main");
+    for (const XmlNodePointer& one : defaults) {
+      if (const XmlNode::Attribute* name = one->Find("class")) names_of_main.insert(name->value);
+      one->Set("class", "main");
     }
-    ForElements(root, {"asset", "tendon", "equality", "actuator"}, [&](Element* one, const char*) {
-      if (one->Attribute("class") == nullptr) one->SetAttribute("class", "main");
-      const char* file = one->Attribute("file");
-      if (file == nullptr || std::string_view(one->Name()) != "mesh") return;
-      const fs::path path = file;
-      if (one->Attribute("name") == nullptr) one->SetAttribute("name", path.stem().c_str());
-      const std::string meshes = Setting(root, "meshdir", Setting(root, "assetdir", "").c_str());
-      one->SetAttribute("file", fs::absolute(folder / meshes / path).c_str());
+    ForElements(root, {"asset", "tendon", "equality", "actuator"}, [&](XmlNode& one, const char*) {
+      if (one.Find("class") == nullptr) one.Set("class", "main");
+      const XmlNode::Attribute* file = one.Find("file");
+      if (file == nullptr || one.tag != "mesh") return;
+      const fs::path path = file->value;
+      if (one.Find("name") == nullptr) one.Set("name", path.stem().string());
+      const std::string meshes = Setting(root, "meshdir", Setting(root, "assetdir", ""));
+      one.Set("file", fs::absolute(folder / meshes / path).string());
     });
-    for (Element* one : document_->Within(root)) {
-      for (const char* key : kNames) Prefix(one, key, prefix);
-      for (const auto& [key, kind] : kReferences) Prefix(one, key, prefix);
+    for (const XmlNodePointer& one : root.Descendants()) {
+      for (const char* key : kNames) Prefix(*one, key, prefix);
+      PrefixReferences(*one, prefix);
       for (const char* key : {"class", "childclass"}) {
-        const std::string name = ValueOf(one, key);
+        const std::string name = ValueOf(*one, key);
         if (!name.empty() && names_of_main.contains(name)) {
-          one->SetAttribute(key, main.c_str());
+          one->Set(key, main);
         } else {
-          Prefix(one, key, prefix);
+          Prefix(*one, key, prefix);
         }
       }
     }
-    document_->attached_defaults.insert(defaults.begin(), defaults.end());
+    for (const XmlNodePointer& one : defaults) one->is_attached_default = true;
+    num_defaults_ += defaults.size();
     return main;
   }
 
-  /// Hides tendons, constraints and actuators of a model that refer to parts outside `frame`.
-  void DropOutside(Element* root, Element* frame) {
+  /// Removes the tendons, constraints and actuators of a model that refer to parts outside `frame`.
+  void DropOutside(XmlNode& root, const XmlNode& frame) {
     std::set<std::string> inside = {"body world"};
-    for (const Element* one : document_->Within(frame)) inside.insert(KindAndName(one));
-    Element* none = root->GetDocument()->NewElement("none");
-    ForElements(root, kReferring, [&](Element* one, const char* tag) {
-      if (NumReferences(one, inside) >= 0) {
-        inside.insert(std::string(tag) + " " + ValueOf(one, "name"));
-      } else {
-        document_->included.emplace(one, none);  // copies refer to it
+    for (const XmlNodePointer& one : frame.Descendants()) inside.insert(KindAndName(*one));
+    for (const char* tag : kReferring) {
+      for (const XmlNodePointer& section : Named(root, tag)) {
+        std::erase_if(section->children, [&](const XmlNodePointer& one) {
+          const bool stays = NumReferences(*one, inside) >= 0;
+          if (stays) inside.insert(std::string(tag) + " " + ValueOf(*one, "name"));
+          return !stays;
+        });
       }
-    });
+    }
   }
 
-  XmlDocument* document_;
+  const XmlFile main_;
   std::vector<fs::path> open_;  ///< the files around the element, the main file first
   std::set<fs::path> known_;    ///< of the model that is read
   std::uintmax_t bytes_ = 0;
   std::size_t copied_ = 0, visited_ = 0;  ///< elements, for all copies
+  std::size_t num_defaults_ = 0;          ///< of attached models
 };
 
 }  // namespace
 
-void XmlDocument::Include() {
-  if (path) Includer(this).Resolve(files.front().xml.RootElement(), path->parent_path());
+void IncludeMjcf(const XmlElement& root) {
+  const auto& main = root.file().main;
+  if (main) Includer(root.file()).Resolve(*root.node(), main->parent_path());
 }
 
 }  // namespace loopbench::harness

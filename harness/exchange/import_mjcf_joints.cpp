@@ -285,8 +285,8 @@ std::optional<Effort> ReadActuator(const XmlElement& element, double control, Mj
 void AddMjcfJoints(MjcfModel* model, const XmlElement& body, int parent, int child,
                    const Placement& X_PB, const std::vector<MjcfPlaced>& placed) {
   ImportDraft* draft = model->draft;
-  std::vector<MjcfJoint> joints;
-  for (const MjcfPlaced& joint : placed) joints.push_back(ReadJoint(model, joint));
+  std::vector<MjcfJoint> joints =
+      Mapped<MjcfJoint>(placed, [&](const MjcfPlaced& joint) { return ReadJoint(model, joint); });
   if (joints.size() > 1 && std::ranges::count(joints, JointType::kFree, &MjcfJoint::type) > 0) {
     body.Fail(fmt::format("{} joints on one body, one of them free", joints.size()),
               "a free joint alone");

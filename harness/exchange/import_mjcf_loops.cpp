@@ -18,12 +18,14 @@ std::string NameOr(const XmlElement& element, const std::string& otherwise) {
 /// MuJoCo's weld: x1 + R1 relpose = x2 + R2 anchor, and torquescale times the relative rotation is
 /// 0 (engine_core_constraint.c).
 void AddClosure(const XmlElement& equality, MjcfModel* model) {
+  ImportDraft* draft = model->draft;
   const bool is_weld = equality.tag() == "weld";
   const bool is_ball = !is_weld || equality.Number("torquescale", 1.0) == 0.0;
-  const auto& rest = model->draft->at_rest;
   const auto site1 = equality.Attribute("site1"), site2 = equality.Attribute("site2");
+  const auto anchor = equality.Attribute("anchor");
+  const auto pose = is_weld ? equality.Attribute("relpose") : std::nullopt;
   FrameOn first, second;
-  if (site1) {
+  if (site1) {  // which make anchor and pose idle
     if (!site2) equality.Fail("no \"site2\"", "a site of the other body");
     first = model->SiteNamed(*site1);
     second = model->SiteNamed(*site2);
@@ -31,36 +33,29 @@ void AddClosure(const XmlElement& equality, MjcfModel* model) {
     const auto body2 = equality.Attribute("body2");
     first.body = model->BodyNamed(equality.Required("body1", "the name of a body"));
     if (body2) second.body = model->BodyNamed(*body2);
-  }
-  const MjcfFrame frame1 = model->FrameOf(first.body), frame2 = model->FrameOf(second.body);
-  const Placement X1 = rest[first.body] * frame1.X, X2 = rest[second.body] * frame2.X;
-  if (!site1 && is_weld) {
-    second.X.p = VectorOr(equality.Attribute("anchor"));
-    first.X = X1.Inverse() * X2 * second.X;
-    if (const auto pose = equality.Attribute("relpose")) {
-      // a zero quaternion selects the drawn poses
-      const std::vector<double> p = model->draft->Numbers(*pose, "nnnq");
-      const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
-      if (q.norm() > 0.0) first.X = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
+    const MjcfFrame frame1 = model->FrameOf(first.body), frame2 = model->FrameOf(second.body);
+    const Placement X1 = draft->at_rest[first.body] * frame1.X;
+    const Placement X2 = draft->at_rest[second.body] * frame2.X;
+    if (is_weld) {
+      second.X.p = VectorOr(anchor);
+      first.X = X1.Inverse() * X2 * second.X;
+      if (pose) {
+        // a zero quaternion selects the drawn poses
+        const std::vector<double> p = draft->Numbers(*pose, "nnnq");
+        const Eigen::Quaterniond q(p[3], p[4], p[5], p[6]);
+        if (q.norm() > 0.0) first.X = {UnitQuaternion(*pose, q), {p[0], p[1], p[2]}};
+      }
+    } else {
+      first.X.p = equality.Required("anchor", "3 numbers").Vector();
+      second.X = X2.Inverse() * X1 * first.X;
     }
-  } else if (!site1) {
-    first.X.p = equality.Required("anchor", "3 numbers").Vector();
-    second.X = X2.Inverse() * X1 * first.X;
-  }
-  if (!site1) {
     first.X = frame1.X * first.X;
     second.X = frame2.X * second.X;
-    if (!frame1.has_axes || !frame2.has_axes) model->draft->Note(equality, kUnknownAxes, true);
+    if (!frame1.has_axes || !frame2.has_axes) draft->Note(equality, kUnknownAxes, true);
   }
-  equality.Attribute("anchor");  // not used with sites
-  if (is_weld) equality.Attribute("relpose");
-  if (is_ball) {
-    first.X.q.setIdentity();
-    second.X.q.setIdentity();
-  }
-  const std::string name = NameOr(equality, equality.tag()) + model->Suffix();
-  model->draft->AddLoop(equality, model->draft->NameLater(name),
-                        is_ball ? JointType::kSpherical : JointType::kWeld, first, second);
+  if (is_ball) first.X.q = second.X.q = Eigen::Quaterniond::Identity();
+  draft->AddLoop(equality, draft->NameLater(NameOr(equality, equality.tag()) + model->Suffix()),
+                 is_ball ? JointType::kSpherical : JointType::kWeld, first, second);
 }
 
 /// Returns the coefficients of `polycoef`; missing ones have their defaults.

@@ -1,6 +1,4 @@
-// SDF (sdformat.org, versions 1.4 to 1.12).
-#include "harness/exchange/import_sdf.h"
-
+// SDF (sdformat.org, versions 1.4 to 1.12), in SDF files and in <gazebo> elements of URDF.
 #include "harness/exchange/solids.h"
 
 namespace loopbench::harness {
@@ -10,15 +8,22 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kFirstVersion = 4, kLastVersion = 12;
-constexpr double kSdfGravity = 9.8;     // [m/s^2]
-constexpr double kSdfDensity = 1000.0;  // [kg/m^3]
+constexpr double kSdfGravity = 9.8;      // [m/s^2]
+constexpr double kSdfDensity = 1000.0;   // [kg/m^3]
+constexpr double kPerpendicular = 1e-9;  // cosine tolerance for nine digits
+constexpr double kSameAxis = 1e-5;       // [rad]: axes of gearboxes repeat those of joints
+constexpr double kNoLimit = 1e15;        // the defaults are 1e16 and infinity
+constexpr const char* kWorld = "world";
+constexpr std::string_view kWithin = "::";  // between the names of a model and its part
+constexpr const char* kNoMedium = "there is no medium";
+constexpr const char* kByForces = "bodies move as forces make them";
 
 constexpr DroppedReason kSdfReasons[] = {
     {"collision", "there is no contact"},
     {"sensor", "there are no sensors"},
-    {"atmosphere enable_wind", "there is no medium"},
-    {"wind fluid_added_mass", "there is no medium", true},
-    {"kinematic", "bodies move as forces make them", true},
+    {"atmosphere enable_wind", kNoMedium},
+    {"wind fluid_added_mass", kNoMedium, true},
+    {"kinematic", kByForces, true},
     {"plugin", "there are no plugins", true},
     {"state", "the start is that of the poses", true},
     {"actor", "actors are no mechanism"},
@@ -28,6 +33,140 @@ constexpr DroppedReason kSdfReasons[] = {
      "magnetic_field spherical_coordinates self_collide allow_auto_disable must_be_base_link "
      "road gripper link@name model@canonical_link sdf@version",
      ""}};
+
+/// An element with a pose: a link, joint, frame or nested model.
+struct SdfFrame {
+  XmlElement element;
+  Placement raw = {};            ///< as given in the file
+  std::string relative_to = "";  ///< a name in the same scope; "" for the scope's own frame
+  std::string attached_to = "";  ///< for frames and joints: the name that they move with
+  bool is_raw_to_child = false;  ///< for joints: raw is in the frame of the child
+};
+
+/// A world, a model or a URDF robot: its named elements, each in its own frame.
+struct SdfScope {
+  XmlElement element;
+  ImportDraft* draft;
+  int minor;                ///< of version 1.x
+  std::string prefix = "";  ///< of names of bodies and joints: "arm::"
+  bool is_static = false;
+  std::map<std::string, SdfFrame> frames = {};
+  std::vector<XmlElement> joints = {};
+  std::map<std::string, std::unique_ptr<SdfScope>> models = {};  ///< nested; each has a frame too
+  Placement at_rest = {};                                        ///< in ground axes
+
+  /// A link's scope and its name there; no scope for the world.
+  using Link = std::pair<const SdfScope*, std::string>;
+  // results, so that a chain of frames is followed once
+  mutable std::map<std::string, Placement> resolved_poses = {};
+  mutable std::map<std::string, Link> resolved_links = {};
+
+  bool is_urdf() const { return element.tag() == "robot"; }
+  /// Returns the name of a joint's frame. Before 1.7 joints are no frames, and links may have their
+  /// names.
+  std::string FrameOf(const std::string& joint) const {
+    return minor < 7 ? "joint " + joint : joint;
+  }
+  /// Refuses a name that is in use here.
+  void Add(const std::string& name, SdfFrame frame) {
+    const auto [known, is_new] = frames.emplace(name, frame);
+    if (is_new) return;
+    frame.element.Fail(
+        fmt::format("a second \"{}\"", name),
+        fmt::format("a name that is not in use (line {} has it)", known->second.element.line()));
+  }
+  bool is_world() const { return element.tag() != "model"; }
+  bool IsOwn(const std::string& name) const {
+    return name.empty() || name == "__model__" || (is_world() && name == kWorld);
+  }
+  const SdfFrame& FrameNamed(const std::string& name, const XmlElement& user) const {
+    const auto found = frames.find(name);
+    if (found != frames.end()) return found->second;
+    user.Fail(fmt::format("the frame \"{}\", which is not there", name),
+              "a link, joint, frame or nested model of the same model");
+  }
+  /// Splits "arm::hand" into the model "arm" and the name "hand".
+  const SdfScope* NestedScope(const std::string& name, std::string* rest) const {
+    const std::size_t cut = name.find(kWithin);
+    if (cut == std::string::npos) return nullptr;
+    const auto found = models.find(name.substr(0, cut));
+    if (found == models.end()) return nullptr;
+    *rest = name.substr(cut + kWithin.size());
+    return found->second.get();
+  }
+  /// Returns the pose of a frame in this scope's frame. `user`: the referring element.
+  Placement Resolve(const std::string& name, const XmlElement& user) const;
+  /// Returns the link that a link, frame or model moves with.
+  Link LinkOf(const std::string& name, const XmlElement& user) const;
+};
+
+Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
+  // chain of relative frames, up to a known one
+  std::vector<std::pair<std::string, Placement>> chain;
+  Placement X;
+  for (std::string here = name, next; !IsOwn(here); here = next) {
+    if (const auto known = resolved_poses.find(here); known != resolved_poses.end()) {
+      X = known->second;
+      break;
+    }
+    // without a cycle, a chain has at most each frame and a name within each model
+    if (chain.size() > 2 * frames.size()) {
+      user.Fail("frames that are relative to each other", "no cycle");
+    }
+    std::string rest;
+    if (const SdfScope* nested = NestedScope(here, &rest)) {
+      chain.emplace_back(here, nested->Resolve(rest, user));
+      next = here.substr(0, here.find(kWithin));
+    } else {
+      const SdfFrame& frame = FrameNamed(here, user);
+      chain.emplace_back(here, frame.raw);
+      next = frame.relative_to;
+    }
+  }
+  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
+    X = X * link->second;
+    resolved_poses.emplace(link->first, X);
+  }
+  return X;
+}
+
+SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
+  std::vector<std::string> chain;  // each attached to the next
+  std::string here = name;
+  std::optional<Link> link;
+  while (!link) {
+    if (const auto known = resolved_links.find(here); known != resolved_links.end()) {
+      link = known->second;
+      break;
+    }
+    if (chain.size() > frames.size() + 1) {
+      user.Fail("frames that are attached to each other", "no cycle");
+    }
+    chain.push_back(here);
+    std::string rest;
+    if (const SdfScope* nested = NestedScope(here, &rest)) {
+      link = nested->LinkOf(rest, user);
+    } else if (IsOwn(here) && is_world()) {
+      link = Link{nullptr, ""};
+    } else if (IsOwn(here)) {
+      // a model moves with its canonical link, by default the first one
+      const auto canonical = element.Filled("canonical_link");
+      const std::vector<XmlElement> links = element.Children({"link"});
+      if (!canonical && links.empty()) {
+        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
+      }
+      here = canonical ? canonical->text() : links[0].RequiredName();
+    } else {
+      const SdfFrame& frame = FrameNamed(here, user);
+      const std::string tag = frame.element.tag();
+      if (tag == "link") link = Link{this, here};
+      if (tag == "model") link = models.at(here)->LinkOf("", user);
+      here = frame.attached_to;
+    }
+  }
+  for (const std::string& attached : chain) resolved_links.emplace(attached, *link);
+  return *link;
+}
 
 void RefuseIncludes(const XmlElement& element) {
   for (const XmlElement& include : element.Children({"include"})) {
@@ -93,7 +232,7 @@ int VersionOf(const XmlElement& root) {
 }
 
 /// Reads the <pose> of an element and its `relative_to`.
-SdfFrame ReadPose(const XmlElement& element, const SdfFile& file) {
+SdfFrame ReadPose(const XmlElement& element, const SdfScope& scope) {
   SdfFrame frame{element};
   const auto pose = element.Child("pose");
   if (!pose) return frame;
@@ -101,7 +240,7 @@ SdfFrame ReadPose(const XmlElement& element, const SdfFile& file) {
     old->Fail("none: what it means was said only from 1.7 on, as relative_to");
   }
   if (const auto relative = pose->Filled("relative_to")) {
-    if (file.minor < 7) relative->Fail("none before version 1.7");
+    if (scope.minor < 7) relative->Fail("none before version 1.7");
     frame.relative_to = relative->Name();
   }
   const bool in_degrees = BoolOr(pose->Attribute("degrees"));
@@ -111,7 +250,7 @@ SdfFrame ReadPose(const XmlElement& element, const SdfFile& file) {
   const XmlValue content = pose->Content();
   if (content.text().empty()) return frame;
   const char* kinds = quaternion ? "nnnr" : in_degrees ? "nnnnnn" : "nnnaaa";
-  const std::vector<double> p = file.draft->Numbers(content, kinds);
+  const std::vector<double> p = scope.draft->Numbers(content, kinds);
   frame.raw.p = {p[0], p[1], p[2]};
   frame.raw.q = quaternion
                     ? UnitQuaternion(content, {p[6], p[3], p[4], p[5]})
@@ -122,7 +261,7 @@ SdfFrame ReadPose(const XmlElement& element, const SdfFile& file) {
 /// Returns the pose of a part in its link. Only parts other than <inertial> may be relative to
 /// other frames.
 Placement PoseInLink(const XmlElement& part, const XmlElement& link, const SdfScope& scope) {
-  const SdfFrame pose = ReadPose(part, scope.file);
+  const SdfFrame pose = ReadPose(part, scope);
   const std::string own = link.RequiredName();
   if (pose.relative_to.empty() || pose.relative_to == own) return pose.raw;
   if (part.tag() == "inertial") {
@@ -133,11 +272,11 @@ Placement PoseInLink(const XmlElement& part, const XmlElement& link, const SdfSc
 
 /// Reads the name and frame of a link, frame or joint.
 void ReadName(const XmlElement& child, SdfScope* scope) {
-  SdfFrame frame = ReadPose(child, scope->file);
+  SdfFrame frame = ReadPose(child, *scope);
   const bool is_joint = child.tag() == "joint";
   if (is_joint) {
     const XmlValue moved = child.RequiredChild("child").Content();
-    if (moved.Name() == kSdfWorld) {
+    if (moved.Name() == kWorld) {
       moved.Fail("a link, frame or nested model: the world is no child, it can be the <parent>");
     }
     frame.attached_to = moved.text();
@@ -162,12 +301,15 @@ void ReadNames(SdfScope* scope) {
   }
   for (const XmlElement& child : element.Children({"model"})) {
     const std::string name = child.RequiredName();
-    const auto fixed = child.Content("static");
-    const bool is_static = scope->is_static || BoolOr(fixed);
+    const bool is_fixed = BoolOr(child.Content("static"));
     const auto& model = scope->models[name] =
-        std::make_unique<SdfScope>(child, scope->file, scope->prefix + name + "::", is_static);
+        std::make_unique<SdfScope>(SdfScope{.element = child,
+                                            .draft = scope->draft,
+                                            .minor = scope->minor,
+                                            .prefix = scope->prefix + name + std::string(kWithin),
+                                            .is_static = scope->is_static || is_fixed});
     ReadNames(model.get());
-    SdfFrame frame = ReadPose(child, scope->file);
+    SdfFrame frame = ReadPose(child, *scope);
     if (const auto placed = child.Filled("placement_frame")) {
       // the pose is the pose of this frame of the model
       frame.raw = frame.raw * model->Resolve(placed->Name(), child).Inverse();
@@ -196,18 +338,16 @@ void ReadShapes(const XmlElement& link, const XmlElement& inertial,
 
 /// Reads <inertial> and the other properties of a link.
 void ReadLink(const XmlElement& link, int body, const SdfScope& scope) {
-  ImportDraft* draft = scope.file.draft;
+  ImportDraft* draft = scope.draft;
   const bool has_weight = BoolOr(link.Content("gravity"), true);
   if (!has_weight && !scope.is_static) draft->AddLift(body, 1.0);
   const auto kinematic = link.Child("kinematic");
-  if (kinematic && kinematic->Content().Bool()) {
-    draft->Note(*kinematic, "dropped: bodies move as forces make them", true);
-  }
+  if (kinematic && kinematic->Content().Bool()) draft->Drop(*kinematic, "", kByForces);
   if (const auto decay = link.Child("velocity_decay")) {
     const double linear = NumberOr(decay->Content("linear"), 0.0);
     const bool acts = linear != 0.0 || NumberOr(decay->Content("angular"), 0.0) != 0.0;
     decay->Ignore();
-    if (acts && !scope.is_static) draft->DropWhole(*decay, "there is no medium", true);
+    if (acts && !scope.is_static) draft->DropWhole(*decay, kNoMedium, true);
   }
   const auto inertial = link.Child("inertial");
   if (scope.is_static) {
@@ -241,7 +381,7 @@ void ReadLink(const XmlElement& link, int body, const SdfScope& scope) {
 
 /// Sets poses of models and links, and adds links as bodies.
 void ReadLinks(SdfScope* scope) {
-  ImportDraft* draft = scope->file.draft;
+  ImportDraft* draft = scope->draft;
   for (const XmlElement& child : scope->element.Children({"link"})) {
     const std::string name = child.RequiredName();
     const int body = draft->AddBody(child, scope->prefix + name);
@@ -258,100 +398,318 @@ void ReadLinks(SdfScope* scope) {
 
 /// Returns the gravity, if it is given. Before 1.6 it is in the first <physics>, from where
 /// libsdformat moves it (sdf/1.6/1_5.convert).
-std::optional<XmlValue> GravityOf(const XmlElement& world, const SdfFile& file) {
-  auto gravity = world.Content("gravity");
-  const std::vector<XmlElement> profiles = world.Children({"physics"});
-  if (!gravity && file.minor < 6 && !profiles.empty()) gravity = profiles[0].Content("gravity");
+std::optional<XmlValue> GravityOf(const SdfScope& scope) {
+  auto gravity = scope.element.Content("gravity");
+  const std::vector<XmlElement> profiles = scope.element.Children({"physics"});
+  if (!gravity && scope.minor < 6 && !profiles.empty()) gravity = profiles[0].Content("gravity");
   for (const XmlElement& physics : profiles) {
-    file.draft->DropWhole(physics, "runs choose their own integrator and steps");
+    scope.draft->DropWhole(physics, "runs choose their own integrator and steps");
     const auto other = physics.Child("gravity");
-    if (other && file.minor >= 6) {
-      file.draft->Note(*other, "dropped: from 1.6 on, <world> contains the gravity", true);
+    if (other && scope.minor >= 6) {
+      scope.draft->Drop(*other, "", "from 1.6 on, <world> contains the gravity");
     }
   }
   return gravity;
 }
 
+/// Returns axes with x along the first axis, y along the second, if these are perpendicular.
+std::optional<Eigen::Quaterniond> UniversalAxes(Vector3d first, Vector3d second) {
+  first.normalize();
+  second.normalize();
+  if (std::abs(first.dot(second)) > kPerpendicular) return std::nullopt;
+  return FromAxes(first, second, first.cross(second));
+}
+
+/// Returns the advance per angle [m/rad]. thread_pitch is in rad/m and positive for a left-handed
+/// thread; screw_thread_pitch, from 1.10 on, in m per turn and positive for a right-handed one.
+double ReadPitch(const XmlElement& joint) {
+  const auto old = joint.Content("thread_pitch"), pitch = joint.Content("screw_thread_pitch");
+  const auto& given = pitch ? pitch : old;
+  if (!given) joint.Fail("no pitch", "<screw_thread_pitch> or <thread_pitch>");
+  const double value = given->Number();
+  if (value == 0.0) given->Fail("a pitch that is not 0");
+  return pitch ? value / (2.0 * std::numbers::pi) : -1.0 / value;
+}
+
+/// An element that couples joints, read after all joints.
+struct Coupling {
+  XmlElement element;
+  const SdfScope* scope;
+  int follower = -1;
+};
+struct Couplings {
+  std::vector<Coupling> mimics, gearboxes;
+};
+
+/// Returns the body that a parent or child moves with, and its pose in ground axes.
+FrameOn EndOf(const XmlElement& side, const SdfScope& scope) {
+  const XmlValue name = side.Content();
+  if (name.Name() == kWorld) return {};
+  const auto [owner, link] = scope.LinkOf(name.text(), side);
+  if (owner == nullptr) return {};
+  const int body = scope.draft->BodyNamed(owner->prefix + link, name);
+  return {body, scope.draft->at_rest[body]};
+}
+
+/// Returns the axis in the joint's frame; before 1.5 it was given in the model's frame.
+Vector3d ReadAxis(const XmlElement& axis, const SdfScope& scope, const Placement& X_model_joint) {
+  Vector3d xyz = Vector3d::UnitZ();
+  std::string frame;
+  bool in_joint = scope.minor >= 5;
+  if (const auto given = axis.Child("xyz")) {
+    xyz = scope.draft->Vector(given->Content(), "d");
+    if (!(xyz.norm() > 0.0)) given->Fail("an axis of length 0", "one that is not zero");
+    if (const auto expressed = given->Filled("expressed_in")) {
+      frame = expressed->Name();
+      in_joint = false;
+    }
+  }
+  if (BoolOr(axis.Content("use_parent_model_frame"))) in_joint = false;
+  if (!in_joint) return X_model_joint.q.conjugate() * (scope.Resolve(frame, axis).q * xyz);
+  if (scope.is_urdf() && !(X_model_joint.q * xyz).isApprox(xyz, kSameAxis)) {
+    scope.draft->Note(
+        axis, "in axes of the joint, as in SDF 1.11; before SDF 1.5, axes were the model's");
+  }
+  return xyz;
+}
+
+void NoteLimits(const XmlElement& axis, ImportDraft* draft) {
+  const auto limit = axis.Child("limit");
+  if (!limit) return;
+  bool ends = false;
+  for (const char* name : {"lower", "upper"}) {
+    const auto bound = limit->Content(name);
+    if (!bound || bound->text().find("inf") != std::string::npos) continue;
+    ends = ends || std::abs(bound->Number()) < kNoLimit;
+  }
+  limit->Ignore();
+  if (ends) draft->DropWhole(*limit, kNoEnds, true);
+}
+
+/// Reads spring and damper of one axis; `has_one`: the joint has only this axis.
+void ReadDynamics(const XmlElement& axis, bool has_one, ImportDraft* draft) {
+  NoteLimits(axis, draft);
+  const auto dynamics = axis.Child("dynamics");
+  if (!dynamics) return;
+  const auto number = [&](const char* name, const Range& range) {
+    return NumberOr(dynamics->Content(name), 0.0, range);
+  };
+  const double c = number("damping", kNotNegative), k = number("spring_stiffness", kNotNegative);
+  const double rest = number("spring_reference", {}), friction = number("friction", {});
+  if (friction != 0.0) draft->Drop(*dynamics, "friction", kDryFriction);
+  if (has_one) {
+    draft->AddSpringAndDamper(k, rest, c);
+  } else if (c > 0.0 || k > 0.0) {
+    draft->Note(*dynamics, "dropped: only joints with one coordinate have springs and dampers",
+                true);
+  }
+}
+
+/// Sets the start of a joint: a coordinate for each of its own axes, 0 by default.
+void ReadStart(const std::vector<XmlElement>& axes, std::size_t num_own, ImportDraft* draft) {
+  std::vector<double> values(num_own);
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const auto start = axes[i].Child("initial_position");
+    const double value = start ? start->Content().Number() : 0.0;
+    if (i < num_own) {
+      values[i] = value;
+    } else if (value != 0.0) {
+      draft->Note(*start, "dropped: the joint has no coordinate of this axis", true);
+    }
+  }
+  const bool moves = std::ranges::any_of(values, [](double value) { return value != 0.0; });
+  if (moves) draft->description.initial.coordinates.push_back({draft->last_joint(), values});
+}
+
+/// Reads dynamics, mimics and start of the joint that was added last. Its own axes come first.
+void ReadAxes(const std::vector<XmlElement>& axes, std::size_t num_own, const SdfScope& scope,
+              Couplings* couplings) {
+  ImportDraft* draft = scope.draft;
+  if (num_own == 0) {
+    for (const XmlElement& axis : axes) draft->DropWhole(axis, "joints of this type have no axis");
+    return;
+  }
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    ReadDynamics(axes[i], num_own == 1 && i == 0, draft);
+    const auto mimic = axes[i].Child("mimic");
+    if (mimic && i < num_own) couplings->mimics.push_back({*mimic, &scope, draft->last_joint()});
+    if (mimic && i >= num_own) draft->DropWhole(*mimic, "the joint has no such axis", true);
+  }
+  ReadStart(axes, num_own, draft);
+}
+
+/// Reads a <joint> between links that are bodies already.
+void ReadJoint(const XmlElement& element, const SdfScope& scope, Couplings* couplings) {
+  ImportDraft* draft = scope.draft;
+  const std::string name = element.RequiredName();
+  using enum JointType;
+  constexpr XmlChoice<std::optional<JointType>> kTypes[] = {
+      {"revolute", kRevolute},   {"continuous", kRevolute}, {"prismatic", kPrismatic},
+      {"screw", kHelical},       {"ball", kSpherical},      {"fixed", kWeld},
+      {"universal", kUniversal}, {"revolute2", kUniversal}, {"gearbox", std::nullopt}};
+  const auto known = element.Required("type", "a joint type").Choice(kTypes);
+  const XmlElement parent = element.RequiredChild("parent");
+  const XmlElement child = element.RequiredChild("child");
+  if (!known) return couplings->gearboxes.push_back({element, &scope});
+  JointType type = *known;
+  const FrameOn P = EndOf(parent, scope);
+  FrameOn Q = EndOf(child, scope);
+  if (P.body == Q.body) {
+    element.Fail("parent and child that are one body", "two different bodies");
+  }
+  const SdfFrame& frame = scope.frames.at(scope.FrameOf(name));
+  const Placement X_model_joint = scope.Resolve(scope.FrameOf(name), element);
+  const Placement X_rest = scope.at_rest * X_model_joint;
+  // bit-identical to the file if the child is a link and not a frame on a link
+  const auto named = scope.frames.find(frame.attached_to);
+  const bool is_raw = frame.is_raw_to_child && Q.body != kGround && named != scope.frames.end() &&
+                      named->second.element.tag() == "link";
+  Placement X_QM = is_raw ? frame.raw : Q.X.Inverse() * X_rest;
+  Placement X_PF = P.X.Inverse() * (is_raw ? Q.X * X_QM : X_rest);
+  std::vector<XmlElement> axes = element.Children({"axis"});
+  const auto axis = element.Child("axis"), axis2 = element.Child("axis2");
+  const bool has_axis = TraitsOf(type).own_axis != '-' || type == kUniversal;
+  if (has_axis && !axis) element.Fail("no <axis>", "one");
+  Vector3d own = Vector3d::Zero();
+  if (has_axis) own = ReadAxis(*axis, scope, X_model_joint);
+  if (type == kUniversal && !axis2) element.Fail("no <axis2>", "one");
+  if (axis2) axes.push_back(*axis2);
+  if (type == kUniversal) {
+    const Vector3d second = ReadAxis(*axis2, scope, X_model_joint);
+    if (const auto q = UniversalAxes(own, second)) {
+      X_QM.q = X_QM.q * *q;
+      X_PF.q = X_PF.q * *q;
+    } else {
+      // two hinges, with a link without mass between them
+      const int link = draft->AddLink(element, Q.body);
+      draft
+          ->AddJoint(draft->NameLater(scope.prefix + name), kRevolute, {link, X_QM}, {Q.body, X_QM})
+          .axis = second;
+      ReadAxes({*axis2}, 1, scope, couplings);
+      type = kRevolute;
+      Q.body = link;
+      axes.pop_back();
+    }
+  }
+  JointDescription& joint = draft->AddJoint(draft->NewJointName(element, scope.prefix + name), type,
+                                            {P.body, X_PF}, {Q.body, X_QM});
+  if (TraitsOf(type).own_axis != '-') joint.axis = own;
+  if (type == kHelical) joint.parameter = ReadPitch(element);
+  joint.cut = scope.is_urdf();
+  if (const auto physics = element.Child("physics")) {
+    const auto simbody = physics->Child("simbody");
+    if (simbody && BoolOr(simbody->Content("must_be_loop_joint"))) joint.cut = true;
+    physics->Ignore();
+  }
+  ReadAxes(axes, type == kUniversal ? 2 : has_axis ? 1 : 0, scope, couplings);
+}
+
+void ReadJoints(const SdfScope& scope, Couplings* couplings) {
+  for (const XmlElement& joint : scope.joints) ReadJoint(joint, scope, couplings);
+  if (scope.is_urdf()) return;
+  for (const XmlElement& ball : scope.element.Children({kDrakeBall})) {
+    scope.draft->AddBall(
+        ball, [&](const XmlElement& side) { return EndOf(side, scope).body; },
+        [](const XmlElement& point) { return point.Content(); });
+  }
+  for (const auto& [name, model] : scope.models) ReadJoints(*model, couplings);
+}
+
+void ReadMimic(const Coupling& coupling) {
+  const XmlElement& mimic = coupling.element;
+  ImportDraft* draft = coupling.scope->draft;
+  const auto axis = mimic.Attribute("axis");
+  const bool is_second = axis && axis->Choice<bool>({{"axis", false}, {"axis2", true}});
+  const int leader =
+      draft->JointNamed(mimic.Required("joint", "the name of a joint"), coupling.scope->prefix);
+  const JointType type = draft->description.joints[leader].type;
+  if (is_second && type != JointType::kUniversal) axis->Fail("axis: its joint has no second one");
+  const double multiplier = NumberOr(mimic.Content("multiplier"), 1.0);
+  const double offset = NumberOr(mimic.Content("offset"), 0.0);
+  const double reference = NumberOr(mimic.Content("reference"), 0.0);
+  draft->AddMimic(mimic, coupling.follower, {leader, multiplier}, offset - multiplier * reference);
+}
+
+/// Hinges and screws, by groups of bodies that are fixed together.
+struct Turns {
+  std::vector<int> groups;
+  std::multimap<std::pair<int, int>, int> joints;
+
+  explicit Turns(const MechanismDescription& d) : groups(FixedTogether(d)) {
+    for (int j = 0; j < std::ssize(d.joints); ++j) {
+      const JointDescription& joint = d.joints[j];
+      if (joint.type != JointType::kRevolute && joint.type != JointType::kHelical) continue;
+      joints.emplace(std::minmax({groups[joint.from.body], groups[joint.to.body]}), j);
+    }
+  }
+
+  /// Returns the joint whose coordinate is the angle of a body from the reference body about an
+  /// axis in ground axes, and their ratio, 1 or -1.
+  CouplingDescription::Part Of(const XmlElement& side, const SdfScope& scope, const Vector3d& axis,
+                               int reference) const {
+    const ImportDraft& draft = *scope.draft;
+    const int body = groups[EndOf(side, scope).body];
+    const auto [first, last] = joints.equal_range(std::minmax({body, reference}));
+    for (auto turn = first; turn != last && body != reference; ++turn) {
+      const JointDescription& joint = draft.description.joints[turn->second];
+      const JointSide& from = joint.from;
+      const Vector3d own =
+          draft.at_rest[from.body].q * (PoseOf(from).R * AxisAlignment(joint) * Vector3d::UnitZ());
+      if (own.cross(axis).norm() > kSameAxis) continue;
+      const bool turns_body = groups[from.body] == reference;
+      return {turn->second, (own.dot(axis) > 0.0) == turns_body ? 1.0 : -1.0};
+    }
+    side.Fail(fmt::format("\"{}\", which no hinge or screw about this axis joins to the reference "
+                          "body",
+                          side.Content().text()),
+              "one: the gearbox couples the coordinates of two such joints");
+  }
+};
+
+/// SDFormat specification, joint/gearbox_reference_body: theta_1 is the angle from the reference
+/// body to the parent about <axis>, theta_2 to the child about <axis2>, and
+/// theta_2 = -gearbox_ratio theta_1. Gazebo verifies this sign (gazebo-classic,
+/// test/integration/joint_gearbox.cc). The angles are coordinates of other joints.
+void ReadGearbox(const XmlElement& element, const SdfScope& scope, const Turns& turns) {
+  ImportDraft* draft = scope.draft;
+  const auto given = element.Content("gearbox_ratio");
+  const double ratio = NumberOr(given, 1.0);
+  if (ratio == 0.0) given->Fail("a ratio that is not 0");
+  const int reference =
+      turns.groups[EndOf(element.RequiredChild("gearbox_reference_body"), scope).body];
+  const XmlElement axis = element.RequiredChild("axis");
+  const auto axis2 = element.Child("axis2");
+  if (!axis2) draft->Note(element, "no <axis2>: the angle of the child is about <axis> too");
+  const Placement X = scope.Resolve(scope.FrameOf(element.RequiredName()), element);
+  CouplingDescription::Part parts[2];  // joints, and their coordinates per theta
+  for (const auto& [side, about, part] :
+       {std::tuple{"parent", axis, &parts[0]}, {"child", axis2.value_or(axis), &parts[1]}}) {
+    const Vector3d direction = (scope.at_rest * X).q * ReadAxis(about, scope, X).normalized();
+    *part = turns.Of(element.RequiredChild(side), scope, direction, reference);
+    ReadDynamics(about, false, draft);
+  }
+  if (const auto physics = element.Child("physics")) physics->Ignore();
+  draft->AddFollower(element, scope.prefix + element.RequiredName(), parts[1].joint,
+                     {parts[0].joint, -ratio * parts[0].ratio * parts[1].ratio}, 0.0);
+}
+
+/// Adds the joints of a scope and of its models, then their couplings. Joints of a URDF robot close
+/// loops.
+void ReadSdfJoints(const SdfScope& scope) {
+  Couplings couplings;
+  ReadJoints(scope, &couplings);
+  for (const Coupling& mimic : couplings.mimics) ReadMimic(mimic);
+  if (!couplings.gearboxes.empty()) {
+    const Turns turns(scope.draft->description);
+    for (const Coupling& one : couplings.gearboxes) ReadGearbox(one.element, *one.scope, turns);
+  }
+  PlaceFollowers(scope.draft);
+}
+
 }  // namespace
 
-void SdfScope::Add(const std::string& name, SdfFrame frame) {
-  const auto [known, is_new] = frames.emplace(name, frame);
-  if (is_new) return;
-  frame.element.Fail(
-      fmt::format("a second \"{}\"", name),
-      fmt::format("a name that is not in use (line {} has it)", known->second.element.line()));
-}
-
-Placement SdfScope::Resolve(const std::string& name, const XmlElement& user) const {
-  // chain of relative frames, up to a known one
-  std::vector<std::pair<std::string, Placement>> chain;
-  Placement X;
-  for (std::string here = name, next; !IsOwn(here); here = next) {
-    if (const auto known = resolved_.find(here); known != resolved_.end()) {
-      X = known->second;
-      break;
-    }
-    // without a cycle, a chain has at most each frame and a name within each model
-    if (chain.size() > 2 * frames.size()) {
-      user.Fail("frames that are relative to each other", "no cycle");
-    }
-    std::string rest;
-    if (const SdfScope* nested = NestedScope(here, &rest)) {
-      chain.emplace_back(here, nested->Resolve(rest, user));
-      next = here.substr(0, here.find(kWithin));
-    } else {
-      const SdfFrame& frame = FrameNamed(here, user);
-      chain.emplace_back(here, frame.raw);
-      next = frame.relative_to;
-    }
-  }
-  for (auto link = chain.rbegin(); link != chain.rend(); ++link) {
-    X = X * link->second;
-    resolved_.emplace(link->first, X);
-  }
-  return X;
-}
-
-SdfScope::Link SdfScope::LinkOf(const std::string& name, const XmlElement& user) const {
-  std::vector<std::string> chain;  // each attached to the next
-  std::string here = name;
-  std::optional<Link> link;
-  while (!link) {
-    if (const auto known = links_.find(here); known != links_.end()) {
-      link = known->second;
-      break;
-    }
-    if (chain.size() > frames.size() + 1) {
-      user.Fail("frames that are attached to each other", "no cycle");
-    }
-    chain.push_back(here);
-    std::string rest;
-    if (const SdfScope* nested = NestedScope(here, &rest)) {
-      link = nested->LinkOf(rest, user);
-    } else if (IsOwn(here) && is_world()) {
-      link = Link{nullptr, ""};
-    } else if (IsOwn(here)) {
-      // a model moves with its canonical link, by default the first one
-      const auto canonical = element.Filled("canonical_link");
-      const std::vector<XmlElement> links = element.Children({"link"});
-      if (!canonical && links.empty()) {
-        user.Fail(fmt::format("the model of \"{}\" without a link", name), "one");
-      }
-      here = canonical ? canonical->text() : links[0].RequiredName();
-    } else {
-      const SdfFrame& frame = FrameNamed(here, user);
-      const std::string tag = frame.element.tag();
-      if (tag == "link") link = Link{this, here};
-      if (tag == "model") link = models.at(here)->LinkOf("", user);
-      here = frame.attached_to;
-    }
-  }
-  for (const std::string& attached : chain) links_.emplace(attached, *link);
-  return *link;
-}
-
 void ReadSdf(const XmlElement& root, ImportDraft* draft) {
-  const SdfFile file{draft, VersionOf(root)};
+  const int minor = VersionOf(root);
   const auto world = root.Child("world");
   const XmlElement& top = world ? *world : root;
   RefuseIncludes(root);
@@ -361,12 +719,12 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
   }
   const std::vector<XmlElement> models = top.Children({"model"});
   if (models.empty()) top.Fail("no <model>", "at least one");
-  if (const auto gravity = GravityOf(top, file)) {
+  SdfScope scope{.element = top, .draft = draft, .minor = minor};
+  if (const auto gravity = GravityOf(scope)) {
     draft->description.gravity = gravity->Vector();
   } else {
     draft->AssumeGravity(top, kSdfGravity);
   }
-  SdfScope scope(top, file);
   ReadNames(&scope);
   const auto name = world ? world->Attribute("name") : std::nullopt;
   if (models.size() == 1) {
@@ -387,7 +745,7 @@ void ReadSdf(const XmlElement& root, ImportDraft* draft) {
 void ReadGazeboJoints(const XmlElement& robot, const std::vector<XmlElement>& joints,
                       ImportDraft* draft) {
   if (joints.empty()) return;
-  SdfScope scope(robot, {draft, 11});
+  SdfScope scope{.element = robot, .draft = draft, .minor = 11};
   for (int i = 1; i < std::ssize(draft->at_rest); ++i) {
     const XmlElement& link = draft->element(i);
     scope.Add(link.RequiredName(), {link, draft->at_rest[i]});

@@ -1,4 +1,5 @@
-// A mechanism in plain numbers: source of all exported documents, programs and peer models.
+// A mechanism in plain numbers, source of all exported documents, programs and peer models, and its
+// export.
 //
 // A forest of tree joints from Ground, the joints that close its loops, and bodies about their
 // centres of mass, all in 3D (a planar mechanism lies in z = 0). No Eigen and only C++17: required
@@ -8,8 +9,13 @@
 #include <array>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
+
+namespace loopbench {
+struct MechanismDescription;
+}
 
 namespace loopbench::exchange {
 
@@ -109,6 +115,12 @@ struct Note {
   std::string text;
 };
 
+/// Exported document or source text for another program.
+struct ExportedFile {
+  std::string text;
+  std::vector<Note> notes;
+};
+
 /// Error for parts of a model that a format or peer does not support; what() lists all.
 class Unsupported : public std::runtime_error {
  public:
@@ -126,5 +138,30 @@ class Unsupported : public std::runtime_error {
 
   std::vector<std::string> parts_;
 };
+
+/// Makes a model with the tree and order of Mechanism(description, Coordinates::kJoint), at zero
+/// coordinates and speeds. Model::missing then lists prescribed motions, time-dependent forces,
+/// drag, forces along coordinates of cut joints, and joints and forces of other programs.
+Model MakeModel(const MechanismDescription& description);
+
+/// Makes the model at the assembled start. Throws std::runtime_error if assembly fails.
+Model MakeModelAtStart(const MechanismDescription& description);
+
+inline constexpr double kTimeStep = 1e-3;  ///< default of MuJoCo's step [s]
+
+/// An export format.
+struct ExportFormat {
+  std::string_view name, ending;
+  ExportedFile (*write)(const MechanismDescription& description, double time_step);
+};
+
+const std::vector<ExportFormat>& ExportFormats();
+
+/// Exports the mechanism at its assembled start, byte-reproducibly. Throws Unsupported with all
+/// unsupported parts, and std::runtime_error if assembly fails.
+inline ExportedFile Export(const MechanismDescription& description, const ExportFormat& format,
+                           double time_step = kTimeStep) {
+  return format.write(description, time_step);
+}
 
 }  // namespace loopbench::exchange

@@ -1,9 +1,9 @@
 #include "harness/exchange/xml_document.h"
 
 #include <fmt/format.h>
+#include <tinyxml2.h>
 
 #include <cmath>
-#include <functional>
 
 #include "harness/base/text.h"
 
@@ -11,10 +11,9 @@ namespace loopbench::harness {
 
 namespace fs = std::filesystem;
 
-using xml::Element;
-
 namespace {
 
+static_assert(kMaxXmlDepth == TINYXML2_MAX_ELEMENT_DEPTH);
 constexpr std::string_view kBlanks = " \t\r\n";
 
 std::string Quoted(const std::string& text) { return '"' + Abbreviated(text) + '"'; }
@@ -48,15 +47,38 @@ void RefuseManyAttributes(std::string_view text, const std::string& file) {
   }
 }
 
-std::vector<const tinyxml2::XMLAttribute*> AttributesIn(const Element& element) {
-  std::vector<const tinyxml2::XMLAttribute*> attributes;
+XmlNodePointer Converted(const tinyxml2::XMLElement& element,
+                         const std::shared_ptr<const XmlFile>& file) {
+  const char* text = element.GetText();
+  const auto node = std::make_shared<XmlNode>(XmlNode{.file = file,
+                                                      .line = element.GetLineNum(),
+                                                      .has_contents = !element.NoChildren(),
+                                                      .tag = element.Name(),
+                                                      .text = text == nullptr ? "" : text});
   for (const auto* one = element.FirstAttribute(); one != nullptr; one = one->Next()) {
-    attributes.push_back(one);
+    node->attributes.push_back({one->Name(), one->Value()});
   }
-  return attributes;
+  for (const auto* child = element.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    node->children.push_back(Converted(*child, file));
+  }
+  return node;
+}
+
+void AddDescendants(const XmlNode& node, std::vector<XmlNodePointer>* all) {
+  for (const XmlNodePointer& child : node.children) {
+    all->push_back(child);
+    AddDescendants(*child, all);
+  }
 }
 
 }  // namespace
+
+std::vector<XmlNodePointer> XmlNode::Descendants() const {
+  std::vector<XmlNodePointer> all;
+  AddDescendants(*this, &all);
+  return all;
+}
 
 void xml::FailIn(const std::string& file, std::ptrdiff_t line, std::string_view found,
                  std::string_view expected) {
@@ -78,6 +100,43 @@ std::vector<std::string_view> xml::Words(std::string_view text) {
     text.remove_prefix(end);
   }
   return words;
+}
+
+XmlNodePointer xml::Parse(std::string_view text, const XmlFile& file) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  if (const std::string fault = EncodingFault(text); !fault.empty()) {
+    throw ConfigError(file.name + ":" + fault);
+  }
+  RefuseManyAttributes(text, file.name);
+  tinyxml2::XMLDocument xml;
+  const auto error = xml.Parse(text.data(), text.size());
+  const auto fail = [&](int line, std::string_view found, std::string_view expected) {
+    FailIn(file.name, line, found, expected);
+  };
+  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
+    fail(xml.ErrorLineNum(), fmt::format("more than {} elements within each other", kMaxXmlDepth),
+         "fewer");
+  }
+  if (error == tinyxml2::XML_ERROR_PARSING_ATTRIBUTE) {
+    fail(xml.ErrorLineNum(), "an attribute twice, or without a value in quotes",
+         "each attribute once, as name=\"value\"");
+  }
+  if (error != tinyxml2::XML_SUCCESS) {
+    fail(std::max(1, xml.ErrorLineNum()),
+         fmt::format("a fault of syntax ({})", xml.ErrorIDToName(error)), "well-formed XML");
+  }
+  for (const auto* node = xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
+    if (node->ToUnknown() != nullptr) {
+      fail(node->GetLineNum(), "a document type or declaration of entities",
+           "none: they are not read");
+    }
+    if (node->ToElement() != nullptr && node != xml.RootElement()) {
+      fail(node->GetLineNum(), "a second root element", "one");
+    }
+  }
+  if (xml.RootElement() == nullptr) fail(1, "no element", "<mujoco>, <robot> or <sdf>");
+  return Converted(*xml.RootElement(), std::make_shared<const XmlFile>(file));
 }
 
 void XmlValue::Fail(std::string_view expected) const {
@@ -112,7 +171,7 @@ std::vector<double> XmlValue::Numbers(std::size_t least, std::size_t most) const
 }
 
 fs::path XmlValue::File(const fs::path& subfolder, const fs::path& otherwise) const {
-  const auto& main = element_.document_->path;
+  const auto& main = element_.file().main;
   if (!main) Fail("nothing: a text has no other files");
   std::error_code error;
   const fs::path folder = main->parent_path(), base = fs::canonical(folder / ".", error);
@@ -134,16 +193,16 @@ bool XmlValue::Bool() const {
 }
 
 std::string XmlElement::Shown() const {
-  const char* name = element_->Attribute("name");
-  std::string shown = "<" + Abbreviated(element_->Name());
-  if (name != nullptr && IsText(name)) shown += " name=" + Quoted(name);
+  const XmlNode::Attribute* name = node_->Find("name");
+  std::string shown = "<" + Abbreviated(tag());
+  if (name != nullptr && IsText(name->value)) shown += " name=" + Quoted(name->value);
   return shown + ">";
 }
 
 void XmlElement::Fail(std::string_view found, std::string_view expected,
                       const std::string& attribute) const {
   const std::string where = attribute.empty() ? "" : " " + Abbreviated(attribute);
-  throw ConfigError(Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", file(), line(),
+  throw ConfigError(Printable(fmt::format("{}:{}: {}{}: found {}, expected {}", file().name, line(),
                                           Shown(), where, found, expected)));
 }
 
@@ -153,15 +212,13 @@ void XmlElement::RequireFew(std::size_t count, std::size_t most, std::string_vie
 
 std::vector<XmlElement> XmlElement::Children(const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> children;
-  for (Element* child : document_->ChildrenOf(element_)) {
-    if (tags.empty() || Contains(tags, child->Name())) {
-      children.emplace_back(document_, child);
-    }
+  for (const XmlNodePointer& child : node_->children) {
+    if (tags.empty() || Contains(tags, child->tag)) children.emplace_back(child);
   }
   return children;
 }
 
-std::vector<XmlElement> XmlElement::InSections(const char* section,
+std::vector<XmlElement> XmlElement::InSections(std::string_view section,
                                                const std::vector<std::string_view>& tags) const {
   std::vector<XmlElement> all;
   for (const XmlElement& one : Children({section})) {
@@ -170,14 +227,7 @@ std::vector<XmlElement> XmlElement::InSections(const char* section,
   return all;
 }
 
-std::optional<XmlElement> XmlElement::Within(const std::vector<std::string_view>& tags) const {
-  for (Element* one : document_->Within(element_)) {
-    if (Contains(tags, one->Name())) return XmlElement(document_, one);
-  }
-  return std::nullopt;
-}
-
-std::optional<XmlElement> XmlElement::Child(const char* tag) const {
+std::optional<XmlElement> XmlElement::Child(std::string_view tag) const {
   const std::vector<XmlElement> children = Children({tag});
   if (children.empty()) return std::nullopt;
   if (children.size() > 1) {
@@ -186,17 +236,17 @@ std::optional<XmlElement> XmlElement::Child(const char* tag) const {
   return children[0];
 }
 
-XmlElement XmlElement::RequiredChild(const char* tag) const {
+XmlElement XmlElement::RequiredChild(std::string_view tag) const {
   const auto child = Child(tag);
   if (!child) Fail(fmt::format("no <{}>", tag), "one");
   return *child;
 }
 
-std::optional<XmlValue> XmlElement::Attribute(const std::string& name) const {
+std::optional<XmlValue> XmlElement::Attribute(std::string_view name) const {
   std::optional<XmlValue> found;
-  if (const auto* own = element_->FindAttribute(name.c_str()); own != nullptr) {
-    document_->read.insert(own);
-    found = XmlValue(XmlElement(document_, element_), name, own->Value());
+  if (XmlNode::Attribute* own = node_->Find(name); own != nullptr) {
+    own->is_read = true;
+    found = XmlValue(XmlElement(node_), name, own->value);
   }
   if (name == "name") return found;
   for (const XmlElement& element : defaults_) {
@@ -206,13 +256,13 @@ std::optional<XmlValue> XmlElement::Attribute(const std::string& name) const {
   return found;
 }
 
-std::optional<XmlValue> XmlElement::Filled(const std::string& name) const {
+std::optional<XmlValue> XmlElement::Filled(std::string_view name) const {
   auto value = Attribute(name);
   if (value && value->text().empty()) value.reset();
   return value;
 }
 
-XmlValue XmlElement::Required(const std::string& name, std::string_view expected) const {
+XmlValue XmlElement::Required(std::string_view name, std::string_view expected) const {
   auto value = Attribute(name);
   if (!value) Fail(fmt::format("no \"{}\"", name), expected);
   return *std::move(value);
@@ -220,104 +270,33 @@ XmlValue XmlElement::Required(const std::string& name, std::string_view expected
 
 std::string XmlElement::RequiredName() const { return Required("name", "a name").Name(); }
 
-XmlValue XmlElement::Content() const {
-  const char* text = element_->GetText();
-  return XmlValue(*this, "", text == nullptr ? "" : text);
-}
+XmlValue XmlElement::Content() const { return XmlValue(*this, "", node_->text); }
 
-std::optional<XmlValue> XmlElement::Content(const char* tag) const {
+std::optional<XmlValue> XmlElement::Content(std::string_view tag) const {
   const auto child = Child(tag);
   return child ? std::optional(child->Content()) : std::nullopt;
 }
 
 void XmlElement::Ignore() const {
-  for (const auto* attribute : AttributesIn(*element_)) document_->read.insert(attribute);
+  for (XmlNode::Attribute& attribute : node_->attributes) attribute.is_read = true;
   for (const XmlElement& child : Children()) child.Ignore();
   for (const XmlElement& element : defaults_) element.Ignore();
 }
 
-XmlElement XmlDocument::root() { return XmlElement(this, files.front().xml.RootElement()); }
-
-std::vector<Element*> XmlDocument::ChildrenOf(Element* element) const {
-  std::vector<Element*> children = xml::ChildrenIn(element);
-  if (included.empty() && added.empty()) return children;
-  std::vector<Element*> all;
-  for (Element* child : children) {
-    const auto found = included.find(child);
-    if (found == included.end()) {
-      all.push_back(child);
+void XmlElement::ForUnread(
+    const std::function<void(const XmlElement&, const std::string&)>& use) const {
+  for (const auto& [name, value, is_read] : node_->attributes) {
+    if (!is_read) use(*this, IsText(name) ? name : "?");
+  }
+  for (const XmlNodePointer& child : node_->children) {
+    const bool is_read = child->is_read;
+    const XmlElement element(child);
+    if (is_read) {
+      element.ForUnread(use);
     } else {
-      std::ranges::copy(ChildrenOf(found->second), std::back_inserter(all));
+      use(element, "");
     }
   }
-  const auto more = added.find(element);
-  if (more != added.end()) std::ranges::copy(more->second, std::back_inserter(all));
-  return all;
-}
-
-void XmlDocument::AddWithin(Element* element, std::string_view tag,
-                            std::vector<Element*>* found) const {
-  for (Element* child : ChildrenOf(element)) {
-    const bool fits = tag.empty() || child->Name() == tag;
-    if (fits) found->push_back(child);
-    if (!fits || tag.empty()) AddWithin(child, tag, found);
-  }
-}
-
-Element* XmlDocument::Parse(std::string_view text, const std::string& file) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  auto& [xml, name] = files.emplace_back();
-  name = file;
-  xml.SetUserData(&name);
-  if (const std::string fault = EncodingFault(text); !fault.empty()) {
-    throw ConfigError(file + ":" + fault);
-  }
-  RefuseManyAttributes(text, file);
-  const auto error = xml.Parse(text.data(), text.size());
-  if (error == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
-    xml::FailIn(file, xml.ErrorLineNum(),
-                fmt::format("more than {} elements within each other", TINYXML2_MAX_ELEMENT_DEPTH),
-                "fewer");
-  }
-  if (error == tinyxml2::XML_ERROR_PARSING_ATTRIBUTE) {
-    xml::FailIn(file, xml.ErrorLineNum(), "an attribute twice, or without a value in quotes",
-                "each attribute once, as name=\"value\"");
-  }
-  if (error != tinyxml2::XML_SUCCESS) {
-    xml::FailIn(file, std::max(1, xml.ErrorLineNum()),
-                fmt::format("a fault of syntax ({})", xml.ErrorIDToName(error)), "well-formed XML");
-  }
-  for (const auto* node = xml.FirstChild(); node != nullptr; node = node->NextSibling()) {
-    if (node->ToUnknown() != nullptr) {
-      xml::FailIn(file, node->GetLineNum(), "a document type or declaration of entities",
-                  "none: they are not read");
-    }
-    if (node->ToElement() != nullptr && node != xml.RootElement()) {
-      xml::FailIn(file, node->GetLineNum(), "a second root element", "one");
-    }
-  }
-  if (xml.RootElement() == nullptr) {
-    xml::FailIn(file, 1, "no element", "<mujoco>, <robot> or <sdf>");
-  }
-  return xml.RootElement();
-}
-
-std::vector<std::pair<XmlElement, std::string>> XmlDocument::Unread() {
-  std::vector<std::pair<XmlElement, std::string>> parts;
-  const std::function<void(Element*)> add = [&](Element* element) {
-    if (!read.contains(element)) {
-      parts.emplace_back(XmlElement(this, element), "");
-      return;
-    }
-    for (const auto* one : AttributesIn(*element)) {
-      if (read.contains(one)) continue;
-      parts.emplace_back(XmlElement(this, element), IsText(one->Name()) ? one->Name() : "?");
-    }
-    for (Element* child : ChildrenOf(element)) add(child);
-  };
-  add(files.front().xml.RootElement());
-  return parts;
 }
 
 }  // namespace loopbench::harness

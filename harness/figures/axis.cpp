@@ -151,15 +151,17 @@ std::vector<Point> Placed(const PlotArea& area, std::span<const Point> points) {
   return Mapped<Point>(points, [&](const Point& point) { return area.Place(point); });
 }
 
+/// Width of a curve [pt], a third of a millimetre: closer features cannot be distinguished.
+constexpr double kDrawnWidth = 1.0;
+
 /// Returns true if all points lie on the line, or on its points; both are page positions.
 bool LieOn(std::span<const Point> points, std::span<const Point> line, bool joined) {
-  constexpr double kDistance = kDrawnWidth;
   return std::ranges::all_of(points, [&](const Point& point) {
-    auto at = std::ranges::lower_bound(line, point.first - kDistance, {}, &Point::first);
+    auto at = std::ranges::lower_bound(line, point.first - kDrawnWidth, {}, &Point::first);
     if (at != line.begin()) --at;
-    for (; at != line.end() && at->first <= point.first + kDistance; ++at) {
+    for (; at != line.end() && at->first <= point.first + kDrawnWidth; ++at) {
       const auto next = !joined || at + 1 == line.end() ? at : at + 1;
-      if (DistanceToSegment(point, *at, *next) <= kDistance) return true;
+      if (DistanceToSegment(point, *at, *next) <= kDrawnWidth) return true;
     }
     return false;
   });
@@ -195,10 +197,9 @@ bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const 
   return LieOn(a, b, joined) && LieOn(b, a, joined);
 }
 
-// Curves that coincide are drawn as one.
-
 namespace {
 
+/// Splits "odca, joint".
 std::vector<std::string> PartsOf(const std::string& label) {
   std::vector<std::string> parts;
   for (std::size_t from = 0; from <= label.size();) {
@@ -256,7 +257,8 @@ std::size_t NumberOfValues(const std::vector<std::string>& labels, std::size_t p
   return values.size();
 }
 
-// Returns "odca = lagrange, joint"; `all` are the labels of the panel.
+}  // namespace
+
 std::string LabelOfSeveral(const std::vector<std::string>& labels,
                            const std::vector<std::string>& all) {
   std::vector<std::string> products;
@@ -265,75 +267,11 @@ std::string LabelOfSeveral(const std::vector<std::string>& labels,
     for (std::size_t i = 0; i < product.size(); ++i) {
       const bool is_any =
           i > 0 && product[i].size() > 1 && product[i].size() == NumberOfValues(all, i);
-      texts.push_back(is_any ? "all" : fmt::format("{}", fmt::join(product[i], " = ")));
+      texts.push_back(is_any ? "all" : Joined(product[i], " = "));
     }
-    products.push_back(fmt::format("{}", fmt::join(texts, ", ")));
+    products.push_back(Joined(texts, ", "));
   }
-  return fmt::format("{}", fmt::join(products, " and "));
-}
-
-bool MayMerge(const Curve& curve) {
-  return curve.merges && !curve.label.empty() && !curve.ends_early;
-}
-
-/// Returns the failed runs of a curve, which keep its colour if it is drawn as one with others.
-Curve FailuresOf(Curve* curve) {
-  return {.style = curve->style, .merges = false, .crosses = std::exchange(curve->crosses, {})};
-}
-
-/// Keeps the style of `one` where `other` has the same, else black, solid, unmarked.
-void KeepCommon(const CurveStyle& other, CurveStyle* one) {
-  const CurveStyle several;
-  if (one->color != other.color) one->color = several.color;
-  if (one->dash != other.dash) one->dash = several.dash;
-  if (one->shape != other.shape) one->shape = several.shape;
-  one->width = std::max(one->width, other.width);
-}
-
-}  // namespace
-
-std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
-  const PlotArea area = AreaOf(panel, size);
-  std::vector<Curve> merged;
-  std::vector<std::vector<Point>> points;
-  std::vector<std::vector<std::string>> labels;
-  std::vector<Curve> failures;
-  for (Curve curve : panel.curves) {
-    const std::vector<Point> all = Drawable(area, curve);
-    const std::vector<Point> own = curve.line ? Decimated(area, all) : all;
-    std::size_t i = 0;
-    for (; i < merged.size(); ++i) {
-      const bool alike = MayMerge(curve) && MayMerge(merged[i]) && curve.line == merged[i].line &&
-                         curve.style.flagged == merged[i].style.flagged;
-      if (alike && Coincide(area, own, points[i], curve.line)) break;
-    }
-    if (i == merged.size()) {
-      merged.push_back(curve);
-      points.push_back(own);
-      labels.push_back({curve.label});
-      continue;
-    }
-    AddOnce(labels[i], curve.label);
-    for (Curve* one : {&merged[i], &curve}) {
-      if (!one->crosses.empty()) failures.push_back(FailuresOf(one));
-    }
-    merged[i].hollow.insert(merged[i].hollow.end(), curve.hollow.begin(), curve.hollow.end());
-    KeepCommon(curve.style, &merged[i].style);
-    if (merged[i].remark.ends_with('?') && !curve.remark.ends_with('?')) {
-      merged[i].remark = curve.remark;  // the resolved one
-      merged[i].guide = curve.guide;
-    }
-  }
-  std::vector<std::string> all;
-  for (const Curve& curve : panel.curves) {
-    if (curve.merges && !curve.label.empty()) all.push_back(curve.label);
-  }
-  for (std::size_t i = 0; i < merged.size(); ++i) {
-    merged[i].several = labels[i].size() > 1;
-    if (merged[i].several) merged[i].label = LabelOfSeveral(labels[i], all);
-  }
-  merged.insert(merged.end(), failures.begin(), failures.end());
-  return merged;
+  return Joined(products, " and ");
 }
 
 }  // namespace loopbench::harness

@@ -1,6 +1,8 @@
+// Figures made of records, and the styles of methods in all of them.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -8,12 +10,105 @@
 #include <tuple>
 
 #include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/config/experiment.h"
+#include "harness/config/formulations.h"
 #include "harness/figures/figures.h"
 #include "harness/judge/analysis.h"
 #include "harness/judge/tables.h"
 
 namespace loopbench::harness {
+namespace {
+
+constexpr const char* kNeutral = "#707070";  // for samples whose meaning is not their hue
+
+/// Returns the legend item of a channel for a run.
+LegendItem ItemOf(const Record& record, std::string_view key) {
+  const CurveStyle style = StyleOf(record);
+  LegendItem item{.text = record.Text(key), .style = {.color = kNeutral}};
+  if (key == "formulation") item.style = {.color = style.color, .width = 2.5};
+  if (key == "enforcement") item.style.dash = style.dash;
+  if (key == "solver") item.style.width = style.width;
+  if (key == "coordinates") {
+    item.style.shape = style.shape;
+    item.line = false;
+  }
+  return item;
+}
+
+/// Returns one item per value, in the order of the records.
+LegendRow ItemsOf(std::span<const Record> records, const std::string& key) {
+  LegendRow row;
+  for (const Record& record : records) {
+    const std::string text = record.Text(key);
+    if (!text.empty() && !Contains(row, text, &LegendItem::text)) {
+      row.push_back(ItemOf(record, key));
+    }
+  }
+  return row;
+}
+
+}  // namespace
+
+CurveStyle DistinctStyle(std::size_t index) {
+  // Okabe and Ito's palette, dark and light colours alternating, and an olive
+  constexpr std::array<const char*, 8> kPalette = {"#000000", "#E69F00", "#0072B2", "#CC79A7",
+                                                   "#009E73", "#D55E00", "#56B4E9", "#999933"};
+  constexpr std::array<Shape, 5> kShapes = {Shape::kCircle, Shape::kTriangle, Shape::kSquare,
+                                            Shape::kDiamond, Shape::kTriangleDown};
+  return {.color = kPalette[index % kPalette.size()], .shape = kShapes[index % kShapes.size()]};
+}
+
+bool Varies(std::span<const Record> records, const std::string& key) {
+  return std::ranges::any_of(
+      records, [&](const Record& record) { return record.Text(key) != records[0].Text(key); });
+}
+
+CurveStyle StyleOf(const Record& record) {
+  const FormulationRow* row = FindFormulation(record.Text("formulation"));
+  const auto level = Parse<Enforcement>(record.Text("enforcement"));
+  const bool as_published = record.Text("solver") == ToString(SolverKind::kAsPublished);
+  const bool absolute = record.Text("coordinates") == "absolute";
+  return {.color = row == nullptr ? kNeutral : row->color,  // formulation of another program
+          .dash = static_cast<std::size_t>(level.value_or(Enforcement())) % kDashes,
+          .width = as_published ? 0.7 : 1.5,
+          .shape = absolute ? Shape::kTriangle : Shape::kCircle,
+          .flagged = HasWarning(record)};
+}
+
+Curve CurveOverTime(const Record& record, const std::string& x, const std::string& y,
+                    const std::string& label, const CurveStyle& style) {
+  Curve curve{.label = label, .x = record.Numbers(x), .y = record.Numbers(y), .style = style};
+  curve.ends_early = HasFailed(record);
+  if (curve.ends_early && curve.x.empty() && x.ends_with('t')) {
+    curve.x = {record.Number("t_reached")};
+    curve.y = {std::numeric_limits<double>::quiet_NaN()};
+  }
+  return curve;
+}
+
+std::string MethodLabel(const Record& record, std::span<const Record> all) {
+  std::string label;
+  for (const char* key : kChannelKeys) {
+    if (Varies(all, key)) label += (label.empty() ? "" : ", ") + record.Text(key);
+  }
+  return label.empty() ? record.Text("formulation") : label;
+}
+
+std::vector<LegendRow> ChannelLegend(std::span<const Record> records) {
+  std::vector<LegendRow> rows;
+  if (LegendRow hues = ItemsOf(records, "formulation"); !hues.empty())
+    rows.push_back(std::move(hues));
+  if (Varies(records, "enforcement")) rows.push_back(ItemsOf(records, "enforcement"));
+  LegendRow others;
+  for (const char* key : {"coordinates", "solver"}) {
+    if (!Varies(records, key)) continue;
+    for (LegendItem& item : ItemsOf(records, key)) others.push_back(std::move(item));
+  }
+  if (!others.empty()) rows.push_back(std::move(others));
+  return rows;
+}
+
 namespace {
 
 // Returns "1.97 ± 0.05", with a "?" if the power is not resolved.
@@ -128,10 +223,9 @@ std::map<std::vector<std::string>, std::vector<Record>> ByOtherKeys(
                 [&](const std::string& key) { return key == "step" || !Varies(records, key); });
   std::map<std::vector<std::string>, std::vector<Record>> groups;
   for (const Record& record : records) {
-    std::vector<std::string> texts;
-    for (const std::string& key : keys)
-      texts.push_back(fmt::format("{} {}", key, record.Text(key)));
-    groups[texts].push_back(record);
+    groups[Mapped<std::string>(keys, [&](const std::string& key) {
+      return fmt::format("{} {}", key, record.Text(key));
+    })].push_back(record);
   }
   return groups;
 }
@@ -273,10 +367,9 @@ NamedFigure FigureOf(std::span<const Record> rungs) {
     named.name += fmt::format("-{}-{}", parameter.key, first.Text(parameter.key));
     figure.title += fmt::format(", {} {}", parameter.key, first.Text(parameter.key));
   }
+  figure.legend.resize(figure.curves.empty() ? 0 : 1);
   for (const Curve& curve : figure.curves) {
-    LegendItem item{curve.label, curve.style};
-    if (figure.legend.empty()) figure.legend.emplace_back();
-    figure.legend.front().push_back(std::move(item));
+    figure.legend.front().push_back({curve.label, curve.style});
   }
   return named;
 }
@@ -306,12 +399,6 @@ std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records) {
   }
   return figures;
 }
-namespace {
-
-/// Returns "joint:A:angle" for "joint:A:angle [rad]".
-std::string WithoutUnit(const std::string& label) { return label.substr(0, label.rfind(" [")); }
-
-}  // namespace
 
 Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
                         std::span<const SharedColumn> columns, const std::string& title) {
@@ -319,28 +406,27 @@ Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
   Figure both{.title = title, .x_label = "time [s]", .y_label = fmt::format("[{}]", unit)};
   Figure apart{
       .title = "", .x_label = "time [s]", .y_label = fmt::format("first - second [{}]", unit)};
+  const auto add = [&](const Trajectory& from, std::size_t column, Curve curve) {
+    for (std::size_t row = 0; row < from.rows(); ++row) {
+      curve.x.push_back(from.Time(row));
+      curve.y.push_back(from.At(row, column));
+    }
+    both.curves.push_back(std::move(curve));
+  };
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const SharedColumn& column = columns[i];
-    const std::string name = WithoutUnit(column.label);
+    // "joint:A:angle" of "joint:A:angle [rad]"
+    const std::string name = column.label.substr(0, column.label.rfind(" ["));
     CurveStyle style = DistinctStyle(i);
     style.shape = Shape::kNone;
-    Curve own{.label = name + ", second", .style = style};
-    Curve difference{.label = name, .style = style};
-    style.dash = 1;
-    Curve other{.label = name + ", first", .style = style};
-    for (std::size_t row = 0; row < ours.rows(); ++row) {
-      own.x.push_back(ours.At(row, ours.time));
-      own.y.push_back(ours.At(row, column.in_ours));
-    }
-    for (std::size_t row = 0; row < theirs.rows(); ++row) {
-      other.x.push_back(theirs.At(row, theirs.time));
-      other.y.push_back(theirs.At(row, column.in_theirs));
-    }
-    difference.x = other.x;
-    difference.y = Differences(ours, theirs, column);
-    both.curves.push_back(std::move(own));
-    both.curves.push_back(std::move(other));
-    apart.curves.push_back(std::move(difference));
+    CurveStyle dashed = style;
+    dashed.dash = 1;
+    add(ours, column.in_ours, {.label = name + ", second", .style = style});
+    add(theirs, column.in_theirs, {.label = name + ", first", .style = dashed});
+    apart.curves.push_back({.label = name,
+                            .x = both.curves.back().x,
+                            .y = Differences(ours, theirs, column),
+                            .style = style});
   }
   both.names_at_ends = true;
   both.below.push_back(std::move(apart));

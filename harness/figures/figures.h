@@ -22,10 +22,6 @@
 
 namespace loopbench::harness {
 
-// Axes, and the points that are drawn along them.
-
-// Scale of a figure: its range, the positions of values on it, and its ticks.
-
 /// Formats a number for figures: plain from 0.01 to 99999, else with powers of ten, "2.5·10⁻⁶".
 std::string NumberText(double value);
 
@@ -74,8 +70,6 @@ struct Tick {
 /// linear axis has multiples of 1, 2 or 5 of a power of ten.
 std::vector<Tick> Ticks(const Axis& axis, int most);
 
-// Reduction of the points of curves, and curves that are drawn as one.
-
 /// A place in a drawing [pt], or a pair of values.
 using Point = std::pair<double, double>;
 
@@ -84,16 +78,10 @@ struct PlotArea {
   Axis x, y;
   double width = 0.0, height = 0.0;
 
-  bool CanShow(const Point& point) const {
-    return x.CanShow(point.first) && y.CanShow(point.second);
-  }
   Point Place(const Point& point) const {
     return {width * x.Place(point.first), height * y.Place(point.second)};
   }
 };
-
-/// Width of a curve [pt], a third of a millimetre: closer features cannot be distinguished.
-inline constexpr double kDrawnWidth = 1.0;
 
 /// Returns the first, last, lowest and highest point of each column that is a third of a curve
 /// wide. Omitted points lie between kept ones. Points need not be in order of x.
@@ -104,9 +92,10 @@ std::vector<Point> Decimated(const PlotArea& area, std::span<const Point> points
 bool Coincide(const PlotArea& area, std::span<const Point> one, std::span<const Point> other,
               bool joined = true);
 
-// Figures as data, and the styles of methods in all of them.
-
-// Figures as SVG or PDF, drawn by gnuplot in the size in which they are printed.
+/// Returns the label of coinciding curves, "odca = lagrange, joint"; `all` are the labels of the
+/// panel.
+std::string LabelOfSeveral(const std::vector<std::string>& labels,
+                           const std::vector<std::string>& all);
 
 /// Marks on a curve.
 enum class Shape { kNone, kCircle, kTriangle, kSquare, kDiamond, kTriangleDown };
@@ -136,8 +125,7 @@ struct Guide {
 /// positive on a logarithmic axis, are left out.
 struct Curve {
   std::string label = "";  ///< properties in the order of the other labels, "odca, joint"
-  std::vector<double> x = {};
-  std::vector<double> y = {};
+  std::vector<double> x = {}, y = {};
   CurveStyle style = {};
   std::optional<Guide> guide = std::nullopt;  ///< logarithmic axes only
   std::string remark = "";                    ///< text at the end of the curve: "2.01 ± 0.05"
@@ -147,10 +135,10 @@ struct Curve {
   bool merges = true;    ///< is drawn as one curve with others that coincide
   bool several = false;  ///< is drawn for several that coincide; `label` lists them
   /// Points of `x` and `y` that belong to runs with warnings: only their marks are hollow.
-  std::vector<std::pair<double, double>> hollow = {};
+  std::vector<Point> hollow = {};
   /// Failed runs, as crosses in the curve's colour. If y cannot be drawn (NaN), the cross lies on
   /// the lower edge of the plot.
-  std::vector<std::pair<double, double>> crosses = {};
+  std::vector<Point> crosses = {};
 };
 
 /// Meaning of a style. An item without text is left out.
@@ -164,10 +152,8 @@ using LegendRow = std::vector<LegendItem>;
 /// Contents of a figure. Labels are plain text (no markup) and carry their units: "time [s]".
 struct Figure {
   std::string title;
-  std::string x_label;
-  std::string y_label;
-  bool log_x = false;
-  bool log_y = false;
+  std::string x_label, y_label;
+  bool log_x = false, log_y = false;
   std::vector<Curve> curves = {};  ///< later ones lie on top
   std::string legend_title = "";
   std::vector<std::string> x_ticks = {};  ///< names of x = 1, 2, ...; empty for a numeric scale
@@ -197,13 +183,12 @@ struct FigureScript {
   std::string commands;
   double height = 0.0;
   std::size_t legend_rows = 0;
+  bool is_empty = true;  ///< no curve has a point to draw
 };
 FigureScript GnuplotScript(const Figure& figure, FigureSize size = FigureSize::kTwoColumn);
 
-/// Draws `figure` into `path`, as PDF if its extension is ".pdf", else as SVG. Returns nothing on
-/// success, else the reason: gnuplot missing (and its package), gnuplot's own message, or nothing
-/// to draw. The file is complete or absent. Equal figures give equal bytes of SVG; a PDF contains
-/// its date. `gnuplot` is the program to call.
+/// Draws `figure` into `path` as DrawWithGnuplot() does; a figure without a point to draw is a
+/// reason, too. Equal figures give equal bytes of SVG; a PDF contains its date.
 [[nodiscard]] std::optional<std::string> WriteFigure(const std::filesystem::path& path,
                                                      const Figure& figure,
                                                      FigureSize size = FigureSize::kTwoColumn,
@@ -242,11 +227,6 @@ std::vector<LegendRow> ChannelLegend(std::span<const Record> records);
 /// True if the values of a key differ.
 bool Varies(std::span<const Record> records, const std::string& key);
 
-// The standard figures of a store, and figures of precision runs and trajectories.
-
-// Figures made of records: motion, drift, and drift through singular configurations. The contents
-// of the records decide, never a name.
-
 /// A figure and the name of its file without extension.
 struct NamedFigure {
   std::string name;
@@ -275,21 +255,14 @@ Figure SingularFigure(std::span<const Record> records);
 /// named with its value.
 std::vector<NamedFigure> AllFigures(std::span<const Record> records);
 
-// Error and drift of runs in several scalars, against tolerance.
-
 /// Draws error (lines) and drift (dashes) of each ladder against tolerance, one colour per scalar.
 /// Failed runs are crosses at the lower edge.
 std::vector<NamedFigure> PrecisionFigures(std::span<const Record> records);
 
-// Two trajectories: both in the upper panel, their difference in the lower one.
-
-/// Makes both panels; columns that coincide are one curve. `columns` have one unit.
+/// Draws two trajectories in the upper panel, their difference in the lower one; columns that
+/// coincide are one curve. `columns` have one unit.
 Figure TrajectoryFigure(const Trajectory& ours, const Trajectory& theirs,
                         std::span<const SharedColumn> columns, const std::string& title);
-
-// Figure of any value against another, and its distinct points.
-
-// A figure that the user chooses: any value of the records against any other.
 
 /// Request for a figure. Keys are keys of records; `x` may hold texts, which become equally spaced
 /// ticks. Two series ("series.drift_t" and "series.drift") give one curve per record.
@@ -324,8 +297,6 @@ void RequireKeys(const FreeFigure& wanted, std::span<const Record> records);
 /// value of a logarithmic axis is positive. Labels without an axis or curve are errors, too.
 FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigure& wanted);
 
-// Selection of distinguishable records if there are more records than points in a picture.
-
 /// Takes records one by one and keeps at most `most` of them, reduced to the keys of a free figure:
 /// one per cell of the picture, curve, failure and warning state. Cells are as fine as `most`
 /// allows, on linear and on logarithmic axes.
@@ -355,10 +326,6 @@ class DistinctPoints {
   std::unordered_set<std::string> cells_;
 };
 
-// Panels of figures and their legends, drawn by gnuplot.
-
-// gnuplot, the program that draws all figures.
-
 /// Letter size of all drawings [pt], distance of their lines and mean width of letters.
 inline constexpr double kLetterSize = 8.0, kLineHeight = 10.0, kLetterWidth = 4.2;
 
@@ -381,80 +348,20 @@ std::vector<std::string> Wrapped(const std::string& text, std::size_t most);
 std::string TextAt(const GnuplotPage& page, std::string_view text, double x, double y,
                    std::string_view options);
 
-/// Runs `script`, which sets neither terminal nor output and quotes its texts with QuoteGnuplot().
-/// Writes `path`, as PDF if its extension is ".pdf", else as SVG. Returns nothing on success, else
-/// the reason: gnuplot missing (and its package) or gnuplot's own message. The file is complete or
-/// absent. No other files remain, even if this process is killed. No shell is used.
+/// Runs `script`, which sets neither terminal nor output and quotes its texts with QuoteGnuplot(),
+/// by the program `gnuplot` without a shell. Writes `path`, as PDF if its extension is ".pdf", else
+/// as SVG. Returns nothing on success, else the reason: gnuplot missing (and its package) or its
+/// own message. The file is complete or absent. No other files remain, even if this process is
+/// killed.
 [[nodiscard]] std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
                                                          const GnuplotPage& page,
                                                          const std::string& script,
                                                          const std::string& gnuplot = "gnuplot");
 
-// A panel of a figure and its legend.
-
-// Legend below a figure: samples of colours, dashes and marks with their meaning.
-
-/// Returns gnuplot's "lc ... dt ... lw ..." of a curve's line, and "pt ... ps ... lc ..." of its
-/// marks.
-std::string LineLook(const CurveStyle& style);
-std::string MarkLook(const CurveStyle& style);
-inline constexpr const char* kCrossLook = "pt 2 ps 0.45 lw 1.2";
-
-struct Legend {
-  std::vector<LegendRow> rows;
-  std::size_t letters = 0;  ///< listed curves that stand for several
-};
-
-/// Makes the legend of a figure with the curves `merged`. First come its own rows, or else the
-/// curves' labels. Then follow the meaning of hollow marks, crosses and question marks, with
-/// `failures`, remarks on crosses without a curve. Last is a list of the curves that stand for
-/// several, by the letters at their ends. Rows are broken at the page width. In one column the list
-/// ends in "…" if the legend would exceed kLegendRows.
-Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSize size,
-                const std::vector<std::string>& failures);
-
-/// Draws rows below `top` [pt from the lower edge of the page].
-std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& page, double top);
-
-/// True if curves are named at their ends instead of in the legend.
-bool NamesAtEnds(const Figure& figure, const std::vector<Curve>& merged);
-
-/// Returns the text at the end of each curve: its name and its remark. The first `letters` curves
-/// that stand for several have their letter in the legend as name.
-std::vector<std::string> EndTexts(const Figure& figure, const std::vector<Curve>& merged,
-                                  bool names, std::size_t letters);
-
-// One panel of a figure: axes, curves, and the texts beside their ends.
-
 double WidthOfPage(FigureSize size);
 
-/// Height of a panel's rectangle [pt] in a figure of `panels` panels.
-double HeightOfPanel(FigureSize size, std::size_t panels);
-
-/// Axes of a panel and its approximate size.
-PlotArea AreaOf(const Figure& panel, FigureSize size);
-
-/// Returns the points that the axes can show.
-std::vector<Point> Drawable(const PlotArea& area, const Curve& curve);
-
-/// Position of a panel on the page [pt from the lower left corner].
-struct PanelPlace {
-  double left = 0.0, right = 0.0, bottom = 0.0, top = 0.0;
-};
-
-/// Returns commands that draw a panel, the last one "plot"; labels set before belong to it. Data
-/// names begin with `name`. `texts` are placed at the ends of the curves.
-std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
-                        const std::vector<std::string>& texts, const PlotArea& area,
-                        const GnuplotPage& page, const PanelPlace& place, const std::string& name,
-                        bool has_x_labels);
-
-/// Width [pt] of the labels of the vertical axis.
-double WidthOfLabels(const PlotArea& area);
-
-// Figures of the robustness map, and of work and precision.
-
-// The robustness map as a small heat map that is readable from a distance.
+/// Returns gnuplot's "lc ... dt ... lw ..." of a curve's line.
+std::string LineLook(const CurveStyle& style);
 
 /// Result of a method in all rows of a group.
 struct FoldedCell {
@@ -470,7 +377,6 @@ struct FoldedCell {
 /// A group with a cell for each method.
 struct FoldedGroup {
   std::string label;  ///< short label of the rules if there is one
-  std::size_t rows = 0;
   std::vector<FoldedCell> cells;
 
   double Share() const;  ///< over all its rows and methods
@@ -491,14 +397,11 @@ struct MapDrawing {
 /// and .csv.
 MapDrawing DrawMap(const RobustnessMap& map, FigureSize size = FigureSize::kTwoColumn);
 
-/// Draws into `path`, as PDF if its extension is ".pdf", else as SVG; returns the result of
-/// DrawWithGnuplot().
+/// Draws into `path` as DrawWithGnuplot() does.
 [[nodiscard]] std::optional<std::string> WriteMapFigure(const std::filesystem::path& path,
                                                         const RobustnessMap& map,
                                                         FigureSize size = FigureSize::kTwoColumn,
                                                         const std::string& gnuplot = "gnuplot");
-
-// Work-precision figures: cost of accuracy.
 
 /// Error over cost on logarithmic axes. Marks are the runs: hue for the formulation, shape for the
 /// coordinates, hollow with warnings. A line, dashed by level, joins the runs that no other run of

@@ -27,25 +27,28 @@ std::vector<std::string> KeysIn(const std::string& list) {
   return parts;
 }
 
+template <class T>
+const T* FindAs(const Record& record, const std::string& key) {
+  const Value* value = record.Find(key);
+  return value == nullptr ? nullptr : std::get_if<T>(value);
+}
+
 /// Formats numbers as in all figures.
 std::string ValueText(const Record& record, const std::string& key) {
-  const Value* value = record.Find(key);
-  const auto* number = value == nullptr ? nullptr : std::get_if<double>(value);
+  const auto* number = FindAs<double>(record, key);
   return number == nullptr ? record.Text(key) : NumberText(*number);
 }
 
 bool IsEmpty(const Record& record, const std::string& key) {
-  const Value* value = record.Find(key);
-  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return true;
-  const auto* number = std::get_if<double>(value);
+  if (record.Find(key) == nullptr || FindAs<std::monostate>(record, key)) return true;
+  const auto* number = FindAs<double>(record, key);
   return number != nullptr && std::isnan(*number);
 }
 
 bool IsSeries(const Record& record, const std::string& key) { return !record.Numbers(key).empty(); }
 
 bool IsText(const Record& record, const std::string& key) {
-  const Value* value = record.Find(key);
-  return value != nullptr && std::holds_alternative<std::string>(*value);
+  return FindAs<std::string>(record, key) != nullptr;
 }
 
 // Returns the participating records: with a value of x, and of the kinds that have y values.
@@ -89,32 +92,19 @@ std::string TitleOf(std::span<const Record> rows, const FreeFigure& wanted) {
   return fmt::format("{} over {}{}", wanted.y, wanted.x, common);
 }
 
-// Positions of x values: numbers unchanged, texts as 1, 2, ... in their sorted list.
-class Positions {
- public:
-  Positions(std::span<const Record> rows, const std::string& key) : key_(key) {
-    std::set<std::string> texts;
-    for (const Record& row : rows) {
-      if (IsText(row, key)) texts.insert(row.Text(key));
-    }
-    categories_.assign(texts.begin(), texts.end());
+/// Returns the texts of a key, sorted: the names of x = 1, 2, ...; none for numbers.
+std::vector<std::string> TextsOf(std::span<const Record> rows, const std::string& key) {
+  std::set<std::string> texts;
+  for (const Record& row : rows) {
+    if (IsText(row, key)) texts.insert(row.Text(key));
   }
-  double Of(const Record& row) const {
-    if (categories_.empty()) return row.Number(key_);
-    const auto it = std::ranges::find(categories_, row.Text(key_));
-    return 1.0 + static_cast<double>(it - categories_.begin());
-  }
-  const std::vector<std::string>& categories() const { return categories_; }
-
- private:
-  std::string key_;
-  std::vector<std::string> categories_;
-};
+  return {texts.begin(), texts.end()};
+}
 
 /// Returns true if all keys have a channel (figures.h), so that curves have their usual styles.
 bool HaveChannels(const std::vector<std::string>& keys) {
   return !keys.empty() && std::ranges::all_of(keys, [](const std::string& key) {
-    return std::ranges::find(kChannelKeys, key) != std::end(kChannelKeys);
+    return Contains(kChannelKeys, key);
   });
 }
 
@@ -128,20 +118,23 @@ Record Only(const std::vector<std::string>& keys, const Record& row) {
 CurveStyle StyleBy(const std::vector<std::string>& keys, const Record& row, std::size_t index) {
   if (!HaveChannels(keys)) return DistinctStyle(index);
   CurveStyle style = StyleOf(Only(keys, row));
-  if (std::ranges::find(keys, "formulation") == keys.end()) style.color = "#000000";
+  if (!Contains(keys, "formulation")) style.color = "#000000";
   return style;
 }
 
 // Makes a curve; `rows` are in order of x.
-Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted, const Positions& x,
-                 const std::string& label, std::size_t index) {
+Curve ValueCurve(const std::vector<Record>& rows, const FreeFigure& wanted,
+                 const std::vector<std::string>& x_ticks, const std::string& label,
+                 std::size_t index) {
   Curve curve{
       .label = label, .style = StyleBy(KeysIn(wanted.group), rows.front(), index), .points = true};
   for (const Record& row : rows) {
+    const auto tick = std::ranges::find(x_ticks, row.Text(wanted.x)) - x_ticks.begin();
+    const double x = x_ticks.empty() ? row.Number(wanted.x) : 1.0 + static_cast<double>(tick);
     if (HasFailed(row)) {
-      curve.crosses.push_back({x.Of(row), row.Number(wanted.y)});
+      curve.crosses.push_back({x, row.Number(wanted.y)});
     } else {
-      curve.x.push_back(x.Of(row));
+      curve.x.push_back(x);
       curve.y.push_back(row.Number(wanted.y));
       if (HasWarning(row)) curve.hollow.emplace_back(curve.x.back(), curve.y.back());
     }
@@ -245,9 +238,8 @@ using Group = std::pair<std::string, std::vector<Record>>;  // label and members
 std::vector<Group> GroupsOf(std::span<const Record> rows, std::span<const std::string> keys) {
   std::vector<Group> groups;
   for (const Record& row : rows) {
-    std::vector<std::string> values;
-    for (const std::string& key : keys) values.push_back(ValueText(row, key));
-    const std::string label = fmt::format("{}", fmt::join(values, ", "));
+    const std::string label =
+        Joined(keys, ", ", [&](const std::string& key) { return ValueText(row, key); });
     if (groups.empty() || groups.back().first != label) groups.push_back({label, {}});
     groups.back().second.push_back(row);
   }
@@ -340,17 +332,13 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   figure.x_label = ColumnOf(wanted.x, rows).header;
   figure.y_label = ColumnOf(wanted.y, rows).header;
   if (HaveChannels(group_keys) && groups.size() > kLegendRows) {
-    std::vector<Record> shown;
-    for (const auto& [label, members] : groups) {
-      shown.push_back(Only(group_keys, members.front()));
-    }
-    figure.legend = ChannelLegend(shown);
+    figure.legend = ChannelLegend(Mapped<Record>(
+        groups, [&](const Group& group) { return Only(group_keys, group.second.front()); }));
   }
   if (!group_keys.empty()) {
     figure.legend_title = fmt::format("curves by {}", fmt::join(group_keys, ", "));
   }
-  const Positions x(rows, wanted.x);
-  figure.x_ticks = x.categories();
+  figure.x_ticks = TextsOf(rows, wanted.x);
   const bool is_series = IsSeries(rows[0], wanted.x);
   std::vector<std::string> telling(kCaseKeys.begin(), kCaseKeys.end());
   for (const TableColumn& parameter : WithParameters({}, rows)) telling.push_back(parameter.key);
@@ -363,7 +351,7 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
       figure.curves.push_back(
           CurveOverTime(members[i], wanted.x, wanted.y, i == 0 ? label : "", style));
     }
-    if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, x, label, g));
+    if (!is_series) figure.curves.push_back(ValueCurve(members, wanted, figure.x_ticks, label, g));
     for (const std::string& key : telling) {
       if (key != wanted.x && key != wanted.y && Varies(members, key)) mixed.insert(key);
     }
@@ -388,11 +376,6 @@ FreeFigureResult MakeFreeFigure(std::span<const Record> records, const FreeFigur
   }
   return result;
 }
-namespace {
-
-constexpr int kFinest = 4096;  ///< cells of an axis: finer than any screen
-
-}  // namespace
 
 DistinctPoints::DistinctPoints(const FreeFigure& wanted, std::size_t most)
     : axes_{wanted.x, wanted.y}, group_(KeysIn(wanted.group)), most_(most) {
@@ -406,8 +389,7 @@ void DistinctPoints::Add(const Record& record) {
   Record slim;
   for (const auto& [key, value] : record.items()) {
     // keys without a measure are parameters, which labels and remarks contain
-    const bool is_shown = std::ranges::find(keys_, key) != keys_.end() || !FindMeasure(key);
-    if (!is_shown) continue;
+    if (!Contains(keys_, key) && FindMeasure(key)) continue;
     if (std::holds_alternative<std::vector<double>>(value)) {
       throw ConfigError(
           fmt::format("{}: found a series, expected single values of more than {} "
@@ -441,6 +423,7 @@ std::string DistinctPoints::KeyOf(const Record& record) const {
 }
 
 void DistinctPoints::Coarsen() {
+  constexpr int kFinest = 4096;  // cells of an axis: finer than any screen
   parts_ = parts_ == 0 ? kFinest : parts_ / 2;
   if (parts_ == 0) {
     throw ConfigError(

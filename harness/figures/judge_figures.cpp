@@ -168,32 +168,30 @@ class MapPainter {
       x += width;
       return at;
     };
-    const auto words = [&](const std::string& text) { Text(text, place(text, 0.0), y, "left"); };
+    const auto add = [&](const std::string& text, double sample, const auto& draw) {
+      const double at = place(text, sample);
+      draw(at);
+      Text(text, at + sample, y, "left");
+    };
+    const auto words = [&](const std::string& text) { add(text, 0.0, [](double) {}); };
+    const auto sign = [&](CellState state, bool hollow, const std::string& text) {
+      add(text, 12.0, [&](double at) { Draw(GlyphOf(state), hollow, at + 5.0, y, "#000000"); });
+    };
     words("rows of the extreme that hold:");
     constexpr const char* kShares[] = {"all", "3/4 and more", "1/2", "1/4", "fewer", "none"};
     for (std::size_t shade = 0; shade < kShades.size(); ++shade) {
-      const double at = place(kShares[shade], 13.0);
-      Shade(at, y - 4.0, 10.0, 8.0, shade);
-      Text(kShares[shade], at + 13.0, y, "left");
+      add(kShares[shade], 13.0, [&](double at) { Shade(at, y - 4.0, 10.0, 8.0, shade); });
     }
     x = left;
     y -= kLineHeight;
     words("the worst of them:");
     for (const CellState state : kCellStates) {
       const bool occurs = std::ranges::any_of(groups_, [state](const FoldedGroup& group) {
-        return std::ranges::find(group.cells, state, &FoldedCell::worst) != group.cells.end();
+        return Contains(group.cells, state, &FoldedCell::worst);
       });
-      if (!occurs) continue;
-      const Glyph glyph = GlyphOf(state);
-      const double at = place(glyph.meaning, 12.0);
-      Draw(glyph, false, at + 5.0, y, "#000000");
-      Text(glyph.meaning, at + 12.0, y, "left");
+      if (occurs) sign(state, false, GlyphOf(state).meaning);
     }
-    if (warnings_) {
-      const double at = place("holds, with warnings", 12.0);
-      Draw(GlyphOf(CellState::kHolds), true, at + 5.0, y, "#000000");
-      Text("holds, with warnings", at + 12.0, y, "left");
-    }
+    if (warnings_) sign(CellState::kHolds, true, "holds, with warnings");
     if (framed_) words("frame: must hold and does not");
   }
 
@@ -205,11 +203,6 @@ class MapPainter {
   bool framed_ = false, warnings_ = false;
   std::string commands_;
 };
-
-/// Ranks states to select the worst; states that are not applicable have no effect.
-int Severity(CellState state) {
-  return state == CellState::kNotApplicable ? -1 : static_cast<int>(state);
-}
 
 }  // namespace
 
@@ -232,14 +225,15 @@ std::vector<FoldedGroup> Folded(const RobustnessMap& map) {
     const MapGroup& rules = map.rules.groups[g];
     FoldedGroup& group = groups.emplace_back();
     group.label = rules.short_label.empty() ? rules.label : rules.short_label;
-    group.rows = map.cells[g].size();
     group.cells.resize(map.rules.columns.size());
     for (const std::vector<MapCell>& row : map.cells[g]) {
       for (std::size_t c = 0; c < row.size(); ++c) {
         FoldedCell& folded = group.cells[c];
         const MapCell& cell = row[c];
-        if (Severity(cell.state) > Severity(folded.worst)) folded.worst = cell.state;
-        folded.judged += cell.state == CellState::kNotApplicable ? 0 : 1;
+        if (cell.state != CellState::kNotApplicable) {
+          folded.worst = folded.judged == 0 ? cell.state : std::max(folded.worst, cell.state);
+          ++folded.judged;
+        }
         folded.holding += cell.state == CellState::kHolds ? 1 : 0;
         folded.with_warnings = folded.with_warnings || HoldsWithWarnings(cell);
         folded.fails_demand =
@@ -279,9 +273,7 @@ std::map<std::string, Rows> RowsBy(std::span<const char* const> keys, const Rows
 }
 
 std::vector<Record> RecordsOf(const Rows& rows) {
-  std::vector<Record> records;
-  for (const WorkPrecisionRow* row : rows) records.push_back(row->record);
-  return records;
+  return Mapped<Record>(rows, &WorkPrecisionRow::record);
 }
 
 Rows RowsWith(const WorkPrecisionProblem& problem, const std::string& integrator) {
@@ -291,10 +283,6 @@ Rows RowsWith(const WorkPrecisionProblem& problem, const std::string& integrator
     if (is_one) rows.push_back(&row);
   }
   return rows;
-}
-
-bool IsFlagged(const WorkPrecisionRow& row) {
-  return !HasFailed(row.record) && !row.record.Text("warnings").empty();
 }
 
 /// Draws runs as marks of `sound`: error over `x`, hollow with warnings. Failed runs are crosses
@@ -315,7 +303,7 @@ void AddRuns(const Rows& rows, X x, Curve sound, Figure* figure) {
       sound.crosses.emplace_back(at, kNowhere);
       continue;
     }
-    Curve& curve = IsFlagged(*row) ? flagged : sound;
+    Curve& curve = row->record.Text("warnings").empty() ? sound : flagged;
     curve.x.push_back(at);
     curve.y.push_back(row->error);
   }
@@ -340,6 +328,16 @@ void AddBest(const Rows& rows, Figure* figure) {
     best.y.push_back(row->error);
   }
   if (best.x.size() > 1) figure->curves.push_back(std::move(best));
+}
+
+/// Makes a figure of the error on logarithmic axes.
+Figure ErrorFigure(const std::string& title, const std::string& x_label,
+                   const WorkPrecision& work_precision) {
+  return {.title = title,
+          .x_label = x_label,
+          .y_label = WithUnit(work_precision.error, work_precision.error),
+          .log_x = true,
+          .log_y = true};
 }
 
 /// Makes a legend row for a line with its own meaning.
@@ -416,11 +414,8 @@ std::string Slug(const std::string& text) {
 
 Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
                            const WorkPrecisionProblem& problem) {
-  Figure figure{.title = problem.name + ": error against cost",
-                .x_label = WithUnit(work_precision.cost, work_precision.cost),
-                .y_label = WithUnit(work_precision.error, work_precision.error),
-                .log_x = true,
-                .log_y = true};
+  Figure figure = ErrorFigure(problem.name + ": error against cost",
+                              WithUnit(work_precision.cost, work_precision.cost), work_precision);
   const Rows rows = RowsWith(problem, "");
   const std::vector<Record> records = RecordsOf(rows);
   figure.legend = ChannelLegend(records);
@@ -438,12 +433,9 @@ Figure WorkPrecisionFigure(const WorkPrecision& work_precision,
 
 Figure ToleranceFigure(const WorkPrecision& work_precision, const WorkPrecisionProblem& problem,
                        const std::string& integrator) {
-  Figure figure{
-      .title = fmt::format("{}, {}: is the tolerance honoured?", problem.name, integrator),
-      .x_label = "tolerance",
-      .y_label = WithUnit(work_precision.error, work_precision.error),
-      .log_x = true,
-      .log_y = true};
+  Figure figure =
+      ErrorFigure(fmt::format("{}, {}: is the tolerance honoured?", problem.name, integrator),
+                  "tolerance", work_precision);
   Rows rows = RowsWith(problem, integrator);
   std::erase_if(rows,
                 [](const WorkPrecisionRow* row) { return std::isnan(row->record.Number("rtol")); });
@@ -520,12 +512,9 @@ double Slope(const Curve& curve) {
 /// observed orders, or over the cost.
 Figure IntegratorsFigure(const WorkPrecision& work_precision, const std::string& title,
                          const Rows& rows, bool over_step) {
-  Figure figure{
-      .title = title,
-      .x_label = over_step ? "step [s]" : WithUnit(work_precision.cost, work_precision.cost),
-      .y_label = WithUnit(work_precision.error, work_precision.error),
-      .log_x = true,
-      .log_y = true};
+  Figure figure = ErrorFigure(
+      title, over_step ? "step [s]" : WithUnit(work_precision.cost, work_precision.cost),
+      work_precision);
   constexpr const char* kIntegrator[] = {"integrator"};
   for (auto& [name, own] : RowsBy(kIntegrator, rows)) {
     const std::string label = own.front()->record.Text("integrator");
@@ -566,13 +555,11 @@ std::vector<NamedFigure> WorkPrecisionFigures(const WorkPrecision& work_precisio
     for (const auto& [name, rows] : RowsBy(kChannelKeys, RowsWith(problem, ""))) {
       const std::string what =
           fmt::format("{}, {}", problem.name, MethodLabel(rows.front()->record, all));
-      Rows fixed = rows;
-      std::erase_if(
-          fixed, [](const WorkPrecisionRow* row) { return !(row->record.Number("step") > 0.0); });
       // a curve joins runs of one kind: at tolerances, or else at fixed steps
-      Rows adaptive = rows;
-      std::erase_if(adaptive,
-                    [](const WorkPrecisionRow* row) { return row->record.Number("step") > 0.0; });
+      Rows fixed, adaptive;
+      for (const WorkPrecisionRow* row : rows) {
+        (row->record.Number("step") > 0.0 ? fixed : adaptive).push_back(row);
+      }
       if (several) {
         add("integrators-", what,
             IntegratorsFigure(work_precision, what, adaptive.empty() ? fixed : adaptive, false));

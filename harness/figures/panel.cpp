@@ -1,3 +1,4 @@
+// Figures and their legends, drawn by gnuplot.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -85,7 +86,34 @@ std::optional<std::string> DrawWithGnuplot(const std::filesystem::path& path,
   WriteFileAtomically(path, pdf ? run.output : InMillimetres(run.output, page));
   return std::nullopt;
 }
+
+double WidthOfPage(FigureSize size) {
+  return std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
+}
+
+std::string LineLook(const CurveStyle& style) {
+  // [pt]; gnuplot multiplies them by half the line width
+  constexpr std::array<std::array<double, 6>, kDashes> kPatterns = {
+      {{}, {6, 2.5}, {1.2, 1.8}, {6, 2, 1.2, 2}, {6, 2, 1.2, 2, 1.2, 2}, {3, 2}}};
+  std::string lengths;
+  for (const double length : kPatterns[style.dash % kDashes]) {
+    if (length == 0.0) continue;
+    lengths += fmt::format("{}{:.3g}", lengths.empty() ? "" : ",", 2.0 * length / style.width);
+  }
+  return fmt::format("lc rgb '{}' dt {} lw {:.4g}", style.color,
+                     lengths.empty() ? "solid" : "(" + lengths + ")", style.width);
+}
+
 namespace {
+
+constexpr const char* kCrossLook = "pt 2 ps 0.45 lw 1.2";
+
+/// Returns gnuplot's "pt ... ps ... lc ..." of the marks of a curve.
+std::string MarkLook(const CurveStyle& style) {
+  constexpr std::array kOpen = {6, 6, 8, 4, 12, 10};  // in the order of Shape; filled is the next
+  const int open = kOpen[static_cast<std::size_t>(style.shape)];
+  return fmt::format("pt {} ps 0.4 lw 1 lc rgb '{}'", style.flagged ? open : open + 1, style.color);
+}
 
 constexpr double kSample = 17.0, kSampleGap = 4.0, kItemGap = 10.0;  // [pt]
 
@@ -135,52 +163,22 @@ std::vector<LegendRow> Broken(const LegendRow& items, double width) {
   return rows;
 }
 
-void Append(std::vector<LegendRow> rows, std::vector<LegendRow>* all) {
-  for (LegendRow& row : rows) all->push_back(std::move(row));
+void Append(const std::vector<LegendRow>& rows, std::vector<LegendRow>* all) {
+  all->insert(all->end(), rows.begin(), rows.end());
 }
 
-}  // namespace
+struct Legend {
+  std::vector<LegendRow> rows;
+  std::size_t letters = 0;  ///< listed curves that stand for several
+};
 
-std::string LineLook(const CurveStyle& style) {
-  // [pt]; gnuplot multiplies them by half the line width
-  constexpr std::array<std::array<double, 6>, kDashes> kPatterns = {
-      {{}, {6, 2.5}, {1.2, 1.8}, {6, 2, 1.2, 2}, {6, 2, 1.2, 2, 1.2, 2}, {3, 2}}};
-  std::string lengths;
-  for (const double length : kPatterns[style.dash % kDashes]) {
-    if (length == 0.0) continue;
-    lengths += fmt::format("{}{:.3g}", lengths.empty() ? "" : ",", 2.0 * length / style.width);
-  }
-  return fmt::format("lc rgb '{}' dt {} lw {:.4g}", style.color,
-                     lengths.empty() ? "solid" : "(" + lengths + ")", style.width);
-}
-
-std::string MarkLook(const CurveStyle& style) {
-  constexpr std::array kOpen = {6, 6, 8, 4, 12, 10};  // in the order of Shape; filled is the next
-  const int open = kOpen[static_cast<std::size_t>(style.shape)];
-  return fmt::format("pt {} ps 0.4 lw 1 lc rgb '{}'", style.flagged ? open : open + 1, style.color);
-}
-
-bool NamesAtEnds(const Figure& figure, const std::vector<Curve>& merged) {
-  const auto named = std::ranges::count_if(
-      merged, [](const Curve& curve) { return !curve.label.empty() && curve.merges; });
-  return figure.legend.empty() &&
-         (figure.names_at_ends || named > static_cast<std::ptrdiff_t>(kLegendRows));
-}
-
-std::vector<std::string> EndTexts(const Figure& figure, const std::vector<Curve>& merged,
-                                  bool names, std::size_t letters) {
-  std::vector<std::string> texts;
-  std::size_t next = 0;
-  for (const Curve& curve : merged) {
-    std::string text = names && curve.merges ? curve.label : "";
-    if (!figure.legend.empty() && curve.several && next++ < letters) text = LetterOf(next - 1);
-    if (!curve.remark.empty()) text += (text.empty() ? "" : " ") + curve.remark;
-    texts.push_back(text);
-  }
-  return texts;
-}
-
-Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSize size,
+/// Makes the legend of a figure with the curves `merged`. First come its own rows, or else the
+/// labels of the curves; with `names` these stand at the ends of the curves. Then follow the
+/// meaning of hollow marks, crosses and question marks, with `failures`, remarks on crosses without
+/// a curve. Last is a list of the curves that stand for several, by the letters at their ends. Rows
+/// are broken at the page width. In one column the list ends in "…" if the legend would exceed
+/// kLegendRows.
+Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, bool names, FigureSize size,
                 const std::vector<std::string>& failures) {
   const double width = WidthOfPage(size) - 16.0;
   std::vector<LegendRow> rows;
@@ -193,14 +191,11 @@ Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSi
   }
   LegendRow named;
   std::vector<std::string> several;
-  const bool at_ends = NamesAtEnds(figure, merged);
   for (const Curve& curve : merged) {
     if (curve.label.empty()) continue;
     if (!figure.legend.empty()) {
-      if (curve.several) {
-        several.push_back(LetterOf(several.size()) + ": " + curve.label);
-      }
-    } else if (!at_ends || !curve.merges) {
+      if (curve.several) several.push_back(LetterOf(several.size()) + ": " + curve.label);
+    } else if (!names || !curve.merges) {
       named.push_back({curve.label, curve.style, curve.line || !curve.points});
     }
   }
@@ -221,6 +216,7 @@ Legend LegendOf(const Figure& figure, const std::vector<Curve>& merged, FigureSi
   return {std::move(rows), letters};
 }
 
+/// Draws rows below `top` [pt from the lower edge of the page].
 std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& page, double top) {
   // gnuplot 5.4 draws all SVG lines of one colour and width with the dashes of the first: widths
   // differ by a thousandth
@@ -249,7 +245,6 @@ std::string DrawLegend(const std::vector<LegendRow>& rows, const GnuplotPage& pa
   }
   return commands;
 }
-namespace {
 
 std::string DataBlock(const std::string& name, const std::vector<Point>& points) {
   std::string block = fmt::format("${} << EOD\n", name);
@@ -362,70 +357,43 @@ std::vector<double> Spread(std::vector<double> wanted, double low, double high) 
   return wanted;
 }
 
-// Draws texts right of the panel, each with a thin line to the end of its curve.
-std::string EndLabels(const PlotArea& area, const std::vector<std::vector<Point>>& points,
-                      const std::vector<std::string>& texts, const GnuplotPage& page,
-                      const PanelPlace& place) {
-  constexpr double kLeader = 8.0;
-  const double height = place.top - place.bottom;
-  const std::size_t room = static_cast<std::size_t>(height / (0.9 * kLineHeight));
-  std::vector<std::size_t> shown;
-  std::vector<double> wanted;
-  std::size_t left_out = 0;
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    if (texts[i].empty() || points[i].empty()) continue;
-    if (shown.size() + 1 >= room) {
-      ++left_out;
-      continue;
-    }
-    shown.push_back(i);
-    wanted.push_back(place.bottom + height * area.y.Place(points[i].back().second));
-  }
-  const std::vector<double> heights =
-      Spread(wanted, place.bottom + (left_out > 0 ? kLineHeight : 0.0), place.top);
-  std::string commands;
-  for (std::size_t k = 0; k < shown.size(); ++k) {
-    const Point& end = points[shown[k]].back();
-    commands += TextAt(page, texts[shown[k]], place.right + kLeader + 2.0, heights[k], "left");
-    commands += fmt::format(
-        "set arrow from first {:.6g}, first {:.6g} to screen {:.5f}, screen {:.5f} nohead "
-        "lc rgb '#808080' dt solid lw 0.4\n",
-        end.first, end.second, (place.right + kLeader) / page.width, heights[k] / page.height);
-  }
-  if (left_out > 0) {
-    commands += TextAt(page, fmt::format("and {} more", left_out), place.right + kLeader,
-                       place.bottom, "left");
-  }
-  return commands;
-}
-
-}  // namespace
-
-double WidthOfPage(FigureSize size) {
-  return std::round(PointsOf(size == FigureSize::kOneColumn ? 85.0 : 178.0));
-}
+/// Position of a panel on the page [pt from the lower left corner].
+struct PanelPlace {
+  double left = 0.0, right = 0.0, bottom = 0.0, top = 0.0;
+};
 
 double HeightOfPanel(FigureSize size, std::size_t panels) {
   const double alone = size == FigureSize::kOneColumn ? 135.0 : 200.0;
   return panels == 1 ? alone : 0.7 * alone;
 }
 
+/// Returns the points that the axes can show.
+std::vector<Point> Drawable(const Axis& x, const Axis& y, const Curve& curve) {
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
+    if (x.CanShow(curve.x[i]) && y.CanShow(curve.y[i])) points.emplace_back(curve.x[i], curve.y[i]);
+  }
+  return points;
+}
+
+/// Returns the points of a curve that are drawn.
+std::vector<Point> DrawnPoints(const PlotArea& area, const Curve& curve) {
+  const std::vector<Point> all = Drawable(area.x, area.y, curve);
+  return curve.line ? Decimated(area, all) : all;
+}
+
+/// Axes of a panel and its approximate size.
 PlotArea AreaOf(const Figure& panel, FigureSize size) {
   AxisRange x(panel.log_x), y(panel.log_y);
+  const auto include = [&](const Point& point) {
+    x.Include(point.first);
+    y.Include(point.second);
+  };
   for (const Curve& curve : panel.curves) {
-    for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
-      if (!Axis{.logarithmic = panel.log_x}.CanShow(curve.x[i]) ||
-          !Axis{.logarithmic = panel.log_y}.CanShow(curve.y[i])) {
-        continue;
-      }
-      x.Include(curve.x[i]);
-      y.Include(curve.y[i]);
-    }
+    std::ranges::for_each(
+        Drawable({.logarithmic = panel.log_x}, {.logarithmic = panel.log_y}, curve), include);
     if (curve.ends_early && !curve.x.empty()) x.Include(curve.x.back());
-    for (const Point& cross : curve.crosses) {
-      x.Include(cross.first);
-      y.Include(cross.second);
-    }
+    std::ranges::for_each(curve.crosses, include);
   }
   const bool has_points = std::ranges::any_of(
       panel.curves, [](const Curve& curve) { return curve.points || !curve.crosses.empty(); });
@@ -439,25 +407,97 @@ PlotArea AreaOf(const Figure& panel, FigureSize size) {
   return area;
 }
 
-std::vector<Point> Drawable(const PlotArea& area, const Curve& curve) {
-  std::vector<Point> points;
-  for (std::size_t i = 0; i < std::min(curve.x.size(), curve.y.size()); ++i) {
-    const Point point{curve.x[i], curve.y[i]};
-    if (area.CanShow(point)) points.push_back(point);
-  }
-  return points;
-}
-
+/// Width [pt] of the labels of the vertical axis.
 double WidthOfLabels(const PlotArea& area) {
   double widest = 0.0;
   for (const Tick& tick : Ticks(area.y, 6)) widest = std::max(widest, WidthOf(tick.label));
   return widest;
 }
 
-std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
-                        const std::vector<std::string>& texts, const PlotArea& area,
-                        const GnuplotPage& page, const PanelPlace& place, const std::string& name,
-                        bool has_x_labels) {
+struct DrawnCurve {
+  Curve curve;
+  std::vector<Point> points = {};
+  std::string text = "";  ///< at its end
+};
+
+/// Panel with the properties taken from its figure.
+struct Panel {
+  Figure figure;
+  PlotArea area;
+  std::vector<DrawnCurve> drawn;
+};
+
+std::vector<Panel> PanelsOf(const Figure& figure, FigureSize size) {
+  std::vector<Panel> panels;
+  AxisRange x(figure.log_x);  // one axis for all panels
+  const auto add = [&](Figure own) {
+    own.log_x = figure.log_x;
+    own.x_ticks = figure.x_ticks;
+    panels.push_back({own, AreaOf(own, size),
+                      Mapped<DrawnCurve>(MergedCurves(own, size),
+                                         [](const Curve& curve) { return DrawnCurve{curve}; })});
+    x.Include(panels.back().area.x.low);
+    x.Include(panels.back().area.x.high);
+  };
+  add(figure);
+  for (const Figure& below : figure.below) add(below);
+  for (Panel& panel : panels) {
+    if (figure.x_ticks.empty()) panel.area.x = x.WithMargin(0.0);
+    for (DrawnCurve& one : panel.drawn) one.points = DrawnPoints(panel.area, one.curve);
+  }
+  return panels;
+}
+
+/// True if curves are named at their ends instead of in the legend.
+bool NamesAtEnds(const Figure& figure, const Panel& panel) {
+  const auto named = std::ranges::count_if(panel.drawn, [](const DrawnCurve& one) {
+    return !one.curve.label.empty() && one.curve.merges;
+  });
+  return figure.legend.empty() &&
+         (figure.names_at_ends || named > static_cast<std::ptrdiff_t>(kLegendRows));
+}
+
+// Draws texts right of the panel, each with a thin line to the end of its curve.
+std::string EndLabels(const Panel& panel, const GnuplotPage& page, const PanelPlace& place) {
+  constexpr double kLeader = 8.0;
+  const double height = place.top - place.bottom;
+  const std::size_t room = static_cast<std::size_t>(height / (0.9 * kLineHeight));
+  std::vector<const DrawnCurve*> shown;
+  std::vector<double> wanted;
+  std::size_t left_out = 0;
+  for (const DrawnCurve& one : panel.drawn) {
+    if (one.text.empty()) continue;
+    if (shown.size() + 1 >= room) {
+      ++left_out;
+      continue;
+    }
+    shown.push_back(&one);
+    wanted.push_back(place.bottom + height * panel.area.y.Place(one.points.back().second));
+  }
+  const std::vector<double> heights =
+      Spread(wanted, place.bottom + (left_out > 0 ? kLineHeight : 0.0), place.top);
+  std::string commands;
+  for (std::size_t k = 0; k < shown.size(); ++k) {
+    const Point& end = shown[k]->points.back();
+    commands += TextAt(page, shown[k]->text, place.right + kLeader + 2.0, heights[k], "left");
+    commands += fmt::format(
+        "set arrow from first {:.6g}, first {:.6g} to screen {:.5f}, screen {:.5f} nohead "
+        "lc rgb '#808080' dt solid lw 0.4\n",
+        end.first, end.second, (place.right + kLeader) / page.width, heights[k] / page.height);
+  }
+  if (left_out > 0) {
+    commands += TextAt(page, fmt::format("and {} more", left_out), place.right + kLeader,
+                       place.bottom, "left");
+  }
+  return commands;
+}
+
+/// Returns commands that draw a panel, the last one "plot"; labels set before belong to it. Data
+/// names begin with `name`.
+std::string PanelScript(const Panel& panel, const GnuplotPage& page, const PanelPlace& place,
+                        const std::string& name, bool has_x_labels) {
+  const PlotArea& area = panel.area;
+  const std::vector<std::string>& names = panel.figure.x_ticks;
   const int most = page.width < 300.0 ? 4 : 7;
   std::string script = fmt::format(
       "set lmargin at screen {:.5f}\nset rmargin at screen {:.5f}\nset bmargin at screen {:.5f}\n"
@@ -469,32 +509,31 @@ std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
   if (area.y.logarithmic) script += "set logscale y\n";
   script += fmt::format("set xrange [{:.10g}:{:.10g}]\nset yrange [{:.10g}:{:.10g}]\n", area.x.low,
                         area.x.high, area.y.low, area.y.high);
-  script += TicksCommand(
-      'x', panel.x_ticks.empty() ? Ticks(area.x, most) : NamedTicks(panel.x_ticks), has_x_labels);
-  script += TicksCommand('y', Ticks(area.y, 6), true);
   script +=
-      TextAt(page, panel.y_label, 7.0, 0.5 * (place.bottom + place.top), "center rotate by 90");
+      TicksCommand('x', names.empty() ? Ticks(area.x, most) : NamedTicks(names), has_x_labels);
+  script += TicksCommand('y', Ticks(area.y, 6), true);
+  script += TextAt(page, panel.figure.y_label, 7.0, 0.5 * (place.bottom + place.top),
+                   "center rotate by 90");
   std::string plot;
   const auto add = [&plot](const std::string& element) {
     if (!element.empty()) plot += (plot.empty() ? "plot " : ", \\\n  ") + element;
   };
-  std::vector<std::vector<Point>> points;
   Crosses crosses(area);
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    const Curve& curve = curves[i];
-    const std::vector<Point> all = Drawable(area, curve);
-    points.push_back(curve.line ? Decimated(area, all) : all);
-    const std::vector<Point>& own = points.back();
+  for (std::size_t i = 0; i < panel.drawn.size(); ++i) {
+    const auto& [curve, own, text] = panel.drawn[i];
     script += crosses.Of(curve);
     if (own.empty()) continue;
+    const auto add_marks = [&](const char* suffix, const CurveStyle& style) {
+      add(fmt::format("${}{}{} with points {} notitle", name, i, suffix, MarkLook(style)));
+    };
     script += DataBlock(fmt::format("{}{}", name, i), own);
     if (curve.line) add(fmt::format("${}{} with lines {} notitle", name, i, LineLook(curve.style)));
     const bool marked = curve.style.shape != Shape::kNone || curve.style.flagged || curve.points;
     if (curve.points) {
-      add(fmt::format("${}{} with points {} notitle", name, i, MarkLook(curve.style)));
+      add_marks("", curve.style);
     } else if (marked) {
-      script += DataBlock(fmt::format("{}{}m", name, i), Marks(area, own, i, curves.size()));
-      add(fmt::format("${}{}m with points {} notitle", name, i, MarkLook(curve.style)));
+      script += DataBlock(fmt::format("{}{}m", name, i), Marks(area, own, i, panel.drawn.size()));
+      add_marks("m", curve.style);
     }
     if (!curve.hollow.empty()) {
       // white marks first, over the curve's own marks
@@ -502,16 +541,150 @@ std::string PanelScript(const Figure& panel, const std::vector<Curve>& curves,
       inner.color = "#ffffff";
       outer.flagged = true;
       script += DataBlock(fmt::format("{}{}h", name, i), curve.hollow);
-      for (const CurveStyle& style : {inner, outer}) {
-        add(fmt::format("${}{}h with points {} notitle", name, i, MarkLook(style)));
-      }
+      add_marks("h", inner);
+      add_marks("h", outer);
     }
     if (curve.guide && area.x.logarithmic && area.y.logarithmic) {
       add(GuideElement(*curve.guide, own));
     }
   }
   if (plot.empty()) add("NaN notitle");
-  return script + EndLabels(area, points, texts, page, place) + plot + '\n';
+  return script + EndLabels(panel, page, place) + plot + '\n';
+}
+
+bool MayMerge(const Curve& curve) {
+  return curve.merges && !curve.label.empty() && !curve.ends_early;
+}
+
+/// Keeps the style of `one` where `other` has the same, else black, solid, unmarked.
+void KeepCommon(const CurveStyle& other, CurveStyle* one) {
+  const CurveStyle several;
+  if (one->color != other.color) one->color = several.color;
+  if (one->dash != other.dash) one->dash = several.dash;
+  if (one->shape != other.shape) one->shape = several.shape;
+  one->width = std::max(one->width, other.width);
+}
+
+}  // namespace
+
+std::vector<Curve> MergedCurves(const Figure& panel, FigureSize size) {
+  const PlotArea area = AreaOf(panel, size);
+  struct Group {
+    Curve curve;
+    std::vector<Point> points;
+    std::vector<std::string> labels;
+  };
+  std::vector<Group> groups;
+  std::vector<Curve> failures;  // they keep the colour of their curves
+  std::vector<std::string> all;
+  for (Curve curve : panel.curves) {
+    if (curve.merges && !curve.label.empty()) all.push_back(curve.label);
+    const std::vector<Point> points = DrawnPoints(area, curve);
+    const auto same = std::ranges::find_if(groups, [&](const Group& group) {
+      return MayMerge(curve) && MayMerge(group.curve) && curve.line == group.curve.line &&
+             curve.style.flagged == group.curve.style.flagged &&
+             Coincide(area, points, group.points, curve.line);
+    });
+    if (same == groups.end()) {
+      groups.push_back({curve, points, {curve.label}});
+      continue;
+    }
+    Curve& merged = same->curve;
+    AddOnce(same->labels, curve.label);
+    for (Curve* one : {&merged, &curve}) {
+      if (one->crosses.empty()) continue;
+      failures.push_back({.style = one->style, .merges = false});
+      failures.back().crosses.swap(one->crosses);
+    }
+    merged.hollow.insert(merged.hollow.end(), curve.hollow.begin(), curve.hollow.end());
+    KeepCommon(curve.style, &merged.style);
+    if (merged.remark.ends_with('?') && !curve.remark.ends_with('?')) {
+      merged.remark = curve.remark;  // the resolved one
+      merged.guide = curve.guide;
+    }
+  }
+  std::vector<Curve> drawn;
+  for (Group& group : groups) {
+    group.curve.several = group.labels.size() > 1;
+    if (group.curve.several) group.curve.label = LabelOfSeveral(group.labels, all);
+    drawn.push_back(std::move(group.curve));
+  }
+  drawn.insert(drawn.end(), failures.begin(), failures.end());
+  return drawn;
+}
+
+FigureScript GnuplotScript(const Figure& figure, FigureSize size) {
+  std::vector<Panel> panels = PanelsOf(figure, size);
+  GnuplotPage page{.width = WidthOfPage(size)};
+  FigureScript script;
+  std::vector<Curve> all;
+  std::vector<std::string> failures;  // of runs without a curve
+  bool names = false;
+  for (const Panel& panel : panels) {
+    names = names || NamesAtEnds(figure, panel);
+    for (const auto& [curve, points, text] : panel.drawn) {
+      all.push_back(curve);
+      script.is_empty = script.is_empty && points.empty() && curve.crosses.empty();
+      const bool is_cross = points.empty() && curve.ends_early;
+      if (is_cross && !curve.remark.empty()) AddOnce(failures, curve.remark);
+    }
+  }
+  const Legend legend = LegendOf(figure, all, names, size, failures);
+  double labels = 0.0, ends = 0.0;
+  std::size_t next = 0;
+  for (Panel& panel : panels) {
+    labels = std::max(labels, WidthOfLabels(panel.area));
+    for (auto& [curve, points, text] : panel.drawn) {
+      // its letter in the legend or its name, and its remark
+      const bool has_letter = !figure.legend.empty() && curve.several && next++ < legend.letters;
+      if (points.empty()) continue;
+      text = has_letter ? LetterOf(next - 1) : names && curve.merges ? curve.label : "";
+      if (!curve.remark.empty()) text += (text.empty() ? "" : " ") + curve.remark;
+      ends = std::max(ends, WidthOf(text));
+    }
+  }
+  std::vector<std::string> title;
+  if (!figure.title.empty()) {
+    title = Wrapped(figure.title, static_cast<std::size_t>((page.width - 16.0) / kLetterWidth));
+  }
+
+  const double line = kLineHeight, height = HeightOfPanel(size, panels.size());
+  constexpr double kEdge = 5.0, kGap = 8.0;
+  const double head = kEdge + line * static_cast<double>(title.size());
+  const double foot = 3.0 * line + kGap + line * static_cast<double>(legend.rows.size()) + kEdge;
+  const double count = static_cast<double>(panels.size());
+  page.height = std::round(head + count * (height + kGap) + foot);
+  script.height = page.height;
+  script.legend_rows = legend.rows.size();
+  std::string& commands = script.commands;
+  commands = "set encoding utf8\n";
+  double y = page.height - kEdge - 0.5 * line;
+  for (const std::string& words : title) {
+    commands += TextAt(page, words, 0.5 * page.width, y, "center");
+    y -= line;
+  }
+  commands += DrawLegend(legend.rows, page, foot - 3.0 * line - kGap);
+  commands += TextAt(page, figure.x_label, 0.5 * page.width, foot - 2.5 * line, "center");
+  if (panels.size() > 1) commands += "set multiplot\n";
+  PanelPlace place{.left = 16.0 + labels + 4.0,
+                   .right = page.width - (ends > 0.0 ? ends + 14.0 : 10.0),
+                   .top = page.height - head - kGap};
+  for (std::size_t i = 0; i < panels.size(); ++i) {
+    place.bottom = place.top - height;
+    if (i > 0) commands += "unset label\nunset arrow\nunset logscale\n";
+    commands += PanelScript(panels[i], page, place, std::string(1, static_cast<char>('c' + i)),
+                            i + 1 == panels.size());
+    place.top = place.bottom - kGap;
+  }
+  if (panels.size() > 1) commands += "unset multiplot\n";
+  return script;
+}
+
+std::optional<std::string> WriteFigure(const std::filesystem::path& path, const Figure& figure,
+                                       FigureSize size, const std::string& gnuplot) {
+  const FigureScript script = GnuplotScript(figure, size);
+  if (script.is_empty) return fmt::format("{}: no curve has a point to draw", path.string());
+  return DrawWithGnuplot(path, {WidthOfPage(size), script.height}, script.commands, gnuplot);
 }
 
 }  // namespace loopbench::harness

@@ -1,24 +1,12 @@
 // Reports: data, and their HTML page.
 #pragma once
 
-#include <cstddef>
-#include <filesystem>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
-
-#include "harness/base/record.h"
 #include "harness/figures/view.h"
 #include "harness/judge/judge.h"
-#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 
-// The data of a report: motions, curves, tables.
-
-// Decimation of curves that keeps their extremes.
+// Decimation of curves.
 
 /// Returns ascending indices of the points to keep: the first, the last, and the minimum and
 /// maximum of each of equal buckets in between. Keeps all points if there are at most `most` (at
@@ -28,10 +16,11 @@ std::vector<std::size_t> KeepExtremes(std::span<const double> values, std::size_
 /// Returns at most `most` (at least 2) of `count` indices, evenly spaced, with the first and last.
 std::vector<std::size_t> KeepEvenly(std::size_t count, std::size_t most);
 
-// Motions of the bodies of a store's problems, from stored trajectories and references. Nothing is
-// integrated here.
+// Data of the page of a store: computed from records, trajectories and references with the rules,
+// tables and texts of the other commands, and free of HTML. The page (web/report/) displays them
+// and evaluates nothing.
 
-/// The motion of one run or of a reference.
+/// The stored motion of one run or of a reference.
 struct ReportPath {
   std::string label = {};
   std::optional<std::size_t> row = {};  ///< row of the run; none for a reference
@@ -45,25 +34,8 @@ struct ReportProblem {
   std::string name = {};                ///< as in ReportTable::problems
   std::optional<Picture> picture = {};  ///< none: see `missing`
   std::vector<ReportPath> paths = {};
-  std::string missing =
-      {};  ///< reason for a missing motion, and the setting that stores it; or empty
+  std::string missing = {};  ///< reason for no motion, and the setting that stores it; or empty
 };
-
-/// Returns problems in the order of the rows, whose names and problems are given. `changed`
-/// receives the messages about files that have changed since their run.
-std::vector<ReportProblem> FindProblems(const std::vector<Record>& rows,
-                                        const std::vector<std::string>& names,
-                                        const std::vector<std::string>& problems,
-                                        const std::filesystem::path& store_file,
-                                        std::vector<std::string>* remarks,
-                                        std::vector<std::string>* changed);
-
-/// Maximum number of drawn problems of a report, of motions of a problem, and of body poses in all
-/// motions of a page.
-inline constexpr std::size_t kMaxProblems = 12, kMaxPaths = 60, kMaxPlaces = 120'000;
-
-// Data of the page of a store: computed from records with the rules, tables and texts of the other
-// commands, and free of HTML. The page (web/report/) displays them and evaluates nothing.
 
 /// A sentence of the page, a filter for its rows of the first table, and a command that prints its
 /// basis.
@@ -81,9 +53,8 @@ struct ReportTable {
   std::vector<TableColumn> columns = {};
   std::vector<std::string> alike = {};  ///< "solver: rank-revealing"
   std::vector<Record> rows = {};
-  std::vector<std::string> names = {};  ///< labels of the rows, from their distinguishing keys
-  std::vector<std::string> problems =
-      {};  ///< problems of the rows: mechanism, horizon and other problem keys
+  std::vector<std::string> names = {};     ///< labels of the rows, from their distinguishing keys
+  std::vector<std::string> problems = {};  ///< of the rows: mechanism, horizon and other keys
   std::string command = {};
 };
 
@@ -123,11 +94,9 @@ struct ReportData {
   std::optional<RobustnessMap> map = {};
   std::vector<ReportProblem> problems = {};
   std::vector<std::string> remarks = {};     ///< decimated or omitted data
-  std::vector<std::string> changed = {};     ///< files of the store that differ from the output of
-                                             ///< their run
-  std::vector<std::string> origins = {};     ///< origin of the records: machine, compiler, commit,
-                                             ///< ...
-  std::vector<std::string> provenance = {};  ///< origin of the page
+  std::vector<std::string> changed = {};     ///< messages about files changed since their run
+  std::vector<std::string> origins = {};     ///< of the records: machine, compiler, commit, ...
+  std::vector<std::string> provenance = {};  ///< of the page
   std::string map_command = {}, claims_command = {}, plot_command = {};
 };
 
@@ -144,15 +113,7 @@ struct ReportOptions {
 /// mechanisms and references next to the store.
 ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& options);
 
-// Time series of records as curves.
-
-/// Returns curves of drift, energy error and true error of the rows that have them. All curves
-/// share at most `most` points evenly and keep their extremes.
-std::vector<ReportPlot> MakePlots(const std::vector<Record>& rows, std::size_t most);
-
-// Writers of a report: JSON and an HTML page.
-
-// Report data as JSON for web/report/, safe inside an HTML element.
+// Writers of a report: JSON that is safe inside an HTML element, and a self-contained HTML page.
 
 /// A data element of the page, which is parsed when it is first displayed.
 struct DataElement {
@@ -163,8 +124,6 @@ struct DataElement {
 /// Returns "tables", "costs", "map", "problems" and one "curves-NAME" per plot. Tables have numbers
 /// with all digits, curves and poses with display precision.
 std::vector<DataElement> ToJson(const ReportData& data);
-
-// Report data as one self-contained HTML page: data, style and script are embedded.
 
 /// web/report/ after uPlot and its licence, embedded when the program is built. Empty in a program
 /// built without it (cmake -DLOOPBENCH_REPORT=OFF).

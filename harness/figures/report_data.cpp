@@ -1,20 +1,8 @@
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
 #include <numeric>
 #include <set>
-#include <stdexcept>
-#include <string_view>
 
-#include "harness/base/record.h"
 #include "harness/base/store.h"
-#include "harness/base/text.h"
 #include "harness/figures/report.h"
-#include "harness/judge/judge.h"
-#include "harness/judge/tables.h"
 #include "harness/observers/reference.h"
 #include "harness/observers/trajectory.h"
 #include "harness/suite/suite.h"
@@ -52,28 +40,27 @@ std::vector<std::size_t> KeepEvenly(std::size_t count, std::size_t most) {
   }
   return kept;
 }
+
 namespace {
 
-/// Returns the columns of the poses of all bodies except Ground.
-std::vector<PoseColumns> PosesIn(const TrajectoryReader& file, const MechanismDescription& user) {
-  std::vector<PoseColumns> columns;
-  for (std::size_t body = 1; body < user.bodies.size(); ++body) {
-    const auto found = FindPose(file.columns(), user.bodies[body].name);
-    if (!found) {
-      throw std::runtime_error("it has no pose of body " + user.bodies[body].name +
-                               " (\"bodies\" in \"output\" of the experiment)");
-    }
-    columns.push_back(*found);
-  }
-  return columns;
-}
+/// Maximum number of drawn problems of a report, of motions of a problem, and of body poses in all
+/// motions of a page.
+constexpr std::size_t kMaxProblems = 12, kMaxPaths = 60, kMaxPlaces = 120'000;
 
 /// Reads the poses of at most `most` displayed rows of a trajectory with `rows` rows in its record;
 /// memory does not grow with the file.
 ReportPath PathOf(const std::filesystem::path& path, const MechanismDescription& user,
                   std::size_t rows, std::size_t most) {
   TrajectoryReader file(path);
-  const std::vector<PoseColumns> columns = PosesIn(file, user);
+  std::vector<PoseColumns> columns;
+  for (std::size_t body = 1; body < user.bodies.size(); ++body) {
+    const auto pose = FindPose(file.columns(), user.bodies[body].name);
+    if (!pose) {
+      throw std::runtime_error("it has no pose of body " + user.bodies[body].name +
+                               " (\"bodies\" in \"output\" of the experiment)");
+    }
+    columns.push_back(*pose);
+  }
   const std::vector<std::size_t> wanted = KeepEvenly(rows, most);
   ReportPath found;
   std::vector<double> row;
@@ -117,30 +104,22 @@ struct Work {
   std::size_t most_places = 0;  ///< body poses in all motions of the problem
 };
 
-/// Returns the reference files of the rows, each once; rows may share a reference.
-std::vector<std::string> ReferencesOf(const Work& work) {
-  std::vector<std::string> ids;
-  for (const std::size_t row : work.rows) {
-    if (ReferenceOf(work.records[row], work.store_file).empty()) continue;
-    const std::string id = work.records[row].Text("reference_file");
-    if (std::ranges::find(ids, id) == ids.end()) ids.push_back(id);
-  }
-  return ids;
-}
-
 void AddPaths(const Work& work, const MechanismDescription& user, ReportProblem* problem,
               std::vector<std::string>* remarks, std::vector<std::string>* changed) {
   std::vector<std::size_t> with_file;
+  std::vector<std::string> references;
   for (const std::size_t row : work.rows) {
-    const auto path = TrajectoryOf(work.records[row], work.store_file);
+    const Record& record = work.records[row];
+    const auto path = TrajectoryOf(record, work.store_file);
     if (!path.empty() && std::filesystem::exists(path)) with_file.push_back(row);
+    if (ReferenceOf(record, work.store_file).empty()) continue;
+    AddOnce(references, record.Text("reference_file"));
   }
   if (with_file.size() > kMaxPaths) {
     remarks->push_back(fmt::format("{}: motions of the first {} of {} runs are in this page",
                                    problem->name, kMaxPaths, with_file.size()));
     with_file.resize(kMaxPaths);
   }
-  const std::vector<std::string> references = ReferencesOf(work);
   const std::size_t paths = std::max<std::size_t>(1, with_file.size() + references.size());
   const std::size_t most = work.most_places / (paths * user.bodies.size());
   const auto add = [&](ReportPath path, const std::string& label) {
@@ -211,21 +190,19 @@ void Fill(const Work& work, ReportProblem* problem, std::vector<std::string>* re
   }
 }
 
-}  // namespace
-
-std::vector<ReportProblem> FindProblems(const std::vector<Record>& rows,
-                                        const std::vector<std::string>& names,
-                                        const std::vector<std::string>& problems,
+/// Returns the problems of a table's rows, in their order.
+std::vector<ReportProblem> FindProblems(const ReportTable& table,
                                         const std::filesystem::path& store_file,
                                         std::vector<std::string>* remarks,
                                         std::vector<std::string>* changed) {
   std::vector<ReportProblem> found;
   std::vector<std::vector<std::size_t>> members;
-  for (std::size_t row = 0; row < rows.size(); ++row) {
-    auto at = static_cast<std::size_t>(
-        std::ranges::find(found, problems[row], &ReportProblem::name) - found.begin());
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    const std::string& name = table.problems[row];
+    auto at = static_cast<std::size_t>(std::ranges::find(found, name, &ReportProblem::name) -
+                                       found.begin());
     if (at == found.size()) {
-      found.push_back({.name = problems[row]});
+      found.push_back({.name = name});
       members.emplace_back();
     }
     members[at].push_back(row);
@@ -239,13 +216,11 @@ std::vector<ReportProblem> FindProblems(const std::vector<Record>& rows,
           kMaxProblems);
       continue;
     }
-    Fill({rows, names, store_file, members[i], kMaxPlaces / shown}, &found[i], remarks, changed);
+    Fill({table.rows, table.names, store_file, members[i], kMaxPlaces / shown}, &found[i], remarks,
+         changed);
   }
   return found;
 }
-namespace {
-
-constexpr std::size_t kRowsNamed = 5;
 
 /// Returns a command as typed in a shell, with quoting.
 std::string Typed(const std::vector<std::string>& words) {
@@ -306,8 +281,7 @@ void NameRows(ReportTable* table) {
   std::vector<std::string> telling = DistinguishingKeys(table->rows);
   const std::vector<std::string> of_problems = KeysOfProblems(table->rows, telling);
   std::erase_if(telling, [&](const std::string& key) {
-    return key == "mechanism" || key == "horizon" ||
-           std::ranges::find(of_problems, key) != of_problems.end();
+    return key == "mechanism" || key == "horizon" || Contains(of_problems, key);
   });
   std::map<std::string, std::string> ids;  // ids of problems, by name
   for (const Record& row : table->rows) {
@@ -348,6 +322,7 @@ std::vector<ReportTable> MakeTables(const std::vector<Record>& records, const st
 /// Returns a finding for each outcome other than "finished", and one for each warning note.
 std::vector<ReportFinding> FindingsOf(const ReportTable& table,
                                       const std::vector<std::string>& warnings) {
+  constexpr std::size_t kRowsNamed = 5;
   std::map<std::string, std::vector<std::size_t>> endings;
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
     if (HasFailed(table.rows[i])) endings[table.rows[i].Text("outcome")].push_back(i);
@@ -383,9 +358,7 @@ std::vector<ReportCost> MakeCosts(const std::vector<Record>& records, const std:
         records, [&](const Record& record) { return std::isfinite(record.Number(key)); });
     if (!is_there) continue;
     WorkPrecisionOptions options{.error = key};
-    for (const std::string& other : CaseKeysOf(records)) {
-      if (other == "config_hash") options.per.push_back(other);
-    }
+    if (Contains(CaseKeysOf(records), "config_hash")) options.per.push_back("config_hash");
     try {
       ReportCost cost{.work_precision = MakeWorkPrecision(records, options)};
       cost.error = ColumnOf(key, records).header;
@@ -415,47 +388,6 @@ std::vector<std::string> OriginsOf(const std::vector<Record>& records) {
   return lines;
 }
 
-void AddPlots(const ReportTable& table, const ReportOptions& options, ReportData* data) {
-  data->plots = MakePlots(table.rows, options.most_points);
-  for (const ReportPlot& plot : data->plots) {
-    if (plot.shown == plot.points) continue;
-    data->remarks.push_back(fmt::format(
-        "{} against time: {} of {} points of the store are in this page, of each of equal buckets "
-        "of a curve the least and the largest",
-        plot.title, plot.shown, plot.points));
-  }
-}
-
-}  // namespace
-
-ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& options) {
-  const std::string store = options.store.string();
-  ReportData data{.store = store, .tables = MakeTables(records, store)};
-  data.origins = OriginsOf(records);
-  data.warnings = NoiseWarnings(records);
-  data.plot_command = Typed({"plot", store, "--out", "figures"});
-  for (const ClaimRule& rule : options.claims) data.claims.push_back(Evaluate(rule, records));
-  data.claims_command = Typed(
-      {"check-claims", store, "--claims", options.claims_file.string(), "--out", "verdicts.md"});
-  if (options.rules) data.map = MakeRobustnessMap(*options.rules, records);
-  data.map_command = Typed({"robustness", store, "--rules", options.rules_file.string()});
-  if (data.tables.empty() || data.tables.front().kind != "drift") return data;
-  const ReportTable& runs = data.tables.front();
-  data.runs = runs.rows.size();
-  for (const Record& row : runs.rows) {
-    data.failed += HasFailed(row) ? 1 : 0;
-    data.flagged += IsFlagged(row, "outcome") ? 1 : 0;
-  }
-  data.warning_notes = WarningNotes(runs.rows, records);
-  data.findings = FindingsOf(runs, data.warning_notes);
-  AddPlots(runs, options, &data);
-  data.costs = MakeCosts(records, store, &data.remarks);
-  data.problems = FindProblems(runs.rows, runs.names, runs.problems, StoreFile(options.store),
-                               &data.remarks, &data.changed);
-  return data;
-}
-namespace {
-
 struct Quantity {
   const char *name, *title, *unit, *time_key, *key;
 };
@@ -464,8 +396,7 @@ constexpr Quantity kQuantities[] = {
     {"energy", "Error of the energy balance", "J", "series.energy_t", "series.energy_error"},
     {"error", "True error of points", "m", "series.error_t", "series.error"}};
 
-}  // namespace
-
+/// Returns curves of the rows that have them. All curves share at most `most` points evenly.
 std::vector<ReportPlot> MakePlots(const std::vector<Record>& rows, std::size_t most) {
   std::vector<ReportPlot> plots;
   std::size_t curves = 0;
@@ -496,6 +427,41 @@ std::vector<ReportPlot> MakePlots(const std::vector<Record>& rows, std::size_t m
     }
   }
   return plots;
+}
+
+}  // namespace
+
+ReportData MakeReport(const std::vector<Record>& records, const ReportOptions& options) {
+  const std::string store = options.store.string();
+  ReportData data{.store = store, .tables = MakeTables(records, store)};
+  data.origins = OriginsOf(records);
+  data.warnings = NoiseWarnings(records);
+  data.plot_command = Typed({"plot", store, "--out", "figures"});
+  for (const ClaimRule& rule : options.claims) data.claims.push_back(Evaluate(rule, records));
+  data.claims_command = Typed(
+      {"check-claims", store, "--claims", options.claims_file.string(), "--out", "verdicts.md"});
+  if (options.rules) data.map = MakeRobustnessMap(*options.rules, records);
+  data.map_command = Typed({"robustness", store, "--rules", options.rules_file.string()});
+  if (data.tables.empty() || data.tables.front().kind != "drift") return data;
+  const ReportTable& runs = data.tables.front();
+  data.runs = runs.rows.size();
+  for (const Record& row : runs.rows) {
+    data.failed += HasFailed(row) ? 1 : 0;
+    data.flagged += IsFlagged(row, "outcome") ? 1 : 0;
+  }
+  data.warning_notes = WarningNotes(runs.rows, records);
+  data.findings = FindingsOf(runs, data.warning_notes);
+  data.plots = MakePlots(runs.rows, options.most_points);
+  for (const ReportPlot& plot : data.plots) {
+    if (plot.shown == plot.points) continue;
+    data.remarks.push_back(fmt::format(
+        "{} against time: {} of {} points of the store are in this page, of each of equal buckets "
+        "of a curve the least and the largest",
+        plot.title, plot.shown, plot.points));
+  }
+  data.costs = MakeCosts(records, store, &data.remarks);
+  data.problems = FindProblems(runs, StoreFile(options.store), &data.remarks, &data.changed);
+  return data;
 }
 
 }  // namespace loopbench::harness

@@ -1,17 +1,5 @@
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
-#include <utility>
-
-#include "harness/base/text.h"
 #include "harness/config/formulations.h"
 #include "harness/figures/report.h"
-#include "harness/figures/view.h"
-#include "harness/judge/judge.h"
-#include "harness/judge/tables.h"
 
 namespace loopbench::harness {
 namespace {
@@ -84,15 +72,6 @@ std::string LooksText() {
                         ScriptString(name), number++);
   }
   return "{" + text + "}";
-}
-
-std::string WarningsText() {
-  return "{" +
-         Joined(MeaningsOfWarnings(), ",",
-                [](const auto& row) {
-                  return ScriptString(row.first) + ":" + ScriptString(row.second);
-                }) +
-         "}";
 }
 
 std::string CurvesText(const ReportPlot& plot) {
@@ -175,9 +154,12 @@ std::string ProblemText(const ReportProblem& problem) {
 }  // namespace
 
 std::vector<DataElement> ToJson(const ReportData& data) {
+  const std::string warnings = Joined(MeaningsOfWarnings(), ",", [](const auto& row) {
+    return ScriptString(row.first) + ":" + ScriptString(row.second);
+  });
   std::vector<DataElement> elements = {
-      {"tables", fmt::format(R"({{"looks":{},"warnings":{},"tables":{}}})", LooksText(),
-                             WarningsText(), ListOf(data.tables, TableText))},
+      {"tables", fmt::format(R"({{"looks":{},"warnings":{{{}}},"tables":{}}})", LooksText(),
+                             warnings, ListOf(data.tables, TableText))},
       {"problems", ListOf(data.problems, ProblemText)},
       {"costs", ListOf(data.costs, CostText)},
       {"plots", ListOf(data.plots, [](const ReportPlot& plot) {
@@ -190,6 +172,7 @@ std::vector<DataElement> ToJson(const ReportData& data) {
   }
   return elements;
 }
+
 namespace {
 
 using Rgb = std::array<int, 3>;
@@ -264,9 +247,10 @@ std::string LookStyle() {
 
 std::string List(const std::vector<std::string>& lines) {
   if (lines.empty()) return "";
-  std::string text = "<ul>\n";
-  for (const std::string& line : lines) text += "<li>" + EscapeXml(line) + "</li>\n";
-  return text + "</ul>\n";
+  return "<ul>\n" +
+         Joined(lines, "",
+                [](const std::string& line) { return "<li>" + EscapeXml(line) + "</li>\n"; }) +
+         "</ul>\n";
 }
 
 std::string Command(const std::string& command) {
@@ -318,48 +302,29 @@ std::string ClaimsOf(const ReportData& data) {
         look, EscapeXml(ToString(claim.verdict)), EscapeXml(claim.rule.claim),
         EscapeXml(claim.rule.where), EscapeXml(claim.text));
     const Table checks = CheckTable(claim);
-    for (const TableColumn& column : checks.columns) {
-      text += "<th>" + EscapeXml(column.header) + "</th>";
-    }
-    text += "</tr>\n";
+    text += Joined(checks.columns, "", [](const TableColumn& column) {
+      return "<th>" + EscapeXml(column.header) + "</th>";
+    });
     for (const Record& row : checks.rows) {
-      text += "<tr>";
-      for (const TableColumn& column : checks.columns) {
-        text += "<td>" + EscapeXml(Cell(row, column)) + "</td>";
-      }
-      text += "</tr>\n";
+      text += "</tr>\n<tr>" + Joined(checks.columns, "", [&row](const TableColumn& column) {
+                return "<td>" + EscapeXml(Cell(row, column)) + "</td>";
+              });
     }
-    text += "</table></details>\n";
+    text += "</tr>\n</table></details>\n";
   }
   return text + Command(data.claims_command);
-}
-
-std::string Links(const ReportData& data) {
-  std::string text =
-      "<a href=\"#verdicts\">Verdicts</a> <a href=\"#motion\">Motion and curves</a> ";
-  text += "<a href=\"#tables\">Cases</a> ";
-  if (!data.costs.empty()) text += "<a href=\"#costs\">Work and precision</a> ";
-  if (data.map) text += "<a href=\"#map\">Robustness map</a> ";
-  return text + "<a href=\"#sources\">Sources</a>";
-}
-
-std::string SourcesOf(const ReportData& data) {
-  std::string text = "<section id=\"sources\"><h2>Sources</h2>\n<h3>What made the records</h3>\n" +
-                     List(data.origins);
-  text += "<h3>What made this page</h3>\n" + List(data.provenance);
-  if (!data.remarks.empty()) {
-    text += "<h3>What is not in this page</h3>\n" + List(data.remarks);
-  }
-  text +=
-      "<p class=\"soft\">Curves are drawn with uPlot, under the MIT License; its text is in "
-      "the source of this page.</p>\n";
-  return text + "</section>\n";
 }
 
 }  // namespace
 
 std::string ToHtml(const ReportData& data) {
   const std::string title = EscapeXml(data.store);
+  std::string links =
+      "<a href=\"#verdicts\">Verdicts</a> <a href=\"#motion\">Motion and curves</a> <a "
+      "href=\"#tables\">Cases</a> ";
+  if (!data.costs.empty()) links += "<a href=\"#costs\">Work and precision</a> ";
+  if (data.map) links += "<a href=\"#map\">Robustness map</a> ";
+  links += "<a href=\"#sources\">Sources</a>";
   std::string page = PageHead("Report of " + title);
   page += kReportStyle;
   page += LookStyle();
@@ -367,7 +332,7 @@ std::string ToHtml(const ReportData& data) {
   page += fmt::format(
       "<header><h1>Report of {}</h1>\n<nav aria-label=\"Sections\">{} <button type=\"button\" "
       "id=\"theme\">Dark</button></nav></header>\n<main class=\"report\">\n",
-      title, Links(data));
+      title, links);
   page += "<section id=\"verdicts\"><h2>Verdicts and warnings: " + WithCount(data.runs, "run") +
           "</h2>\n" + SummaryOf(data) + FindingsOf(data) + ClaimsOf(data) + List(data.warnings) +
           "</section>\n";
@@ -377,9 +342,13 @@ std::string ToHtml(const ReportData& data) {
     page += "<section id=\"costs\"><h2>Work and precision</h2></section>\n";
   }
   if (data.map) page += "<section id=\"map\"><h2>Robustness map</h2></section>\n";
-  page += SourcesOf(data);
+  page += "<section id=\"sources\"><h2>Sources</h2>\n<h3>What made the records</h3>\n" +
+          List(data.origins) + "<h3>What made this page</h3>\n" + List(data.provenance);
+  if (!data.remarks.empty()) page += "<h3>What is not in this page</h3>\n" + List(data.remarks);
   page +=
-      "</main>\n<noscript><p>Tables and curves need JavaScript; loopbench table and plot do "
+      "<p class=\"soft\">Curves are drawn with uPlot, under the MIT License; its text is in "
+      "the source of this page.</p>\n</section>\n</main>\n<noscript><p>Tables and curves need "
+      "JavaScript; loopbench table and plot do "
       "not.</p></noscript>\n";
   for (const DataElement& element : ToJson(data)) {
     page += "<script type=\"application/json\" id=\"data-" + element.id + "\">" + element.json +

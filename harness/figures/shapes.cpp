@@ -131,6 +131,14 @@ std::vector<std::vector<Vector3d>> Attachments(const MechanismDescription& descr
 
 namespace {
 
+/// A frame on a body, in body axes from the body's origin.
+struct End {
+  int body;
+  Frame X;
+
+  PicturePlace Place() const { return {.body = body, .at = X.p}; }
+};
+
 /// Adds shapes of one item to a picture.
 class Pen {
  public:
@@ -144,16 +152,15 @@ class Pen {
         {kind, style, item_, radius * size(), aside * size(), std::move(places)});
   }
   /// Returns points of a frame on a body, given in symbol sizes.
-  std::vector<PicturePlace> On(int body, const Frame& X,
-                               const std::vector<Vector3d>& points) const {
+  std::vector<PicturePlace> On(const End& end, const Points& points) const {
     std::vector<PicturePlace> places;
     for (const Vector3d& point : points) {
-      places.push_back({.body = body, .at = X.p + X.R * (size() * point)});
+      places.push_back({.body = end.body, .at = end.X.p + end.X.R * (size() * point)});
     }
     return places;
   }
   /// Adds a box about the origin of a frame, with half sides `half` [symbol sizes]; flat if planar.
-  void Box(ShapeStyle style, int body, const Frame& X, const Vector3d& half) {
+  void Box(ShapeStyle style, const End& end, const Vector3d& half) {
     const auto face = [&](int normal, double side) {
       const int a = (normal + 1) % 3, b = (normal + 2) % 3;
       std::vector<Vector3d> corners(4, side * half[normal] * Vector3d::Unit(normal));
@@ -161,7 +168,7 @@ class Pen {
         corners[i][a] = (i == 0 || i == 3 ? -1 : 1) * half[a];
         corners[i][b] = (i < 2 ? -1 : 1) * half[b];
       }
-      Add(ShapeKind::kArea, style, On(body, X, corners));
+      Add(ShapeKind::kArea, style, On(end, corners));
     };
     if (picture_->planar) return face(2, 0.0);
     for (int normal = 0; normal < 3; ++normal) {
@@ -180,7 +187,7 @@ class Pen {
 /// Adds hatched ground `below` the origin of a frame whose y points down.
 void Hatch(const Frame& foot, double from, double to, double below, Pen pen) {
   const auto line = [&](const Points& points) {
-    pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On(kGround, foot, points));
+    pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On({kGround, foot}, points));
   };
   line({{from - 0.5, below, 0}, {to + 0.5, below, 0}});
   constexpr int kMaxHatches = 60;
@@ -199,14 +206,14 @@ void AddFoot(const Vector3d& at, Pen pen, const Picture& picture) {
   foot.R << along, down, down.cross(along);
   if (picture.planar) {
     pen.Add(ShapeKind::kArea, ShapeStyle::kGround,
-            pen.On(kGround, foot, {{0, 0, 0}, {-1.6, 2.4, 0}, {1.6, 2.4, 0}}));
+            pen.On({kGround, foot}, {{0, 0, 0}, {-1.6, 2.4, 0}, {1.6, 2.4, 0}}));
     return Hatch(foot, -1.6, 1.6, 2.4, pen);
   }
   // a pyramid with its base on the ground
   const Points base = {{-1.5, 2.2, -1.5}, {1.5, 2.2, -1.5}, {1.5, 2.2, 1.5}, {-1.5, 2.2, 1.5}};
-  pen.Add(ShapeKind::kArea, ShapeStyle::kGround, pen.On(kGround, foot, base));
+  pen.Add(ShapeKind::kArea, ShapeStyle::kGround, pen.On({kGround, foot}, base));
   for (const Vector3d& corner : base) {
-    pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On(kGround, foot, {{0, 0, 0}, corner}));
+    pen.Add(ShapeKind::kLine, ShapeStyle::kGround, pen.On({kGround, foot}, {{0, 0, 0}, corner}));
   }
 }
 
@@ -225,7 +232,7 @@ void AddSweep(const JointDescription& joint, bool straight, ShapeStyle style, do
       points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
     }
   }
-  pen.Add(ShapeKind::kArrow, style, pen.On(joint.from.body, PlacesOf(joint).F, points));
+  pen.Add(ShapeKind::kArrow, style, pen.On({joint.from.body, PlacesOf(joint).F}, points));
 }
 
 /// Draws one joint; guides span the distance of the bodies at the picture's start. z is its
@@ -233,102 +240,96 @@ void AddSweep(const JointDescription& joint, bool straight, ShapeStyle style, do
 class JointSymbol {
  public:
   JointSymbol(const JointDescription& joint, Pen pen, const Picture& picture)
-      : joint_(joint), pen_(pen), picture_(picture), places_(PlacesOf(joint)) {}
+      : joint_(joint),
+        pen_(pen),
+        picture_(picture),
+        from_{joint.from.body, PlacesOf(joint).F},
+        to_{joint.to.body, PlacesOf(joint).M} {}
 
   void Draw() {
     // a free joint supports nothing
     const bool holds = joint_.type != JointType::kFree;
-    if (holds && joint_.from.body == kGround) Ground(places_.F, Relative().p.x());
-    if (holds && joint_.to.body == kGround) Ground(places_.M, 0.0);
+    if (holds && joint_.from.body == kGround) Ground(from_.X, Relative().p.x());
+    if (holds && joint_.to.body == kGround) Ground(to_.X, 0.0);
     switch (joint_.type) {
       case JointType::kRevolute:
-        Pin(0.8);
+        if (!picture_.planar) {
+          pen_.Add(ShapeKind::kLine, ShapeStyle::kGuide,
+                   pen_.On(from_, {{0, 0, -2.6}, {0, 0, 2.6}}));
+        }
+        Axle(from_, ShapeStyle::kJoint, 1.1, 0.8);
         break;
       case JointType::kPrismatic:
         Guide(0, ShapeStyle::kGuide, 0.3, 4.0);
-        pen_.Box(ShapeStyle::kJoint, to(), places_.M, {2.2, 1.3, 1.3});
+        pen_.Box(ShapeStyle::kJoint, to_, {2.2, 1.3, 1.3});
         break;
       case JointType::kWeld:
-        pen_.Box(ShapeStyle::kSolid, to(), places_.M, {0.7, 0.7, 0.7});
+        pen_.Box(ShapeStyle::kSolid, to_, {0.7, 0.7, 0.7});
         break;
       case JointType::kFree:
         break;
       case JointType::kPinInSlot:
         Guide(0, ShapeStyle::kJoint, 1.0, 3.0);
-        Axle(to(), places_.M, ShapeStyle::kSolid, 0.8, 0.55);
+        Axle(to_, ShapeStyle::kSolid, 0.8, 0.55);
         break;
       case JointType::kRod:
-        pen_.Add(ShapeKind::kBar, ShapeStyle::kRod, {On(from(), places_.F), On(to(), places_.M)},
-                 0.25);
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kJoint, {On(from(), places_.F)}, 0.5);
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kJoint, {On(to(), places_.M)}, 0.5);
+        pen_.Add(ShapeKind::kBar, ShapeStyle::kRod, {from_.Place(), to_.Place()}, 0.25);
+        Disc(from_, ShapeStyle::kJoint, 0.5);
+        Disc(to_, ShapeStyle::kJoint, 0.5);
         break;
       case JointType::kCylindrical:
         Guide(2, ShapeStyle::kSolid, 0.3, 3.0);
-        Axle(to(), places_.M, ShapeStyle::kJoint, 1.0, 0.9);
+        Axle(to_, ShapeStyle::kJoint, 1.0, 0.9);
         break;
       case JointType::kSpherical:
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kJoint, {On(from(), places_.F)}, 1.1);
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kSolid, {On(to(), places_.M)}, 0.65);
+        Disc(from_, ShapeStyle::kJoint, 1.1);
+        Disc(to_, ShapeStyle::kSolid, 0.65);
         break;
       case JointType::kPlanar:
-        pen_.Box(ShapeStyle::kGuide, from(), places_.F, {4.0, 4.0, 0.1});
-        Axle(to(), places_.M, ShapeStyle::kJoint, 0.6, 0.9);
+        pen_.Box(ShapeStyle::kGuide, from_, {4.0, 4.0, 0.1});
+        Axle(to_, ShapeStyle::kJoint, 0.6, 0.9);
         break;
       case JointType::kUniversal:
-        Line(from(), places_.F, {-1.4, 0, 0}, {1.4, 0, 0}, ShapeStyle::kSolid, 0.3);
-        Line(to(), places_.M, {0, -1.4, 0}, {0, 1.4, 0}, ShapeStyle::kSolid, 0.3);
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kJoint, {On(to(), places_.M)}, 0.5);
+        Line(from_, {-1.4, 0, 0}, {1.4, 0, 0}, ShapeStyle::kSolid, 0.3);
+        Line(to_, {0, -1.4, 0}, {0, 1.4, 0}, ShapeStyle::kSolid, 0.3);
+        Disc(to_, ShapeStyle::kJoint, 0.5);
         break;
       case JointType::kHelical:
         Screw();
         break;
       case JointType::kSchoenflies:
-        Axle(to(), places_.M, ShapeStyle::kSolid, 2.2, 0.3);
+        Axle(to_, ShapeStyle::kSolid, 2.2, 0.3);
         [[fallthrough]];
       case JointType::kTranslation:
-        pen_.Box(ShapeStyle::kJoint, to(), places_.M, {1.3, 1.3, 1.3});
+        pen_.Box(ShapeStyle::kJoint, to_, {1.3, 1.3, 1.3});
         break;
       case JointType::kPointOnLine:
         Guide(0, ShapeStyle::kGuide, 0.3, 4.0);
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kSolid, {On(to(), places_.M)}, 0.65);
+        Disc(to_, ShapeStyle::kSolid, 0.65);
         break;
       case JointType::kPointInPlane:
-        pen_.Box(ShapeStyle::kGuide, from(), places_.F, {4.0, 4.0, 0.1});
-        pen_.Add(ShapeKind::kDisc, ShapeStyle::kSolid, {On(to(), places_.M)}, 0.65);
+        pen_.Box(ShapeStyle::kGuide, from_, {4.0, 4.0, 0.1});
+        Disc(to_, ShapeStyle::kSolid, 0.65);
         break;
       default:
         pen_.Add(ShapeKind::kArea, ShapeStyle::kJoint,
-                 pen_.On(to(), places_.M, {{1.2, 0, 0}, {0, 1.2, 0}, {-1.2, 0, 0}, {0, -1.2, 0}}));
+                 pen_.On(to_, {{1.2, 0, 0}, {0, 1.2, 0}, {-1.2, 0, 0}, {0, -1.2, 0}}));
     }
     for (const PrescribedMotion& motion : joint_.motions) Driven(motion.coordinate);
   }
 
  private:
-  int from() const { return joint_.from.body; }
-  int to() const { return joint_.to.body; }
-  PicturePlace On(int body, const Frame& X) const { return {.body = body, .at = X.p}; }
-
-  void Line(int body, const Frame& X, const Vector3d& a, const Vector3d& b, ShapeStyle style,
-            double radius) {
-    pen_.Add(ShapeKind::kBar, style, pen_.On(body, X, {a, b}), radius);
+  void Line(const End& end, const Vector3d& a, const Vector3d& b, ShapeStyle style, double radius) {
+    pen_.Add(ShapeKind::kBar, style, pen_.On(end, {a, b}), radius);
+  }
+  void Disc(const End& end, ShapeStyle style, double radius) {
+    pen_.Add(ShapeKind::kDisc, style, {end.Place()}, radius);
   }
 
   /// Adds an axle about z: a disc if seen along z.
-  void Axle(int body, const Frame& X, ShapeStyle style, double half, double radius) {
-    if (picture_.planar) {
-      pen_.Add(ShapeKind::kDisc, style, {On(body, X)}, radius);
-    } else {
-      Line(body, X, {0, 0, -half}, {0, 0, half}, style, radius);
-    }
-  }
-
-  void Pin(double radius) {
-    if (!picture_.planar) {
-      pen_.Add(ShapeKind::kLine, ShapeStyle::kGuide,
-               pen_.On(from(), places_.F, {{0, 0, -2.6}, {0, 0, 2.6}}));
-    }
-    Axle(from(), places_.F, ShapeStyle::kJoint, 1.1, radius);
+  void Axle(const End& end, ShapeStyle style, double half, double radius) {
+    if (picture_.planar) return Disc(end, style, radius);
+    Line(end, {0, 0, -half}, {0, 0, half}, style, radius);
   }
 
   /// Adds a guide along an axis of F up to M, extended by `beyond` on both sides.
@@ -337,13 +338,13 @@ class JointSymbol {
     const double reach = std::clamp(X.p[axis] / pen_.size(), -1e4, 1e4);
     const Points ends = {(std::min(reach, 0.0) - beyond) * Vector3d::Unit(axis),
                          (std::max(reach, 0.0) + beyond) * Vector3d::Unit(axis)};
-    pen_.Add(ShapeKind::kBar, style, pen_.On(from(), places_.F, ends), radius);
+    pen_.Add(ShapeKind::kBar, style, pen_.On(from_, ends), radius);
   }
 
   /// Returns M in F at the start.
   Frame Relative() const {
-    const Frame P = picture_.start[from()], Q = picture_.start[to()];
-    return (P * places_.F).Inverse() * (Q * places_.M);
+    const Frame P = picture_.start[from_.body], Q = picture_.start[to_.body];
+    return (P * from_.X).Inverse() * (Q * to_.X);
   }
 
   void Screw() {
@@ -355,8 +356,8 @@ class JointSymbol {
       thread.push_back(
           {0.7 * std::cos(turn), 0.7 * std::sin(turn), 6.0 * i / (kTurns * kCorners) - 3.0});
     }
-    pen_.Add(ShapeKind::kLine, ShapeStyle::kGuide, pen_.On(from(), places_.F, thread));
-    Axle(to(), places_.M, ShapeStyle::kJoint, 1.0, 1.1);
+    pen_.Add(ShapeKind::kLine, ShapeStyle::kGuide, pen_.On(from_, thread));
+    Axle(to_, ShapeStyle::kJoint, 1.0, 1.1);
   }
 
   /// Adds the support of a joint on Ground: a foot, or in the plane hatched ground for a rail.
@@ -389,7 +390,7 @@ class JointSymbol {
   const JointDescription& joint_;
   Pen pen_;
   const Picture& picture_;
-  JointPlaces places_;
+  End from_, to_;
 };
 
 // Symbols of forces: springs, dashpots, arrows. Forces of other programs have an arrow at a joint,
@@ -399,13 +400,13 @@ class JointSymbol {
 void AddBeside(const JointDescription& joint, ShapeKind kind, ShapeStyle style, double y, Pen pen) {
   const JointPlaces X = PlacesOf(joint);
   pen.Add(kind, style,
-          {pen.On(joint.from.body, X.F, {{0, y, 0}}).front(),
-           pen.On(joint.to.body, X.M, {{0, y, 0}}).front()},
+          {pen.On({joint.from.body, X.F}, {{0, y, 0}}).front(),
+           pen.On({joint.to.body, X.M}, {{0, y, 0}}).front()},
           0.7);
 }
 
 /// Adds part of a circle or spiral about z of a frame; angles in half turns.
-void AddArc(int body, const Frame& X, double angle, double sweep, double radius, double growth,
+void AddArc(const End& end, double angle, double sweep, double radius, double growth,
             ShapeStyle style, Pen pen) {
   Points arc;
   constexpr int kCorners = 44;
@@ -414,7 +415,7 @@ void AddArc(int body, const Frame& X, double angle, double sweep, double radius,
     const double r = radius + growth * i / kCorners;
     arc.push_back({r * std::cos(at), r * std::sin(at), 0});
   }
-  pen.Add(ShapeKind::kLine, style, pen.On(body, X, arc));
+  pen.Add(ShapeKind::kLine, style, pen.On(end, arc));
 }
 
 void AddAtJoint(const JointDescription& joint, bool length, const ForceDescription& force,
@@ -422,12 +423,12 @@ void AddAtJoint(const JointDescription& joint, bool length, const ForceDescripti
   const JointPlaces X = PlacesOf(joint);
   if (std::holds_alternative<JointSpring>(force)) {
     if (length) return AddBeside(joint, ShapeKind::kSpring, ShapeStyle::kSpring, 1.9, pen);
-    return AddArc(joint.from.body, X.F, 0.0, 5.5, 0.9, 1.3, ShapeStyle::kSpring, pen);
+    return AddArc({joint.from.body, X.F}, 0.0, 5.5, 0.9, 1.3, ShapeStyle::kSpring, pen);
   }
   if (std::holds_alternative<JointDamper>(force)) {
     if (length) return AddBeside(joint, ShapeKind::kDamper, ShapeStyle::kDamper, -1.9, pen);
-    AddArc(joint.to.body, X.M, 1.0, 0.5, 1.5, 0.0, ShapeStyle::kDamper, pen);
-    return AddArc(joint.from.body, X.F, 0.9, 0.7, 1.9, 0.0, ShapeStyle::kDamper, pen);
+    AddArc({joint.to.body, X.M}, 1.0, 0.5, 1.5, 0.0, ShapeStyle::kDamper, pen);
+    return AddArc({joint.from.body, X.F}, 0.9, 0.7, 1.9, 0.0, ShapeStyle::kDamper, pen);
   }
   AddSweep(joint, length, ShapeStyle::kForce, 3.1, pen);
 }

@@ -1,8 +1,9 @@
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <numbers>
 #include <unordered_set>
 #include <utility>
 
@@ -13,6 +14,48 @@ namespace loopbench::harness {
 namespace {
 
 using Eigen::Vector3d;
+
+/// A point of the paper [px], y downwards, with its height towards the viewer [m].
+struct ProjectedPoint {
+  double x = 0.0, y = 0.0, depth = 0.0;
+};
+
+/// An orthographic projection keeps parallel links parallel and lengths comparable.
+struct Camera {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< rows: right, up, towards the viewer
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double scale = 1.0;                     ///< [px/m]
+  double middle_x = 0.0, middle_y = 0.0;  ///< paper position of `centre` [px]
+
+  ProjectedPoint See(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d v = R * (p - centre);
+    return {middle_x + scale * v.x(), middle_y - scale * v.y(), v.z()};
+  }
+};
+
+/// Returns a camera for paper of this `width`, as high as all points of `poses` require, within
+/// limits, with a `margin` on each side. Sets `*height`. [px]
+Camera FitTo(const Picture& picture, const std::vector<const Poses*>& poses,
+             const Eigen::Matrix3d& R, double width, double margin, double* height) {
+  Eigen::AlignedBox3d box;
+  for (const PictureShape& shape : picture.shapes) {
+    for (const PicturePlace& place : shape.places) {
+      for (const Poses* one : poses) box.extend(R * place.In(*one));
+    }
+  }
+  if (box.isEmpty()) box.extend(Vector3d::Zero());
+  // half of a pin and of a bar
+  const double around = 2.0 * picture.symbol;
+  const Vector3d size = box.sizes() + Vector3d::Constant(2.0 * around);
+  constexpr double kLowest = 90.0, kHighest = 560.0;
+  const double across = width - 2.0 * margin;
+  Camera camera{.R = R, .centre = R.transpose() * box.center()};
+  camera.scale = std::min(across / size.x(), (kHighest - 2.0 * margin) / size.y());
+  *height = std::max(kLowest, camera.scale * size.y() + 2.0 * margin);
+  camera.middle_x = 0.5 * width;
+  camera.middle_y = 0.5 * *height;
+  return camera;
+}
 
 // Shapes as SVG elements.
 
@@ -156,110 +199,6 @@ std::string Centre(const ProjectedPoint& c, double r, const Ink& ink) {
              x, y, top, radius, right, bottom, left);
 }
 
-/// Draws shapes in order. Shapes too small to be visible become dots, at most one per pixel. A
-/// picture of 10^5 shapes therefore stays small.
-class SvgPen {
- public:
-  SvgPen(const Picture& picture, const Camera& camera) : picture_(picture), camera_(camera) {}
-
-  /// Draws all shapes at `poses`, the farthest first.
-  void DrawAll(const Poses& poses) {
-    std::vector<double> depths;
-    for (const PictureShape& shape : picture_.shapes) {
-      double depth = 0.0;
-      for (const PicturePlace& place : shape.places) depth += camera_.See(place.In(poses)).depth;
-      depth /= static_cast<double>(shape.places.size());
-      depths.push_back(depth + picture_.symbol * TraitsOf(shape.style).lift);
-    }
-    std::vector<std::size_t> order(depths.size());
-    std::iota(order.begin(), order.end(), 0u);
-    if (!picture_.planar) {
-      std::ranges::stable_sort(order, {}, [&](std::size_t i) { return depths[i]; });
-    }
-    for (const std::size_t i : order) Draw(picture_.shapes[i], poses);
-  }
-
-  /// Draws only dashed outlines of bodies and sliders.
-  void DrawGhost(const Poses& poses) {
-    constexpr std::size_t kMost = 2000;
-    std::size_t drawn = 0;
-    for (const PictureShape& shape : picture_.shapes) {
-      const bool area = shape.kind == ShapeKind::kArea;
-      const bool outline = (shape.style == ShapeStyle::kBody && shape.kind == ShapeKind::kBar) ||
-                           (area && shape.style != ShapeStyle::kGround);
-      if (!outline || ++drawn > kMost) continue;
-      ProjectedPoints spots;
-      for (const PicturePlace& place : shape.places) spots.push_back(camera_.See(place.In(poses)));
-      text_ += Path(PathOf(spots, shape.kind == ShapeKind::kArea), {"#8a8a8a", "none", 1.0, "6 3"},
-                    false);
-    }
-  }
-
-  /// Returns the elements drawn since the last call.
-  std::string Take() {
-    if (!dots_.empty()) {
-      text_ += fmt::format("<path d=\"{}\" stroke=\"#333\" stroke-width=\"1\"/>\n", dots_);
-    }
-    dots_.clear();
-    return std::exchange(text_, "");
-  }
-
- private:
-  void Draw(const PictureShape& shape, const Poses& poses) {
-    ProjectedPoints spots;
-    double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
-    for (const PicturePlace& place : shape.places) {
-      const ProjectedPoint& spot = spots.emplace_back(camera_.See(place.In(poses)));
-      if (!std::isfinite(spot.x + spot.y)) return;
-      left = std::min(left, spot.x), right = std::max(right, spot.x);
-      top = std::min(top, spot.y), bottom = std::max(bottom, spot.y);
-    }
-    const double radius = shape.radius * camera_.scale, aside = shape.aside * camera_.scale;
-    constexpr double kSeen = 0.8;
-    if (std::max(right - left, bottom - top) + 2.0 * radius < kSeen) return Dot(spots.front());
-    const PictureItem& item = picture_.items[static_cast<std::size_t>(shape.item)];
-    Ink ink = InkOf(item, shape.style);
-    // in space, parts behind a plate show through
-    if (shape.style == ShapeStyle::kBody && !picture_.planar) ink.opacity = "0.8";
-    switch (shape.kind) {
-      case ShapeKind::kLine:
-        text_ += Path(PathOf(spots, false), ink, false);
-        break;
-      case ShapeKind::kArea:
-        text_ += Thick(spots, true, radius, ink);
-        break;
-      case ShapeKind::kBar:
-        text_ += Thick(spots, false, radius, ink);
-        break;
-      case ShapeKind::kDisc:
-        text_ += Disc(spots.front(), radius, ink);
-        break;
-      case ShapeKind::kCentre:
-        text_ += Centre(spots.front(), radius, ink);
-        break;
-      case ShapeKind::kSpring:
-        text_ += Spring(spots[0], spots[1], radius, aside, ink);
-        break;
-      case ShapeKind::kDamper:
-        text_ += Damper(spots[0], spots[1], radius, aside, ink);
-        break;
-      case ShapeKind::kArrow:
-        text_ += Arrow(spots, 1.3 * picture_.symbol * camera_.scale, ink);
-        break;
-    }
-  }
-
-  void Dot(const ProjectedPoint& spot) {
-    const long x = std::lround(spot.x), y = std::lround(spot.y);
-    if (cells_.insert(y * 100000L + x).second) dots_ += fmt::format("M{} {}h1", x, y);
-  }
-
-  const Picture& picture_;
-  const Camera& camera_;
-  std::string text_, dots_;
-  std::unordered_set<long> cells_;
-};
-
 // The document.
 
 /// Page of 160 mm at 96 px per inch; a font of 8 points.
@@ -288,10 +227,8 @@ class Document {
     std::vector<const Poses*> seen = {&picture_.start};
     if (ghost) seen.push_back(&picture_.given);
     camera_ = FitTo(picture_, seen, ViewNamed(picture_, options_.view), kWidth, kMargin, &height_);
-    SvgPen pen(picture_, camera_);
-    if (ghost) pen.DrawGhost(picture_.given);
-    pen.DrawAll(picture_.start);
-    body_ += pen.Take();
+    if (ghost) DrawGhost();
+    DrawShapes();
     // text comes last, so that nothing covers it
     if (!options_.plain) DrawRedundant();
     if (!options_.plain) DrawGaps();
@@ -326,6 +263,96 @@ class Document {
     }
   };
 
+  /// Draws dashed outlines of bodies and sliders as in the file.
+  void DrawGhost() {
+    constexpr std::size_t kMost = 2000;
+    std::size_t drawn = 0;
+    for (const PictureShape& shape : picture_.shapes) {
+      const bool area = shape.kind == ShapeKind::kArea;
+      const bool outline = (shape.style == ShapeStyle::kBody && shape.kind == ShapeKind::kBar) ||
+                           (area && shape.style != ShapeStyle::kGround);
+      if (!outline || ++drawn > kMost) continue;
+      const auto spots = Mapped<ProjectedPoint>(shape.places, [&](const PicturePlace& place) {
+        return camera_.See(place.In(picture_.given));
+      });
+      body_ += Path(PathOf(spots, area), {"#8a8a8a", "none", 1.0, "6 3"}, false);
+    }
+  }
+
+  /// Draws all shapes at the start, the farthest first.
+  void DrawShapes() {
+    std::vector<std::pair<double, const PictureShape*>> order;
+    for (const PictureShape& shape : picture_.shapes) {
+      double depth = 0.0;
+      for (const PicturePlace& place : shape.places) {
+        depth += camera_.See(place.In(picture_.start)).depth;
+      }
+      depth /= static_cast<double>(shape.places.size());
+      order.emplace_back(depth + picture_.symbol * TraitsOf(shape.style).lift, &shape);
+    }
+    if (!picture_.planar) {
+      std::ranges::stable_sort(order, {}, &std::pair<double, const PictureShape*>::first);
+    }
+    for (const auto& [depth, shape] : order) Draw(*shape);
+    if (dots_.empty()) return;
+    body_ += fmt::format("<path d=\"{}\" stroke=\"#333\" stroke-width=\"1\"/>\n", dots_);
+  }
+
+  /// Draws a shape, or a dot if it is too small to be visible.
+  void Draw(const PictureShape& shape) {
+    ProjectedPoints spots;
+    double left = 1e300, right = -1e300, top = 1e300, bottom = -1e300;
+    for (const PicturePlace& place : shape.places) {
+      const ProjectedPoint& spot = spots.emplace_back(camera_.See(place.In(picture_.start)));
+      if (!std::isfinite(spot.x + spot.y)) return;
+      left = std::min(left, spot.x), right = std::max(right, spot.x);
+      top = std::min(top, spot.y), bottom = std::max(bottom, spot.y);
+    }
+    const double radius = shape.radius * camera_.scale, aside = shape.aside * camera_.scale;
+    constexpr double kSeen = 0.8;
+    if (std::max(right - left, bottom - top) + 2.0 * radius < kSeen) return Dot(spots.front());
+    const PictureItem& item = picture_.items[static_cast<std::size_t>(shape.item)];
+    Ink ink = InkOf(item, shape.style);
+    // in space, parts behind a plate show through
+    if (shape.style == ShapeStyle::kBody && !picture_.planar) ink.opacity = "0.8";
+    switch (shape.kind) {
+      case ShapeKind::kLine:
+        body_ += Path(PathOf(spots, false), ink, false);
+        break;
+      case ShapeKind::kArea:
+        body_ += Thick(spots, true, radius, ink);
+        break;
+      case ShapeKind::kBar:
+        body_ += Thick(spots, false, radius, ink);
+        break;
+      case ShapeKind::kDisc:
+        body_ += Disc(spots.front(), radius, ink);
+        break;
+      case ShapeKind::kCentre:
+        body_ += Centre(spots.front(), radius, ink);
+        break;
+      case ShapeKind::kSpring:
+        body_ += Spring(spots[0], spots[1], radius, aside, ink);
+        break;
+      case ShapeKind::kDamper:
+        body_ += Damper(spots[0], spots[1], radius, aside, ink);
+        break;
+      case ShapeKind::kArrow:
+        body_ += Arrow(spots, 1.3 * picture_.symbol * camera_.scale, ink);
+        break;
+    }
+  }
+
+  /// Adds at most one dot per pixel: a picture of 10^5 shapes stays small.
+  void Dot(const ProjectedPoint& spot) {
+    const long x = std::lround(spot.x), y = std::lround(spot.y);
+    if (cells_.insert(y * 100000L + x).second) dots_ += fmt::format("M{} {}h1", x, y);
+  }
+
+  ProjectedPoint SpotOf(const PictureItem& item) const {
+    return camera_.See(item.anchor.In(picture_.start));
+  }
+
   void Text(double x, double y, const std::string& text, const char* anchor, const char* colour) {
     body_ += fmt::format(
         "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\" stroke=\"#fff\" "
@@ -349,8 +376,7 @@ class Document {
       if (loop.redundant.empty()) continue;
       std::string path;
       for (const int joint : loop.joints) {
-        const ProjectedPoint spot =
-            camera_.See(picture_.items[picture_.ItemOfJoint(joint)].anchor.In(picture_.start));
+        const ProjectedPoint spot = SpotOf(picture_.items[picture_.ItemOfJoint(joint)]);
         path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", spot.x, spot.y);
       }
       body_ += fmt::format(
@@ -360,7 +386,7 @@ class Document {
     }
     for (const PictureItem& item : picture_.items) {
       if (item.redundant.empty()) continue;
-      const ProjectedPoint spot = camera_.See(item.anchor.In(picture_.start));
+      const ProjectedPoint spot = SpotOf(item);
       body_ += fmt::format(
           "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\" fill=\"none\" stroke=\"#b45309\" "
           "stroke-width=\"1.6\" stroke-dasharray=\"3 2\"/>\n",
@@ -393,11 +419,8 @@ class Document {
                                     {1, 0},  {-1, 0},  {1, -2.2}, {-1, -2.2}, {1, 2.2}, {-1, 2.2}};
     for (const auto& [right, down] : kSides) {
       const double left = x + (right > 0 ? off : right < 0 ? -off - wide : -0.5 * wide);
-      const double top = y +
-                         down * (off + (down > 0   ? 0.0
-                                        : down < 0 ? high
-                                                   : 0.0)) -
-                         (down == 0 ? 0.5 * high : 0.0);
+      const double above = down < 0 ? high : 0.0;
+      const double top = y + down * (off + above) - (down == 0 ? 0.5 * high : 0.0);
       const Box box = {left, top, left + wide, top + high};
       const bool inside =
           box.left > 2 && box.right < kWidth - 2 && box.top > 2 && box.bottom < height_ - 2;
@@ -412,19 +435,16 @@ class Document {
     constexpr std::size_t kMaxNames = 120;
     if (picture_.bodies + picture_.joints > kMaxNames) return;
     const double pin = std::max(3.0, 1.1 * picture_.symbol * camera_.scale);
-    const auto at = [&](const PictureItem& item) {
-      return camera_.See(item.anchor.In(picture_.start));
-    };
     for (const PictureItem& item : picture_.items) {
       if (item.kind == ItemKind::kForce) continue;
-      const ProjectedPoint spot = at(item);
+      const ProjectedPoint spot = SpotOf(item);
       taken_.push_back(
           {spot.x - 0.7 * pin, spot.y - 0.7 * pin, spot.x + 0.7 * pin, spot.y + 0.7 * pin});
     }
     for (std::size_t i = 1; i < picture_.bodies + picture_.joints; ++i) {
       const PictureItem& item = picture_.items[i];
       const bool body = item.kind == ItemKind::kBody;
-      const ProjectedPoint spot = at(item);
+      const ProjectedPoint spot = SpotOf(item);
       PlaceText(spot.x, spot.y, Shortened(item.name, 20), body ? "#1e3a5f" : "#111",
                 body ? 1.2 * pin : pin);
     }
@@ -511,7 +531,8 @@ class Document {
   const SvgOptions& options_;
   Camera camera_;
   double height_ = 0.0;
-  std::string body_;
+  std::string body_, dots_;
+  std::unordered_set<long> cells_;  ///< pixels with a dot
   std::vector<Box> taken_;
 };
 
@@ -524,6 +545,32 @@ double RoundLength(double longest) {
     if (step * decade <= longest) return step * decade;
   }
   return decade;
+}
+
+const std::vector<std::string>& ViewNames() {
+  static const std::vector<std::string> names = {"oblique", "front", "side", "top"};
+  return names;
+}
+
+Eigen::Matrix3d ViewNamed(const Picture& picture, const std::string& name) {
+  if (picture.planar) return Eigen::Matrix3d::Identity();
+  // azimuth and elevation of the viewer [degrees] about `up`
+  double azimuth = -62.0, elevation = 22.0;
+  if (name == "front") azimuth = -90.0, elevation = 0.0;
+  if (name == "side") azimuth = 0.0, elevation = 0.0;
+  if (name == "top") azimuth = -90.0, elevation = 89.999;  // right stays defined
+  const Vector3d& up = picture.up;
+  const Vector3d axis = std::abs(up.x()) < 0.9 ? Vector3d::UnitX() : Vector3d::UnitY();
+  const Vector3d a = (axis - axis.dot(up) * up).normalized(), b = up.cross(a);
+  constexpr double kDegree = std::numbers::pi / 180.0;
+  const Vector3d level = std::cos(azimuth * kDegree) * a + std::sin(azimuth * kDegree) * b;
+  const Vector3d viewer =
+      std::cos(elevation * kDegree) * level + std::sin(elevation * kDegree) * up;
+  Eigen::Matrix3d R;
+  R.row(0) = up.cross(viewer).normalized();
+  R.row(2) = viewer;
+  R.row(1) = viewer.cross(Vector3d(R.row(0)));
+  return R;
 }
 
 std::string ToSvg(const Picture& picture, const SvgOptions& options) {

@@ -1,4 +1,4 @@
-// Pictures of a mechanism: data, camera, and writers.
+// Pictures of a mechanism: data and writers.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,17 +12,10 @@
 
 namespace loopbench::harness {
 
-// The picture of a mechanism as data, and its camera.
-
-// The picture of a mechanism: plain data, independent of the output format.
-//
-// A shape is a list of points, each fixed on a body. Its kind defines how they are joined, its
-// style the part that they represent. Any writer can draw it from a pose for every body: the SVG
-// writer once, web/scene.js for every frame. The form of each symbol (a slider is a box on a guide)
-// is therefore defined once, in shapes.cpp. Writers define how lines and discs are painted.
-//
-// Lengths in m, angles in rad. Poses are those of the user's bodies at their origins, in ground
-// axes, however the mechanism is compiled.
+// The picture of a mechanism is plain data. A shape is a list of points, each fixed on a body. Its
+// kind defines how they are joined, its style the part that they represent. A writer draws it from
+// a pose for every body: the SVG writer once, web/scene.js for every frame. Poses are those of the
+// user's bodies at their origins, in ground axes, however the mechanism is compiled. [m, rad]
 
 /// A pose for each of the user's bodies, Ground included.
 using Poses = std::vector<Frame>;
@@ -140,7 +133,7 @@ struct Picture {
   std::size_t bodies = 0, joints = 0;                 ///< Ground included
   std::vector<PictureItem> items;
   std::vector<PicturePlace> centres;  ///< centres of mass, by body
-  std::vector<PicturePoint> points;   ///< of moving bodies, at most kMaxPoints
+  std::vector<PicturePoint> points;   ///< of moving bodies, the first 50
   std::vector<PictureShape> shapes;
   Poses start;  ///< as assembled
   Poses given;  ///< as given in the file, before assembly
@@ -154,58 +147,23 @@ struct Picture {
 
 /// Number of bodies above which centres of mass and numerical details are omitted.
 inline constexpr std::size_t kMaxDetailed = 500;
-/// Number of tree speeds above which no loop motion is followed and nothing is analysed.
-inline constexpr int kMaxFollowed = 240;
-/// Maximum number of named points with paths.
-inline constexpr std::size_t kMaxPoints = 50;
-/// Maximum number of motions, and of body poses in all of them.
-inline constexpr std::size_t kMaxMotions = 12, kMaxFrames = 40000;
+/// Maximum number of body poses in all motions.
+inline constexpr std::size_t kMaxFrames = 40000;
 
 /// Assembles, analyses and draws. `file` is the displayed source. Throws std::invalid_argument for
 /// a description that Validate() rejects.
 Picture MakePicture(const MechanismDescription& description, const std::string& file);
-
-// Camera: an orthographic projection keeps parallel links parallel and lengths comparable.
-
-/// A point of the paper [px], y downwards, with its height towards the viewer [m].
-struct ProjectedPoint {
-  double x = 0.0, y = 0.0, depth = 0.0;
-};
-
-struct Camera {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();  ///< rows: right, up, towards the viewer
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double scale = 1.0;                     ///< [px/m]
-  double middle_x = 0.0, middle_y = 0.0;  ///< paper position of `centre` [px]
-
-  ProjectedPoint See(const Eigen::Vector3d& p) const {
-    const Eigen::Vector3d v = R * (p - centre);
-    return {middle_x + scale * v.x(), middle_y - scale * v.y(), v.z()};
-  }
-};
 
 /// Returns the names of views; planar pictures have only "front".
 const std::vector<std::string>& ViewNames();
 /// Returns the axes of a named view as rows: right, up, towards the viewer.
 Eigen::Matrix3d ViewNamed(const Picture& picture, const std::string& name);
 
-/// Returns a camera for paper of this `width`, as high as all points of `poses` require, within
-/// limits, with a `margin` on each side. Sets `*height`. [px]
-Camera FitTo(const Picture& picture, const std::vector<const Poses*>& poses,
-             const Eigen::Matrix3d& R, double width, double margin, double* height);
-
-// Outlines of bodies: convex hulls of their attachment points.
-
 /// Returns faces of the convex hull as lists of indices into `points`. One point gives none, points
 /// in line give one face with two corners, points in a plane one polygon, others triangles. Points
 /// closer than `tolerance` [m] are merged. More than 24 points that span a volume give no faces.
 std::vector<std::vector<int>> HullFaces(const std::vector<Eigen::Vector3d>& points,
                                         double tolerance);
-
-// Symbols of bodies, joints and forces, built from attachment points.
-//
-// Sizes are multiples of Picture::symbol, half the size of a pin. A shape between two bodies (a
-// spring, a rod, the guide of a slider) has points on both, so that it follows them.
 
 /// Frames of a joint on its bodies, its axis included: in body axes, from body origins.
 struct JointPlaces {
@@ -218,34 +176,9 @@ JointPlaces PlacesOf(const JointDescription& joint);
 std::vector<std::vector<Eigen::Vector3d>> Attachments(const MechanismDescription& description);
 
 /// Sets anchors of items and all shapes. Requires items, `start`, `up`, `symbol` and `extent`.
+/// Sizes are multiples of `symbol`. A shape between two bodies (a spring, a rod, the guide of a
+/// slider) has points on both, so that it follows them.
 void AddShapes(const MechanismDescription& description, Picture* picture);
-
-// Motions for a picture: each degree of freedom swings to and fro with all loops closed in every
-// frame. Prescribed motions run once.
-//
-// In the chosen basis of admissible speeds each motion moves one joint by one unit and stops the
-// leading joints of the other motions. Each motion is therefore named after a joint. A motion is
-// followed in small steps: a step along the projection of its last direction, then a position
-// projection onto the loops (excursion.h finds ranks in the same way). Links keep their lengths to
-// round-off. The swing ends early if the loops cannot close. If even the first step fails (speeds
-// of a singular configuration without a finite motion), bodies move along the speed itself by a
-// small angle, and the text states this.
-
-/// Returns the poses of the bodies of a mechanism that was compiled from `description` unchanged.
-template <class Space>
-Poses PosesOf(const MechanismDescription& description, const Kinematics<Space, double>& kinematics);
-
-/// Finds at most kMaxMotions motions from the closed position q in joint coordinates; none for
-/// loops with more than kMaxFollowed speeds. `left_out` gives the reason.
-template <class Space>
-std::vector<PictureMotion> FindMotions(const MechanismDescription& description,
-                                       const Mechanism<Space, double>& mechanism,
-                                       const VectorX<double>& q, std::string* left_out);
-
-// Writers of a picture: SVG, JSON, an HTML page, and tables.
-
-// SVG of a picture, for papers: line widths for print, 8-point fonts, light fills and dark lines
-// that stay visible in greyscale. The file is self-contained, without style sheet and script.
 
 struct SvgOptions {
   std::string view = "oblique";  ///< name from ViewNames()
@@ -253,14 +186,12 @@ struct SvgOptions {
   bool plain = false;
 };
 
+/// Returns SVG for papers: line widths for print, 8-point fonts, light fills and dark lines that
+/// stay visible in greyscale. The file is self-contained, without style sheet and script.
 std::string ToSvg(const Picture& picture, const SvgOptions& options);
 
 /// Returns the largest length of 1, 2 or 5 times a power of ten that is at most `longest`.
 double RoundLength(double longest);
-
-// JSON of a picture.
-
-// JSON for web/scene.js that is safe inside an HTML element.
 
 /// Returns a JSON string without <, >, & and line separators, so that no text ends the element or
 /// line that contains it. Control characters and invalid UTF-8 are made visible (text.h).
@@ -281,13 +212,12 @@ inline std::string Strings(const std::vector<std::string>& list) {
   return ListOf(list, [](const std::string& one) { return ScriptString(one); });
 }
 
-/// Writes numbers with ten digits and poses as described in scene.js.
+/// Returns JSON for web/scene.js that is safe inside an HTML element: numbers with ten digits and
+/// poses as described there.
 std::string ToJson(const Picture& picture);
 
 /// Returns only the poses, with `digits` digits, for drawing with a picture of the same mechanism.
 std::string PosesJson(const Poses& poses, bool planar, int digits = 10);
-
-// A picture as one self-contained HTML page: data, style and script are embedded.
 
 /// web/scene.js (draws any poses of a picture) with the files that it needs, web/scene.css,
 /// web/view.js and web/view.html (page of one mechanism), web/history.css and web/history.js,
@@ -299,12 +229,11 @@ extern const std::string_view kSceneScript, kSceneStyle, kViewScript, kViewBody,
 /// may load or send nothing, whatever a name contains. `title` is safe for XML.
 std::string PageHead(std::string_view title);
 
+/// Returns one self-contained HTML page: data, style and script are embedded.
 std::string ToHtml(const Picture& picture);
 
-// A picture as tables of positions, for terminals and screen readers.
-
-/// Returns tables of bodies, joints, forces, loops and motions with their positions in ground axes
-/// [m, rad], which `explain` does not print.
+/// Returns, for terminals and screen readers, tables of bodies, joints, forces, loops and motions
+/// with their positions in ground axes [m, rad], which `explain` does not print.
 std::vector<Table> ToTables(const Picture& picture);
 
 }  // namespace loopbench::harness

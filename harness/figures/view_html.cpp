@@ -125,13 +125,6 @@ std::string ToJson(const Picture& picture) {
           });
   return text + ",\"notes\":" + Strings(picture.notes) + "}";
 }
-namespace {
-
-std::string Plural(std::size_t count, const char* one, const char* many) {
-  return fmt::format("{} {}", count, count == 1 ? one : many);
-}
-
-}  // namespace
 
 std::string PageHead(std::string_view title) {
   std::string head = fmt::format(
@@ -147,11 +140,11 @@ std::string PageHead(std::string_view title) {
 
 std::string ToHtml(const Picture& picture) {
   const std::string title = EscapeXml(picture.name);
-  const std::string subtitle = EscapeXml(fmt::format(
-      "{}{}, {}, {}{}", picture.file.empty() ? "" : picture.file + ": ",
-      Plural(picture.bodies - 1, "body", "bodies"), Plural(picture.joints, "joint", "joints"),
-      Plural(picture.loops.size(), "loop", "loops"),
-      picture.freedom.empty() ? "" : "; degrees of freedom: " + picture.freedom));
+  const std::string subtitle = EscapeXml(
+      fmt::format("{}{}, {}, {}{}", picture.file.empty() ? "" : picture.file + ": ",
+                  WithCount(picture.bodies - 1, "body"), WithCount(picture.joints, "joint"),
+                  WithCount(picture.loops.size(), "loop"),
+                  picture.freedom.empty() ? "" : "; degrees of freedom: " + picture.freedom));
   const std::string failure =
       picture.assembled
           ? ""
@@ -197,8 +190,8 @@ class Writer {
   }
 
   Table Bodies() const {
-    Table table{.title = picture_.assembled ? "Bodies, as assembled" : "Bodies, as in the file"};
-    table.columns = {{"name", "body"}};
+    Table table{.title = picture_.assembled ? "Bodies, as assembled" : "Bodies, as in the file",
+                .columns = {{"name", "body"}}};
     AddPlace("", "", &table);
     table.columns.push_back({"turn", picture_.planar ? "angle [rad]" : "turn [rad]"});
     AddPlace("com", "com ", &table);
@@ -224,8 +217,7 @@ class Writer {
   }
 
   Table Joints() const {
-    Table table{.title = "Joints"};
-    table.columns = {{"name", "joint"}, {"what", "what"}};
+    Table table{.title = "Joints", .columns = {{"name", "joint"}, {"what", "what"}}};
     AddPlace("", "", &table);
     table.columns.push_back({"redundant", "redundant"});
     table.columns.push_back({"gone", "in a run"});
@@ -233,15 +225,14 @@ class Writer {
       const PictureItem& item = picture_.items[picture_.ItemOfJoint(static_cast<int>(j))];
       Record& row = AddRow({item.name, item.detail}, &table);
       SetPlace("", item.anchor.In(picture_.start), &row);
-      row.Set("redundant", fmt::format("{}", fmt::join(item.redundant, "; ")));
+      row.Set("redundant", Joined(item.redundant, "; "));
       row.Set("gone", item.gone);
     }
     return table;
   }
 
   Table Forces() const {
-    Table table{.title = "Forces"};
-    table.columns = {{"name", "force"}, {"what", "what"}};
+    Table table{.title = "Forces", .columns = {{"name", "force"}, {"what", "what"}}};
     AddPlace("", "", &table);
     AddPlace("to", "to ", &table);
     for (std::size_t i = picture_.bodies + picture_.joints; i < picture_.items.size(); ++i) {
@@ -266,19 +257,16 @@ class Writer {
                      {"left", "assembled [m]"},
                      {"bodies", "bodies"}};
     for (const PictureLoop& loop : picture_.loops) {
-      std::vector<std::string> names;
-      for (const int b : loop.bodies) names.push_back(picture_.items[b].name);
       AddRow({picture_.items[picture_.ItemOfJoint(loop.cut_joint)].name, Number(loop.gap, small_),
               Number(loop.turn, 1e-12), Number(loop.left, small_),
-              fmt::format("{}", fmt::join(names, " "))},
+              Joined(loop.bodies, " ", [&](int b) { return picture_.items[b].name; })},
              &table);
     }
     return table;
   }
 
   Table Motions() const {
-    Table table{.title = "Motions"};
-    table.columns = {{"name", "motion"}, {"what", "how far"}};
+    Table table{.title = "Motions", .columns = {{"name", "motion"}, {"what", "how far"}}};
     for (const PictureMotion& motion : picture_.motions) AddRow({motion.name, motion.text}, &table);
     return table;
   }

@@ -1,16 +1,192 @@
 #include "harness/generate/generated.h"
 
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
-#include <map>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <sstream>
 
 #include "harness/base/text.h"
 #include "harness/generate/graph.h"
-#include "harness/generate/print_c.h"
 #include "mechanism/algebra/lanes.h"
 #include "mechanism/formulation/side_by_side.h"
 
 namespace loopbench::generate {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using harness::FailOn, harness::Fnv1a;
+
+std::vector<std::string> Compiler() {
+  const char* named = std::getenv("CC");
+  std::istringstream words(named != nullptr && *named != '\0' ? named : "cc");
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+/// Throws if other users could have written the file or folder.
+void RequireOwn(const fs::path& path, mode_t kind) {
+  struct stat found = {};
+  if (::lstat(path.c_str(), &found) != 0) FailOn("look at", path);
+  if ((found.st_mode & S_IFMT) == kind && found.st_uid == ::geteuid() &&
+      (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) {
+    return;
+  }
+  throw NotCovered(fmt::format(
+      "{}: found owner {} and mode {:o}, expected a {} of user {} that others cannot write",
+      path.string(), found.st_uid, found.st_mode & 07777, kind == S_IFDIR ? "folder" : "file",
+      ::geteuid()));
+}
+
+/// Returns the folder of libraries, created if missing; nothing on failure.
+std::optional<fs::path> CacheFolder() {
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  fs::path folder;
+  if (cache != nullptr && *cache == '/') {
+    folder = cache;
+  } else if (home != nullptr && *home == '/') {
+    folder = fs::path(home) / ".cache";
+  } else {
+    return std::nullopt;
+  }
+  std::error_code error;
+  fs::create_directories(folder, error);
+  folder /= "loopbench";
+  if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) return std::nullopt;
+  RequireOwn(folder, S_IFDIR);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return std::nullopt;
+  return folder;
+}
+
+CompiledBranch Load(const fs::path& library) {
+  void* handle = ::dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) throw NotCovered(fmt::format("generated code: {}", ::dlerror()));
+  void* function = ::dlsym(handle, "loopbench_function");
+  void* use_sines = ::dlsym(handle, "loopbench_use_sines");
+  void* use_lane_sines = ::dlsym(handle, "loopbench_use_lane_sines");
+  const void* room = ::dlsym(handle, "loopbench_room");
+  if (function == nullptr || (use_sines == nullptr && use_lane_sines == nullptr) ||
+      room == nullptr) {
+    throw NotCovered(library.string() + ": found no loopbench_function, expected generated code");
+  }
+  if (use_sines != nullptr) {
+    reinterpret_cast<void (*)(decltype(&PoseSines))>(use_sines)(&PoseSines);
+  } else {
+    reinterpret_cast<void (*)(decltype(&PoseLaneSines))>(use_lane_sines)(&PoseLaneSines);
+  }
+  CompiledBranch branch;
+  branch.function = reinterpret_cast<decltype(branch.function)>(function);
+  branch.room = *static_cast<const int*>(room);
+  return branch;
+}
+
+std::vector<std::string> Flags(Contraction contraction) {
+  std::vector<std::string> flags(std::begin(kCompilerFlags), std::end(kCompilerFlags));
+  const bool is_fused = contraction == Contraction::kFused;
+  flags.push_back(is_fused ? "-ffp-contract=fast" : "-ffp-contract=off");
+  return flags;
+}
+
+/// Compiles `text` to `library`.
+void Compile(const std::string& text, std::vector<std::string> arguments, const fs::path& folder,
+             const fs::path& library) {
+  const fs::path source = folder / "function.c";
+  harness::WriteFileAtomically(source, text);
+  for (const std::string& word :
+       {source.string(), std::string("-o"), library.string(), std::string("-lm")}) {
+    arguments.push_back(word);
+  }
+  RunCompiler(arguments, folder);
+}
+
+/// A kept library ends with the checksum of the bytes before it, which the loader does not read.
+void RequireWhole(const fs::path& library) {
+  const std::string bytes = harness::ReadFile(library);
+  const std::size_t size = bytes.size() - std::min(bytes.size(), Fnv1a("").size());
+  if (Fnv1a(bytes.substr(0, size)) == bytes.substr(size)) return;
+  throw NotCovered(library.string() + ": found a wrong checksum, expected the file as it was " +
+                   "written; remove it");
+}
+
+CompiledBranch CompileOrFind(const std::string& text, const std::vector<std::string>& flags,
+                             const std::string& name, const std::optional<fs::path>& cache) {
+  if (cache) {
+    const fs::path kept = *cache / (name + ".so");
+    if (fs::exists(fs::symlink_status(kept))) {
+      RequireOwn(kept, S_IFREG);
+      RequireWhole(kept);
+      return Load(kept);
+    }
+  }
+  const harness::TemporaryFolder folder("loopbench-generated");
+  const fs::path library = folder.path() / "function.so";
+  Compile(text, flags, folder.path(), library);
+  if (cache) {
+    // renamed when complete, so a concurrent process never reads an incomplete file
+    const fs::path own = *cache / fmt::format("{}.{}", name, ::getpid());
+    const harness::Unfinished unfinished(own);
+    const std::string bytes = harness::ReadFile(library);
+    std::error_code error;
+    if (std::ofstream(own, std::ios::binary) << bytes << Fnv1a(bytes) << std::flush) {
+      fs::permissions(own, fs::perms::owner_all, error);
+      if (!error) fs::rename(own, *cache / (name + ".so"), error);
+    }
+  }
+  return Load(library);
+}
+
+}  // namespace
+
+std::string RunCompiler(const std::vector<std::string>& arguments, const fs::path& folder,
+                        int seconds) {
+  // "timeout" ends it politely, a second later in any case
+  std::vector<std::string> words = {"timeout", "--kill-after=1", std::to_string(seconds)};
+  const std::vector<std::string> compiler = Compiler();
+  if (!folder.empty()) words.insert(words.end(), {"env", "TMPDIR=" + folder.string()});
+  words.insert(words.end(), compiler.begin(), compiler.end());
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const harness::ProgramResult result = harness::RunProgram(words);
+  const std::string name = compiler.empty() ? "CC" : compiler.front();
+  if (result.error == 0 && result.status == 127) {
+    throw NotCovered(fmt::format("no C compiler: '{}' not found (CC names another)", name));
+  }
+  if (result.error == 0 && (result.status == 124 || result.status == 128 + SIGKILL)) {
+    throw NotCovered(fmt::format("{} took more than {} s", name, seconds));
+  }
+  const std::string failure = result.Failure(name);
+  if (!failure.empty()) throw NotCovered("C compiler: " + failure);
+  return result.output;
+}
+
+CompiledBranch CompileBranch(const std::string& key, const std::function<std::string()>& print,
+                             Contraction contraction) {
+  static std::mutex mutex;
+  static std::map<std::string, CompiledBranch> loaded;
+  const std::lock_guard lock(mutex);
+  static std::map<std::string, std::string> versions;  // by the compiler's words
+  const std::string words = fmt::format("{}", fmt::join(Compiler(), " "));
+  if (!versions.contains(words)) versions[words] = RunCompiler({"--version"});
+  const std::vector<std::string> flags = Flags(contraction);
+  const std::string how =
+      fmt::format("{}\n{}\n{}\n", words, versions[words], fmt::join(flags, " "));
+  const std::optional<fs::path> cache = CacheFolder();
+  const std::string place = fmt::format("{}{}\n{}", how, cache ? cache->string() : "", key);
+  const auto known = loaded.find(place);
+  if (known != loaded.end()) return known->second;
+  const std::string text = print(), all = how + text;
+  return loaded[place] = CompileOrFind(text, flags, Fnv1a(all) + Fnv1a(Fnv1a(all) + all), cache);
+}
 
 namespace {
 
@@ -27,81 +203,37 @@ struct SharedBranches {
 };
 
 /// Calls of compiled functions by runs of one thread, kLanes runs at once.
-class LaneCalls final : public SharedWork {
- public:
-  static LaneCalls& Of(SideBySide& beside) {
-    for (const std::unique_ptr<SharedWork>& work : beside.works) {
-      if (auto* calls = dynamic_cast<LaneCalls*>(work.get())) return *calls;
-    }
-    auto calls = std::make_unique<LaneCalls>();
-    LaneCalls& found = *calls;
-    beside.works.push_back(std::move(calls));
-    return found;
-  }
-
-  /// -1 if no lane is free.
-  int Take() {
-    const auto free = std::ranges::find(taken_, false);
-    if (free == taken_.end()) return -1;
-    *free = true;
-    return static_cast<int>(free - taken_.begin());
-  }
-  void GiveBack(int lane) {
-    taken_[lane] = false;
-    for (auto& [function, constants] : constants_) constants.of[lane] = nullptr;
-  }
-
-  /// Branches of runs with this mechanism whose first recordings have this key.
-  std::shared_ptr<SharedBranches> Shared(const void* mechanism, const std::string& first_key) {
-    if (mechanism == nullptr) return std::make_shared<SharedBranches>();
-    std::shared_ptr<SharedBranches>& known = shared_[{mechanism, first_key}];
-    if (known == nullptr) known = std::make_shared<SharedBranches>();
-    return known;
-  }
-
-  void Want(int lane, const Code& wanted, std::span<const double> x, std::span<double> y) {
-    const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
-      if (numbers.size() < size) numbers.resize(size);
-    };
-    grow(x_, x.size());
-    grow(y_, y.size());
-    grow(w_, static_cast<std::size_t>(wanted.compiled.room));
-    Constants& constants = constants_[wanted.compiled.function];
-    grow(constants.numbers, wanted.constants.size());
-    if (constants.of[lane] != &wanted) {
-      constants.of[lane] = &wanted;
-      SetLane(wanted.constants, lane, constants.numbers);
-    }
-    calls_[lane] = {&wanted, x, y};
-  }
-  bool Held(int lane) const { return calls_[lane].held; }
-
+struct LaneCalls final : SharedWork {
   void Do() noexcept override {
-    for (const Call& first : calls_) {
+    for (const Call& first : calls) {
       if (first.code == nullptr) continue;
       const auto function = first.code->compiled.function;
       const auto is_together = [function](const Call& call) {
         return call.code != nullptr && call.code->compiled.function == function;
       };
       for (int lane = 0; lane < kLanes; ++lane) {
-        if (is_together(calls_[lane])) SetLane(calls_[lane].x, lane, x_);
+        if (is_together(calls[lane])) SetLane(calls[lane].x, lane, x);
       }
       const int held =
-          function(reinterpret_cast<const double*>(x_.data()),
-                   reinterpret_cast<const double*>(constants_[function].numbers.data()),
-                   reinterpret_cast<double*>(y_.data()), reinterpret_cast<double*>(w_.data()));
+          function(reinterpret_cast<const double*>(x.data()),
+                   reinterpret_cast<const double*>(constants[function].numbers.data()),
+                   reinterpret_cast<double*>(y.data()), reinterpret_cast<double*>(w.data()));
       for (int lane = 0; lane < kLanes; ++lane) {
-        Call& call = calls_[lane];
+        Call& call = calls[lane];
         if (!is_together(call)) continue;
         call.code = nullptr;
         call.held = (held >> lane & 1) != 0;
-        for (std::size_t i = 0; i < call.y.size(); ++i) call.y[i] = y_[i][lane];
+        for (std::size_t i = 0; i < call.y.size(); ++i) call.y[i] = y[i][lane];
       }
     }
   }
 
- private:
+  static void SetLane(std::span<const double> numbers, int lane, std::vector<Lanes>& all) {
+    for (std::size_t i = 0; i < numbers.size(); ++i) all[i][lane] = numbers[i];
+  }
+
   struct Call {
+    bool is_taken = false;       ///< the lane has a run
     const Code* code = nullptr;  ///< null if none waits
     std::span<const double> x;
     std::span<double> y;
@@ -112,16 +244,20 @@ class LaneCalls final : public SharedWork {
     std::vector<Lanes> numbers;
     std::array<const Code*, kLanes> of{};
   };
-  static void SetLane(std::span<const double> numbers, int lane, std::vector<Lanes>& all) {
-    for (std::size_t i = 0; i < numbers.size(); ++i) all[i][lane] = numbers[i];
-  }
 
-  std::array<bool, kLanes> taken_{};
-  std::array<Call, kLanes> calls_;
-  std::vector<Lanes> x_, y_, w_;
-  std::map<decltype(CompiledBranch::function), Constants> constants_;
-  std::map<std::pair<const void*, std::string>, std::shared_ptr<SharedBranches>> shared_;
+  std::array<Call, kLanes> calls;
+  std::vector<Lanes> x, y, w;
+  std::map<decltype(CompiledBranch::function), Constants> constants;
+  /// Branches of runs by their mechanism and the key of their first recordings.
+  std::map<std::pair<const void*, std::string>, std::shared_ptr<SharedBranches>> shared;
 };
+
+LaneCalls& CallsOf(SideBySide& beside) {
+  for (const std::unique_ptr<SharedWork>& work : beside.works) {
+    if (auto* calls = dynamic_cast<LaneCalls*>(work.get())) return *calls;
+  }
+  return static_cast<LaneCalls&>(*beside.works.emplace_back(std::make_unique<LaneCalls>()));
+}
 
 }  // namespace
 
@@ -131,26 +267,48 @@ class Lane {
   /// Returns null without a batch or a free lane.
   static std::unique_ptr<Lane> Take(SideBySide* beside) {
     if (beside == nullptr) return nullptr;
-    LaneCalls& calls = LaneCalls::Of(*beside);
-    const int lane = calls.Take();
-    return lane < 0 ? nullptr : std::unique_ptr<Lane>(new Lane(*beside, calls, lane));
+    LaneCalls& calls = CallsOf(*beside);
+    const auto free = std::ranges::find(calls.calls, false, &LaneCalls::Call::is_taken);
+    if (free == calls.calls.end()) return nullptr;
+    free->is_taken = true;
+    return std::unique_ptr<Lane>(
+        new Lane(*beside, calls, static_cast<int>(free - calls.calls.begin())));
   }
-  ~Lane() { calls_.GiveBack(lane_); }
+  ~Lane() {
+    calls_.calls[lane_].is_taken = false;
+    for (auto& [function, constants] : calls_.constants) constants.of[lane_] = nullptr;
+  }
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
 
-  /// Joins the runs of LaneCalls::Shared(), unless it has joined others.
+  /// Joins the runs with this mechanism whose first recordings have this key, unless it has joined
+  /// others.
   void Join(const void* mechanism, const std::string& first_key) {
-    if (shared_ == nullptr) shared_ = calls_.Shared(mechanism, first_key);
+    if (shared_ != nullptr) return;
+    if (mechanism != nullptr) shared_ = calls_.shared[{mechanism, first_key}];
+    if (shared_ == nullptr) shared_ = std::make_shared<SharedBranches>();
+    if (mechanism != nullptr) calls_.shared[{mechanism, first_key}] = shared_;
   }
   /// Branches of the runs that it has joined; null before.
   SharedBranches* shared() { return shared_.get(); }
 
   /// Returns false if a comparison differs from its recorded outcome.
   bool Call(const Code& code, std::span<const double> x, std::span<double> y) {
-    calls_.Want(lane_, code, x, y);
+    const auto grow = [](std::vector<Lanes>& numbers, std::size_t size) {
+      if (numbers.size() < size) numbers.resize(size);
+    };
+    grow(calls_.x, x.size());
+    grow(calls_.y, y.size());
+    grow(calls_.w, static_cast<std::size_t>(code.compiled.room));
+    LaneCalls::Constants& constants = calls_.constants[code.compiled.function];
+    grow(constants.numbers, code.constants.size());
+    if (constants.of[lane_] != &code) {
+      constants.of[lane_] = &code;
+      LaneCalls::SetLane(code.constants, lane_, constants.numbers);
+    }
+    calls_.calls[lane_] = {true, &code, x, y};
     beside_.Meet();
-    return calls_.Held(lane_);
+    return calls_.calls[lane_].held;
   }
 
  private:

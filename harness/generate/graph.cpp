@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <stdexcept>
 
 namespace loopbench::generate {
@@ -24,6 +23,72 @@ std::array<double, 2> PoseSineAndCosine(double angle) {
   std::array<double, 2> both;
   PoseSines(angle, &both[0], &both[1]);
   return both;
+}
+
+/// Node y of an operation on a and b, whose derivatives are da and db; builds expressions of them.
+struct Rule {
+  Graph& graph;
+  const int y, a, b, da, db;
+  const std::vector<double>& values;
+
+  int Number(double value) const { return graph.Constant(value); }
+  int Add(int one, int other) const { return graph.Make(kAdd, one, other); }
+  int Subtract(int one, int other) const { return graph.Make(kSubtract, one, other); }
+  int Times(int one, int other) const { return graph.Make(kMultiply, one, other); }
+  int Over(int one, int other) const { return graph.Make(kDivide, one, other); }
+  int Negate(int of) const { return graph.Make(kNegate, of); }
+  int Of(Operation function, int of, int other = -1) const {
+    return graph.Make(function, of, other);
+  }
+  /// sqrt(1 - a^2) without cancellation.
+  int Cosine() const { return Of(kSqrt, Times(Subtract(Number(1.0), a), Add(Number(1.0), a))); }
+  int Power() const {
+    const int power = Of(kPow, a, Subtract(b, Number(1.0)));
+    const int by_base = graph.Is(da, 0.0) ? da : Times(da, Times(b, power));
+    const int by_exponent = graph.Is(db, 0.0) ? db : Times(db, Times(y, Of(kLog, a)));
+    return Add(by_base, by_exponent);
+  }
+  /// The derivative of min(a, b) or max(a, b).
+  int Extreme(bool is_least) const {
+    const bool first_is_less = values[a] < values[b];
+    graph.Compare(Relation::kLess, a, b, first_is_less);
+    return first_is_less == is_least ? da : db;
+  }
+};
+
+/// Returns the derivative of an operation.
+int DerivativeOf(Operation operation, const Rule& rule) {
+  constexpr int (*kRules[])(const Rule&) = {
+      [](const Rule& x) { return x.Number(0.0); },  // an input
+      [](const Rule& x) { return x.Number(0.0); },  // a constant
+      [](const Rule& x) { return x.Negate(x.da); },
+      [](const Rule& x) { return x.Times(x.da, x.Over(x.a, x.y)); },  // |a|
+      [](const Rule& x) { return x.Add(x.da, x.db); },
+      [](const Rule& x) { return x.Subtract(x.da, x.db); },
+      [](const Rule& x) { return x.Add(x.Times(x.da, x.b), x.Times(x.a, x.db)); },
+      [](const Rule& x) { return x.Over(x.Subtract(x.da, x.Times(x.y, x.db)), x.b); },
+      [](const Rule& x) { return x.Over(x.da, x.Add(x.y, x.y)); },  // square root
+      [](const Rule& x) { return x.Times(x.da, x.Of(kCos, x.a)); },
+      [](const Rule& x) { return x.Negate(x.Times(x.da, x.Of(kSin, x.a))); },
+      [](const Rule& x) { return x.Times(x.da, x.Of(kPoseCos, x.a, x.y)); },
+      [](const Rule& x) { return x.Negate(x.Times(x.da, x.b)); },  // kPoseCos: b is the sine
+      [](const Rule& x) { return x.Over(x.da, x.Cosine()); },      // asin
+      [](const Rule& x) { return x.Negate(x.Over(x.da, x.Cosine())); },
+      [](const Rule& x) {  // atan2
+        return x.Over(x.Subtract(x.Times(x.b, x.da), x.Times(x.a, x.db)),
+                      x.Add(x.Times(x.a, x.a), x.Times(x.b, x.b)));
+      },
+      [](const Rule& x) { return x.Times(x.da, x.y); },                        // exp
+      [](const Rule& x) { return x.Times(x.da, x.Add(x.y, x.Number(1.0))); },  // expm1
+      [](const Rule& x) { return x.Over(x.da, x.a); },                         // log
+      [](const Rule& x) { return x.Power(); },
+      [](const Rule& x) { return x.Number(0.0); },  // round
+      // a remainder is a less a multiple of b, which is constant between its jumps
+      [](const Rule& x) { return x.Subtract(x.da, x.Times(x.db, x.Of(kRound, x.Over(x.a, x.b)))); },
+      [](const Rule& x) { return x.Extreme(true); },
+      [](const Rule& x) { return x.Extreme(false); }};
+  static_assert(std::size(kRules) == static_cast<std::size_t>(kMax) + 1);
+  return kRules[static_cast<std::size_t>(operation)](rule);
 }
 
 }  // namespace
@@ -281,76 +346,6 @@ bool Graph::Holds(const std::vector<double>& values) const {
     return outcome == comparison.outcome;
   });
 }
-
-namespace {
-
-/// Node y of an operation on a and b, whose derivatives are da and db; builds expressions of them.
-struct Rule {
-  Graph& graph;
-  const int y, a, b, da, db;
-  const std::vector<double>& values;
-
-  int Number(double value) const { return graph.Constant(value); }
-  int Add(int one, int other) const { return graph.Make(kAdd, one, other); }
-  int Subtract(int one, int other) const { return graph.Make(kSubtract, one, other); }
-  int Times(int one, int other) const { return graph.Make(kMultiply, one, other); }
-  int Over(int one, int other) const { return graph.Make(kDivide, one, other); }
-  int Negate(int of) const { return graph.Make(kNegate, of); }
-  int Of(Operation function, int of, int other = -1) const {
-    return graph.Make(function, of, other);
-  }
-  /// sqrt(1 - a^2) without cancellation.
-  int Cosine() const { return Of(kSqrt, Times(Subtract(Number(1.0), a), Add(Number(1.0), a))); }
-  int Power() const {
-    const int power = Of(kPow, a, Subtract(b, Number(1.0)));
-    const int by_base = graph.Is(da, 0.0) ? da : Times(da, Times(b, power));
-    const int by_exponent = graph.Is(db, 0.0) ? db : Times(db, Times(y, Of(kLog, a)));
-    return Add(by_base, by_exponent);
-  }
-  /// The derivative of min(a, b) or max(a, b).
-  int Extreme(bool is_least) const {
-    const bool first_is_less = values[a] < values[b];
-    graph.Compare(Relation::kLess, a, b, first_is_less);
-    return first_is_less == is_least ? da : db;
-  }
-};
-
-/// Returns the derivative of an operation.
-int DerivativeOf(Operation operation, const Rule& rule) {
-  constexpr int (*kRules[])(const Rule&) = {
-      [](const Rule& x) { return x.Number(0.0); },  // an input
-      [](const Rule& x) { return x.Number(0.0); },  // a constant
-      [](const Rule& x) { return x.Negate(x.da); },
-      [](const Rule& x) { return x.Times(x.da, x.Over(x.a, x.y)); },  // |a|
-      [](const Rule& x) { return x.Add(x.da, x.db); },
-      [](const Rule& x) { return x.Subtract(x.da, x.db); },
-      [](const Rule& x) { return x.Add(x.Times(x.da, x.b), x.Times(x.a, x.db)); },
-      [](const Rule& x) { return x.Over(x.Subtract(x.da, x.Times(x.y, x.db)), x.b); },
-      [](const Rule& x) { return x.Over(x.da, x.Add(x.y, x.y)); },  // square root
-      [](const Rule& x) { return x.Times(x.da, x.Of(kCos, x.a)); },
-      [](const Rule& x) { return x.Negate(x.Times(x.da, x.Of(kSin, x.a))); },
-      [](const Rule& x) { return x.Times(x.da, x.Of(kPoseCos, x.a, x.y)); },
-      [](const Rule& x) { return x.Negate(x.Times(x.da, x.b)); },  // kPoseCos: b is the sine
-      [](const Rule& x) { return x.Over(x.da, x.Cosine()); },      // asin
-      [](const Rule& x) { return x.Negate(x.Over(x.da, x.Cosine())); },
-      [](const Rule& x) {  // atan2
-        return x.Over(x.Subtract(x.Times(x.b, x.da), x.Times(x.a, x.db)),
-                      x.Add(x.Times(x.a, x.a), x.Times(x.b, x.b)));
-      },
-      [](const Rule& x) { return x.Times(x.da, x.y); },                        // exp
-      [](const Rule& x) { return x.Times(x.da, x.Add(x.y, x.Number(1.0))); },  // expm1
-      [](const Rule& x) { return x.Over(x.da, x.a); },                         // log
-      [](const Rule& x) { return x.Power(); },
-      [](const Rule& x) { return x.Number(0.0); },  // round
-      // a remainder is a less a multiple of b, which is constant between its jumps
-      [](const Rule& x) { return x.Subtract(x.da, x.Times(x.db, x.Of(kRound, x.Over(x.a, x.b)))); },
-      [](const Rule& x) { return x.Extreme(true); },
-      [](const Rule& x) { return x.Extreme(false); }};
-  static_assert(std::size(kRules) == static_cast<std::size_t>(kMax) + 1);
-  return kRules[static_cast<std::size_t>(operation)](rule);
-}
-
-}  // namespace
 
 std::vector<int> Differentiate(Graph& graph, const std::vector<int>& outputs,
                                const std::vector<int>& inputs, const std::vector<double>& values) {

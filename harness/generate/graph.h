@@ -135,7 +135,7 @@ class Graph {
   int Depth(const std::vector<bool>& live, const std::vector<bool>& given = {}) const;
 
   /// Returns a digest of operations, comparisons and `outputs`, without the numbers of constants.
-  /// Graphs of equal structure have one text of code (print_c.h) and the same Given() nodes.
+  /// Graphs of equal structure have one text of code (print_c.cpp) and the same Given() nodes.
   std::string Structure(const std::vector<int>& outputs) const;
   /// Known nodes that outputs, comparisons or nodes with unknown values use, ascending.
   std::vector<int> Given(const std::vector<int>& outputs) const;

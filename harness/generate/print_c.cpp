@@ -1,5 +1,3 @@
-#include "harness/generate/print_c.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,8 @@
 #include <cmath>
 #include <iterator>
 #include <utility>
+
+#include "harness/generate/record.h"
 
 namespace loopbench::generate {
 
@@ -102,20 +102,25 @@ class Printer {
       }
       text_ += "  return ok;\n}\n";
     }
-    fmt::format_to(std::back_inserter(text_), "static {0} {1}({2}) {{\n  {3}", Truth(), name_,
-                   parameters_, has_lanes_ ? "holds ok = " : "return ");
+    Put("static {0} {1}({2}) {{\n  {3}", Truth(), name_, parameters_,
+        has_lanes_ ? "holds ok = " : "return ");
     for (int function = 0; function < num_functions_; ++function) {
-      fmt::format_to(std::back_inserter(text_), "{}{}_part{}({})",
-                     function == 0 ? ""
-                     : has_lanes_  ? ";\n  ok &= "
-                                   : " &&\n         ",
-                     name_, function, arguments_);
+      Put("{}{}_part{}({})",
+          function == 0 ? ""
+          : has_lanes_  ? ";\n  ok &= "
+                        : " &&\n         ",
+          name_, function, arguments_);
     }
     text_ += has_lanes_ ? ";\n  return ok;\n}\n" : ";\n}\n";
     return std::move(text_);
   }
 
  private:
+  template <class... Arguments>
+  void Put(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+    fmt::format_to(std::back_inserter(text_), format, std::forward<Arguments>(arguments)...);
+  }
+
   /// A cosine stays with its sine.
   void AssignFunctions() {
     int operations = 0, function = 0;
@@ -152,9 +157,7 @@ class Printer {
   }
 
   void Open(int function) {
-    fmt::format_to(
-        std::back_inserter(text_),
-        "static {0} {1}_part{2}({3}) {{\n  {0} ok = {4};\n  (void)x, (void)y, (void)w;\n", Truth(),
+    Put("static {0} {1}_part{2}({3}) {{\n  {0} ok = {4};\n  (void)x, (void)y, (void)w;\n", Truth(),
         name_, function, parameters_, has_lanes_ ? "~(holds){0}" : "1");
   }
 
@@ -174,12 +177,10 @@ class Printer {
   /// Sine and cosine of an angle, s and c with its node, once in each function.
   void PrintSines(int angle, int function) {
     if (std::exchange(sines_in_[angle], function) == function) return;
-    fmt::format_to(std::back_inserter(text_), "  {0} s{1}, c{1};\n  sines({2}, &s{1}, &c{1});\n",
-                   number_, angle, Name(angle, function));
+    Put("  {0} s{1}, c{1};\n  sines({2}, &s{1}, &c{1});\n", number_, angle, Name(angle, function));
   }
 
   void Print(int node, int function, int* input) {
-    const auto out = std::back_inserter(text_);
     const Node& of = graph_.nodes()[node];
     if (of.operation == Operation::kInput) places_[node] = (*input)++;
     if (!live_[node]) return;
@@ -198,33 +199,33 @@ class Printer {
       case Operation::kPoseSin:
       case Operation::kPoseCos:
         PrintSines(of.a, function);
-        fmt::format_to(out, "  const {} v{} = {}{};\n", number_, node, in_c, of.a);
+        Put("  const {} v{} = {}{};\n", number_, node, in_c, of.a);
         break;
       default:
-        fmt::format_to(out, "  const {} v{} = ", number_, node);
+        Put("  const {} v{} = ", number_, node);
         if (std::isalpha(static_cast<unsigned char>(*in_c)) != 0) {
-          fmt::format_to(out, "{}{}({}{}{})", has_lanes_ ? "each_" : "", in_c, a(),
-                         of.b >= 0 ? ", " : "", of.b >= 0 ? b() : "");
+          Put("{}{}({}{}{})", has_lanes_ ? "each_" : "", in_c, a(), of.b >= 0 ? ", " : "",
+              of.b >= 0 ? b() : "");
         } else if (of.b < 0) {
-          fmt::format_to(out, "{}{}", in_c, a());
+          Put("{}{}", in_c, a());
         } else {
-          fmt::format_to(out, "{} {} {}", a(), in_c, b());
+          Put("{} {} {}", a(), in_c, b());
         }
         text_ += ";\n";
     }
-    if (room_[node] >= 0) fmt::format_to(out, "  w[{}] = v{};\n", room_[node], node);
+    if (room_[node] >= 0) Put("  w[{}] = v{};\n", room_[node], node);
     for (const std::size_t i : results_[node]) {
-      fmt::format_to(out, "  y[{}] = {};\n", i, Name(node, function));
+      Put("  y[{}] = {};\n", i, Name(node, function));
     }
     for (const Comparison* test : tests_[node]) {
       const char* relation = test->relation == Relation::kLess        ? "<"
                              : test->relation == Relation::kLessEqual ? "<="
                                                                       : "==";
-      fmt::format_to(out, "  ok &= {}({} {} {});\n",
-                     test->outcome ? ""
-                     : has_lanes_  ? "~"
-                                   : "!",
-                     Name(test->a, function), relation, Name(test->b, function));
+      Put("  ok &= {}({} {} {});\n",
+          test->outcome ? ""
+          : has_lanes_  ? "~"
+                        : "!",
+          Name(test->a, function), relation, Name(test->b, function));
     }
   }
 

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "harness/base/text.h"
-#include "harness/generate/print_c.h"
 #include "harness/generate/recorded.h"
 //
 #include "lagrange/lagrange.h"
@@ -32,8 +31,6 @@ std::unique_ptr<System<Space, Recorded>> MakeRecorded(const std::string& formula
       "formulation \"{}\" is compiled for double alone: no operations are recorded", formulation));
 }
 
-VectorX<Recorded> Constants(const Eigen::VectorXd& numbers) { return numbers.cast<Recorded>(); }
-
 /// The node of a number in the graph of the current recording.
 int NodeOf(const Recorded& x, Graph& graph) {
   return x.node >= 0 ? x.node : graph.Constant(x.number);
@@ -48,8 +45,8 @@ class Recorder {
     options.general = true;
     options.beside = nullptr;
     system_ = MakeRecorded(subject.formulation, mechanism_, options);
-    q_ = Constants(start.q);
-    u_ = Constants(start.u);
+    q_ = start.q.cast<Recorded>();
+    u_ = start.u.cast<Recorded>();
     if (system_->Start(start.t, q_, u_) != Outcome::kFinished)
       throw NotCovered("it does not start");
     if (!start.mode.empty()) system_->solver().TakeMode(start.mode);
@@ -122,10 +119,12 @@ class Recorder {
           }
         }
         break;
+      case Quantity::kMismatch:
       case Quantity::kViolation: {
         Correction<Recorded> largest;
         VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_equations());
         PositionViolation(kinematics, violation, largest);
+        if (subject_.quantity == Quantity::kMismatch) return {largest.rotation, largest.shift};
         values.assign(violation.begin(), violation.end());
         SpeedViolation(kinematics, violation);
         values.insert(values.end(), violation.begin(), violation.end());
@@ -135,12 +134,6 @@ class Recorder {
       case Quantity::kPositionStep:
       case Quantity::kSpeedStep:
         return Corrected(y.size());
-      case Quantity::kMismatch: {
-        Correction<Recorded> largest;
-        VectorX<Recorded> violation = VectorX<Recorded>::Zero(mechanism_.num_equations());
-        PositionViolation(kinematics, violation, largest);
-        return {largest.rotation, largest.shift};
-      }
     }
     return values;
   }
@@ -244,17 +237,13 @@ void RequireNoTurns(const RecordedFunction& recorded, SpaceKind space) {
   }
 }
 
-void RequireCovered(const RecordingSubject& subject) {
+RecordedFunction RecordAt(const RecordingSubject& subject, const RecordingStart& start, double t,
+                          const std::vector<double>* state) {
   const Enforcement level = subject.options.enforcement;
   if (!IsBuiltIn(level)) {
     throw NotCovered(fmt::format(
         "level \"{}\" is compiled for double alone: no operations are recorded", ToString(level)));
   }
-}
-
-RecordedFunction RecordAt(const RecordingSubject& subject, const RecordingStart& start, double t,
-                          const std::vector<double>* state) {
-  RequireCovered(subject);
   const SpaceKind space = subject.description.space;
   const auto record = [&](CastsAs casts) {
     return space == SpaceKind::kPlanar ? Recorder<Planar>(subject, start).Record(t, state, casts)

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "harness/generate/graph.h"
 #include "harness/generate/record.h"
 
 namespace loopbench::generate {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <functional>
 #include <set>
 #include <utility>
 
@@ -93,12 +92,8 @@ void Apply(const Record& line, const std::filesystem::path& folder, History* his
     throw ConfigError(fmt::format("{}: commit {}: \"{}\": found nothing, expected a text",
                                   FileOf(folder).string(), line.Text("commit"), key));
   }
-  HistoryEntry entry{line.Text("commit"),
-                     line.Text("date"),
-                     line.Text("machine"),
-                     ResultsIn(folder, line.Text("results")),
-                     "",
-                     ""};
+  HistoryEntry entry{line.Text("commit"), line.Text("date"), line.Text("machine"),
+                     ResultsIn(folder, line.Text("results"))};
   const auto same = std::ranges::find_if(entries, [&entry](const HistoryEntry& one) {
     return one.commit == entry.commit && one.machine == entry.machine;
   });
@@ -121,6 +116,15 @@ std::filesystem::path NewResults(const std::filesystem::path& folder, const Hist
     results = fmt::format("results/{}-{}.jsonl", stem, i);
   }
   return results;
+}
+
+/// Returns a line of the history with these texts.
+Record LineOf(const std::string& kind,
+              const std::vector<std::pair<std::string, std::string>>& texts) {
+  Record line;
+  line.Set("kind", kind);
+  for (const auto& [key, text] : texts) line.Set(key, text);
+  return line;
 }
 
 void RequireSomethingToFollow(const HistoryEntry& entry, const std::vector<Record>& records) {
@@ -154,29 +158,20 @@ std::string CommitNamed(const History& history, const std::string& name,
                                 found.empty() ? "" : fmt::format(" ({})", fmt::join(found, ", "))));
 }
 
-using IsWanted = std::function<bool(const HistoryEntry&)>;
-
-/// Returns the last wanted entry marked good or accepted.
-std::optional<HistoryEntry> LastMarked(const History& history, const IsWanted& is_wanted) {
-  std::optional<HistoryEntry> last;
-  for (const HistoryEntry& entry : history.entries) {
-    if ((entry.mark == "good" || entry.mark == kAccepted) && is_wanted(entry)) last = entry;
-  }
-  return last;
+bool IsMarkedGood(const HistoryEntry& entry) {
+  return entry.mark == "good" || entry.mark == kAccepted;
 }
 
-std::optional<HistoryEntry> LastNotBad(const History& history, const IsWanted& is_wanted) {
+bool IsNotBad(const HistoryEntry& entry) { return entry.mark != "bad"; }
+
+/// Returns the last such entry of a machine, of any machine if it is "".
+std::optional<HistoryEntry> Last(const History& history, bool (*is_such)(const HistoryEntry&),
+                                 const std::string& machine = "") {
   std::optional<HistoryEntry> last;
   for (const HistoryEntry& entry : history.entries) {
-    if (entry.mark != "bad" && is_wanted(entry)) last = entry;
+    if (is_such(entry) && (machine.empty() || entry.machine == machine)) last = entry;
   }
   return last;
-}
-
-bool IsAny(const HistoryEntry&) { return true; }
-
-IsWanted IsOf(const std::string& machine) {
-  return [machine](const HistoryEntry& entry) { return entry.machine == machine; };
 }
 
 }  // namespace
@@ -243,12 +238,10 @@ HistoryEntry AddToHistory(const std::filesystem::path& folder, HistoryEntry entr
   std::string text;
   for (const Record& record : records) text += ToJsonLine(Slim(record)) + '\n';
   WriteFileAtomically(ResultsIn(folder, entry.results.string()), text);
-  Record line;
-  line.Set("kind", std::string("commit"));
-  line.Set("commit", entry.commit);
-  line.Set("date", entry.date);
-  line.Set("machine", entry.machine);
-  line.Set("results", entry.results.string());
+  const Record line = LineOf("commit", {{"commit", entry.commit},
+                                        {"date", entry.date},
+                                        {"machine", entry.machine},
+                                        {"results", entry.results.string()}});
   entry.results = folder / entry.results;
   try {
     lines.Append(line);
@@ -275,17 +268,12 @@ Mark MarkInHistory(const std::filesystem::path& folder, Mark mark,
       return mark;
     }
   }
-  Record line;
-  line.Set("kind", std::string("mark"));
-  line.Set("commit", mark.commit);
-  line.Set("mark", mark.mark);
-  line.Set("note", mark.note);
-  lines.Append(line);
+  lines.Append(LineOf("mark", {{"commit", mark.commit}, {"mark", mark.mark}, {"note", mark.note}}));
   return mark;
 }
 
 std::optional<HistoryEntry> LastGood(const History& history, const std::string& machine) {
-  std::optional<HistoryEntry> good = LastMarked(history, IsOf(machine));
+  std::optional<HistoryEntry> good = Last(history, IsMarkedGood, machine);
   if (good) {
     bool is_behind = false;
     for (const HistoryEntry& entry : history.entries) {
@@ -293,9 +281,9 @@ std::optional<HistoryEntry> LastGood(const History& history, const std::string& 
       is_behind |= entry.commit == good->commit && entry.machine == machine;
     }
   }
-  if (!good) good = LastMarked(history, IsAny);
-  if (!good) good = LastNotBad(history, IsOf(machine));
-  if (!good) good = LastNotBad(history, IsAny);
+  if (!good) good = Last(history, IsMarkedGood);
+  if (!good) good = Last(history, IsNotBad, machine);
+  if (!good) good = Last(history, IsNotBad);
   for (const HistoryEntry& entry : history.entries) {
     if (good && entry.commit == good->commit && entry.machine == machine) good = entry;
   }
@@ -303,8 +291,8 @@ std::optional<HistoryEntry> LastGood(const History& history, const std::string& 
 }
 
 std::optional<HistoryEntry> LastGoodOfMachine(const History& history, const std::string& machine) {
-  std::optional<HistoryEntry> good = LastMarked(history, IsOf(machine));
-  if (!good) good = LastNotBad(history, IsOf(machine));
+  std::optional<HistoryEntry> good = Last(history, IsMarkedGood, machine);
+  if (!good) good = Last(history, IsNotBad, machine);
   return good ? good : LastGood(history, machine);
 }
 

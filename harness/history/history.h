@@ -18,8 +18,7 @@
 
 namespace loopbench::harness {
 
-// Detection of level changes in a series of numbers, robust to outliers.
-//
+// Detection of level changes in a series of numbers, robust to outliers:
 // P. Fearnhead, G. Rigaill, "Changepoint detection in the presence of outliers", Journal of the
 // American Statistical Association 114 (2019) 169-183: minimal penalised cost with the biweight
 // loss min((x - mu)^2, K^2), computed exactly by functional pruning (R-FPOP, a variant of PELT for
@@ -80,52 +79,8 @@ inline constexpr double kFalseAlarms = 0.01;
 ///     values beyond half of the step, with the share beyond 3 sigma in the series.
 std::vector<LevelChange> FindChanges(std::span<const double> x, const Resolution& resolution);
 
-// Git as storage of a history: commands, branches, locations.
-
-// The git program.
-
-/// Git repository of the current directory. Variables of a hook (GIT_DIR, GIT_INDEX_FILE, ...) only
-/// select this repository: the user's index and work tree are never used. Hooks do not run. User
-/// settings cannot change file contents or the set of files.
-class GitRepository {
- public:
-  /// Throws ConfigError if there is no repository or no git.
-  GitRepository();
-
-  /// @param variables  "NAME=value", in addition to the environment
-  /// @param input      standard input
-  ProgramResult Try(const std::vector<std::string>& words,
-                    const std::vector<std::string>& variables = {},
-                    const std::string& input = "") const;
-
-  /// Returns the output without the line end. Throws std::runtime_error with the message of git.
-  std::string Get(const std::vector<std::string>& words,
-                  const std::vector<std::string>& variables = {},
-                  const std::string& input = "") const;
-
-  /// Returns the commit of a branch.
-  std::optional<std::string> BranchAt(const std::string& branch) const;
-
-  /// Returns the work tree in which a branch is checked out; "" if none.
-  std::string CheckedOutIn(const std::string& branch) const;
-
-  /// Writes the regular files of a commit into `folder`, byte for byte: attributes, filters and
-  /// line-end settings of the user have no effect. Other entries are not written.
-  /// @param index  a file that does not exist yet, outside of the folder: for Commit()
-  void Export(const std::string& commit, const std::filesystem::path& folder,
-              const std::string& index) const;
-
-  /// Returns a new commit on top of `parent` ("": no parent) with its files and all of `folder`,
-  /// unchanged by ignore, conversion or signature settings. Returns `parent` if nothing changed.
-  /// The author is the user, or "loopbench" if git has no user.
-  /// @param index  file made by Export() for the parent; without a parent, a file that does not
-  /// exist
-  std::string Commit(const std::filesystem::path& folder, const std::string& index,
-                     const std::string& parent, const std::string& message) const;
-
- private:
-  std::string folder_;  ///< .git, common to all work trees
-};
+// Location of a history: a folder, or a branch of its own in the git repository of the current
+// directory.
 
 /// Checked-out commit and its date (ISO 8601, UTC); both "" outside of a repository.
 struct CheckedOut {
@@ -135,39 +90,7 @@ struct CheckedOut {
 /// Throws ConfigError if there is no git.
 CheckedOut FindCommit(const std::string& commit = "HEAD");
 
-// A history on a branch of its own in a git repository, edited in a folder.
-
-/// Files of a branch of the current repository, in a temporary folder. The repository changes only
-/// in Commit(). Several processes may work at once.
-class HistoryBranch {
- public:
-  /// Throws ConfigError if the branch is absent and `may_begin` is false, if its name is invalid,
-  /// or if it has files but no history.jsonl. Throws std::runtime_error with the message of git.
-  explicit HistoryBranch(std::string branch, bool may_begin = false);
-
-  const std::filesystem::path& folder() const { return folder_; }
-
-  /// Returns the message with the branch in place of the folder: "measured:history.jsonl".
-  std::string Named(std::string message) const;
-
-  /// Commits all changes to the branch, and creates it if necessary; does nothing without changes.
-  /// Returns false if another process has changed the branch: repeat the changes in a new
-  /// HistoryBranch. Throws ConfigError if the branch is checked out anywhere, and
-  /// std::runtime_error with the message of git.
-  bool Commit(const std::string& message);
-
- private:
-  std::string Index() const { return (temporary_.path() / "index").string(); }
-
-  GitRepository git_;
-  std::string branch_, at_;  ///< at_: the commit that was read, "" for a new branch
-  TemporaryFolder temporary_;
-  std::filesystem::path folder_;
-};
-
-// Location of a history, as given by users.
-
-/// Either a folder or a branch of the current repository.
+/// Either a folder or a branch, as given by users.
 struct HistoryPlace {
   std::filesystem::path store;
   std::string branch;
@@ -180,12 +103,16 @@ struct OpenHistory {
   std::function<std::string(std::string)> named;
 };
 
-/// Calls `read` with the history. Errors contain the branch instead of its folder. Throws as
-/// HistoryBranch, and ConfigError unless exactly one of both is given.
+/// Calls `read` with the history; the files of a branch are then in a temporary folder. Errors
+/// contain the branch instead of its folder. Throws ConfigError if not exactly one of both is
+/// given, or without git or a repository. It also does so for an absent branch, an invalid name,
+/// and a branch with files but no history.jsonl. Throws std::runtime_error with the message of git.
 void ReadPlace(const HistoryPlace& place, const std::function<void(const OpenHistory&)>& read);
 
-/// Calls `change`, which returns the commit message for the branch. If another process has changed
-/// the branch meanwhile, calls it again on the new state.
+/// Calls `change`, which returns the commit message for the branch, and commits all changes. If
+/// another process has changed the branch meanwhile, calls it again on the new state. The author is
+/// the user, or "loopbench" if git has no user. The user's index, work tree, hooks and settings
+/// have no effect. Throws as ReadPlace(), and ConfigError if the branch is checked out anywhere.
 /// @param may_begin  creates an absent branch
 void ChangePlace(const HistoryPlace& place, bool may_begin,
                  const std::function<std::string(const OpenHistory&)>& change);
@@ -252,8 +179,6 @@ std::optional<HistoryEntry> LastGoodOfMachine(const History& history, const std:
 
 // Series of measurements over commits, and their steps.
 
-// Measures over commits and their level changes.
-
 /// Value of a commit in a series.
 struct HistoryValue {
   std::size_t entry = 0;            ///< index into the history
@@ -272,10 +197,10 @@ struct HistorySeries {
   std::string machine, one;  ///< one: the case, or kAllCases
   std::string measure, unit;
   Rule rule = Rule::kNone;
-  std::vector<HistoryValue> values;
+  std::vector<HistoryValue> values = {};
   /// at: index into `values`; levels: medians of the values. For times found after removing the
   /// common variation, the levels are without it too.
-  std::vector<LevelChange> changes;
+  std::vector<LevelChange> changes = {};
 
   std::size_t Unsteady() const;  ///< number of values at another speed of the machine
 };
@@ -305,8 +230,6 @@ struct HistoryFindings {
 /// read.
 HistoryFindings FindingsOf(const History& history);
 
-// Steps of a history as table rows.
-
 /// Returns a row for each step, newest first; in one commit changed outcomes come first. "ratio" is
 /// empty if the level was 0 or a text.
 Table StepTable(const History& history, const HistoryFindings& found);
@@ -314,9 +237,7 @@ Table StepTable(const History& history, const HistoryFindings& found);
 /// Returns the number of omitted times as a sentence; nothing if there are none.
 std::optional<std::string> UnsteadyNote(const HistoryFindings& found);
 
-// Reports of a history: its page, and the summary of a comparison.
-
-// Results of a comparison for pull requests and CI servers.
+// Reports: the summary of a comparison for pull requests and CI servers, and the page of a history.
 
 /// Returns Markdown: the conclusion, worse or different measures (at most 50 rows and the number of
 /// others), and the number of compared measures. `notes` follow.
@@ -330,10 +251,8 @@ std::string ComparisonMarkdown(const ComparisonReport& report, const std::string
 /// @param options  options of the comparison
 std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions& options);
 
-// A history as one HTML page: steps, commits, and a chart of each series.
-
-/// Writes charts as SVG, without script; series with steps come first. Draws at most 200 and states
-/// the number of omitted ones.
+/// Returns one HTML page: steps, commits, and a chart of each series as SVG, without script; series
+/// with steps come first. Draws at most 200 and states the number of omitted ones.
 std::string HistoryPage(const History& history, const HistoryFindings& found,
                         const std::string& title, const std::vector<std::string>& provenance);
 

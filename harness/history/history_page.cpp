@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <ranges>
 
@@ -34,18 +35,16 @@ std::string Named(const Finding& finding) {
   return unit.empty() ? std::string(key) : fmt::format("{} [{}]", key, unit);
 }
 
-struct Missing {
-  const std::vector<std::string>* cases;
-  const char* why;
-};
+/// Cases, and why they are not compared.
+using Missing = std::pair<const std::vector<std::string>*, const char*>;
 
 std::vector<Missing> MissingCases(const ComparisonReport& report, const CompareOptions& options) {
   std::vector<Missing> missing = {
       {&report.ambiguous, "there more than once, not compared"},
       {&report.other_content,
        "ran another mechanism, limits or ensemble under equal keys, not compared"}};
-  if (!options.subset) missing.push_back({&report.only_base, "only in the base"});
-  if (!options.added) missing.push_back({&report.only_fresh, "only in the new measurements"});
+  if (!options.subset) missing.emplace_back(&report.only_base, "only in the base");
+  if (!options.added) missing.emplace_back(&report.only_fresh, "only in the new measurements");
   return missing;
 }
 
@@ -137,6 +136,11 @@ std::string ComparisonJunit(const ComparisonReport& report, const CompareOptions
 }
 namespace {
 
+/// "x 1.03"
+std::string RatioText(const LevelChange& change) {
+  return change.before > 0.0 ? fmt::format("x {:.3g}", change.after / change.before) : "from 0";
+}
+
 constexpr std::size_t kMaxCharts = 200;
 constexpr double kWidth = 760, kHeight = 190, kLeft = 92, kRight = 16, kTop = 12, kBottom = 46;
 
@@ -224,12 +228,10 @@ struct Chart {
     }
     for (const LevelChange& change : series.changes) {
       const double x = 0.5 * (X(change.at - 1) + X(change.at));
-      const std::string ratio =
-          change.before > 0.0 ? fmt::format("x {:.3g}", change.after / change.before) : "from 0";
       svg += fmt::format(
           "<line class=\"step\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1}\" y2=\"{2}\"/>"
           "<text x=\"{3:.1f}\" y=\"{4}\">{5}</text>\n",
-          x, kTop, bottom, x + 3, kTop + 12, ratio);
+          x, kTop, bottom, x + 3, kTop + 12, RatioText(change));
     }
     for (std::size_t i = 0; i < series.values.size(); ++i) {
       const HistoryValue& one = series.values[i];
@@ -269,21 +271,26 @@ std::string Sparkline(const History& history, const HistorySeries& series) {
       kLong, kHigh, path, x, y);
 }
 
+/// Begins a table with this heading.
+template <class Names>
+std::string BeginTable(const Names& names) {
+  return "<div class=\"wide\"><table><thead><tr>" +
+         Joined(names, "", [](const std::string& name) { return "<th>" + name + "</th>"; }) +
+         "</tr></thead><tbody>\n";
+}
+
+constexpr const char* kEndTable = "</tbody></table></div>\n";
+
 /// Rows of all series in this order, with their last value and their last step.
 std::string SeriesRows(const History& history, const std::vector<const HistorySeries*>& order) {
   std::string text =
-      "<div "
-      "class=\"wide\"><table><thead><tr><th>case</th><th>measure</th><th>machine</th><th>values</"
-      "th>"
-      "<th>last</th><th>last step</th></tr></thead><tbody>\n";
+      BeginTable(std::array{"case", "measure", "machine", "values", "last", "last step"});
   for (const HistorySeries* one : order) {
     std::string step;
     if (!one->changes.empty()) {
       const LevelChange& change = one->changes.back();
-      step = fmt::format(
-          "{} at {}",
-          change.before > 0.0 ? fmt::format("x {:.3g}", change.after / change.before) : "from 0",
-          ShortCommit(history.entries[one->values[change.at].entry].commit));
+      step = fmt::format("{} at {}", RatioText(change),
+                         ShortCommit(history.entries[one->values[change.at].entry].commit));
     }
     text += fmt::format(
         "<tr class=\"series\"><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td "
@@ -292,7 +299,7 @@ std::string SeriesRows(const History& history, const std::vector<const HistorySe
         Sparkline(history, *one), one->values.back().value,
         one->unit.empty() ? "" : " " + EscapeXml(one->unit), EscapeXml(step));
   }
-  return text + "</tbody></table></div>\n";
+  return text + kEndTable;
 }
 
 /// Rows of all steps, by commit.
@@ -303,9 +310,7 @@ std::string StepRows(const History& history, const HistoryFindings& found) {
   }
   constexpr std::size_t kOfCommit = 2;  // the first columns
   const auto columns = table.columns | std::views::drop(kOfCommit);
-  std::string text = "<div class=\"wide\"><table><thead><tr>", commit;
-  for (const TableColumn& column : columns) text += "<th>" + column.header + "</th>";
-  text += "</tr></thead><tbody>\n";
+  std::string text = BeginTable(Mapped<std::string>(columns, &TableColumn::header)), commit;
   for (const Record& row : table.rows) {
     if (const std::string own = row.Text("commit"); own != commit) {
       commit = own;
@@ -324,7 +329,7 @@ std::string StepRows(const History& history, const HistoryFindings& found) {
     }
     text += "</tr>\n";
   }
-  return text + "</tbody></table></div>\n";
+  return text + kEndTable;
 }
 
 }  // namespace
@@ -369,15 +374,13 @@ std::string HistoryPage(const History& history, const HistoryFindings& found,
                     order.size() - kMaxCharts, kMaxCharts);
   }
   page +=
-      "<h2>Commits</h2>\n<div "
-      "class=\"wide\"><table><thead><tr><th>commit</th><th>date</th><th>machine</th><th>mark</th>"
-      "<th>note</th></tr></thead><tbody>\n";
+      "<h2>Commits</h2>\n" + BeginTable(std::array{"commit", "date", "machine", "mark", "note"});
   for (const HistoryEntry& entry : history.entries) {
     page += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
                         EscapeXml(entry.commit), EscapeXml(entry.date), EscapeXml(entry.machine),
                         EscapeXml(entry.mark), EscapeXml(entry.note));
   }
-  page += "</tbody></table></div>\n";
+  page += kEndTable;
   for (const std::string& line : provenance)
     page += "<p class=\"soft\">" + EscapeXml(line) + "</p>\n";
   return page + "</main>\n</body>\n</html>\n";

@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <set>
 #include <span>
 #include <tuple>
 #include <utility>
@@ -54,21 +55,18 @@ Rule RuleOfTracked(const std::string& measure) {
 
 /// Returns NaN if no value is steady.
 double MedianOfSteady(const HistorySeries& series) {
-  std::vector<double> steady;
-  for (const HistoryValue& value : series.values) {
-    if (value.is_steady) steady.push_back(value.value);
-  }
-  return Median(steady);
+  std::vector<HistoryValue> steady = series.values;
+  std::erase_if(steady, [](const HistoryValue& one) { return !one.is_steady; });
+  return Median(Mapped<double>(steady, &HistoryValue::value));
 }
 
 /// @param cases  series with medians above 0
 HistorySeries Pooled(const std::vector<const HistorySeries*>& cases) {
-  HistorySeries pooled;
-  pooled.machine = cases.front()->machine;
-  pooled.one = kAllCases;
-  pooled.measure = cases.front()->measure;
-  pooled.rule = Rule::kTime;
-  pooled.unit = "of the median";
+  HistorySeries pooled{.machine = cases.front()->machine,
+                       .one = kAllCases,
+                       .measure = cases.front()->measure,
+                       .unit = "of the median",
+                       .rule = Rule::kTime};
   std::map<std::size_t, std::vector<double>> ratios;
   for (const HistorySeries* one : cases) {
     const double usual = MedianOfSteady(*one);
@@ -92,54 +90,40 @@ void AddValues(const std::string& machine, std::size_t entry, const std::vector<
     const auto [at, is_new] =
         places->try_emplace({machine, value.benchmark, value.measure}, all->size());
     if (is_new) {
-      HistorySeries& fresh = all->emplace_back();
-      fresh.machine = machine;
-      fresh.one = value.benchmark;
-      fresh.measure = value.measure;
-      fresh.unit = value.unit;
-      fresh.rule = RuleOfTracked(value.measure);
+      all->push_back({.machine = machine,
+                      .one = value.benchmark,
+                      .measure = value.measure,
+                      .unit = value.unit,
+                      .rule = RuleOfTracked(value.measure)});
     }
-    HistorySeries& series = (*all)[at->second];
-    series.values.push_back({entry, value.least, value.upper, value.calibration});
+    (*all)[at->second].values.push_back({entry, value.least, value.upper, value.calibration});
   }
 }
 
-/// Latest outcomes and warnings.
-class Endings {
- public:
-  void Add(const std::string& machine, std::size_t entry, const std::vector<Record>& records,
-           std::vector<EndingChange>* changes) {
-    std::map<std::string, int> times_there;
-    for (const Record& record : records) ++times_there[CaseText(record)];
-    for (const Record& record : records) {
-      const std::string one = CaseText(record);
-      if (times_there[one] > 1) continue;  // ambiguous: several records of this case
-      for (const char* measure : {"outcome", "warnings"}) {
-        if (record.Find(measure) == nullptr) continue;
-        std::string now = record.Text(measure);
-        const auto [at, is_new] = last_.try_emplace({machine, one, measure}, now);
-        if (!is_new && at->second != now) {
-          changes->push_back({machine, one, measure, entry, at->second, now});
-        }
-        at->second = std::move(now);
+/// Adds changes of outcomes and warnings; `last` has the latest ones.
+void AddEndings(const std::string& machine, std::size_t entry, const std::vector<Record>& records,
+                std::map<Key, std::string>* last, std::vector<EndingChange>* changes) {
+  const std::set<std::string> repeated = RepeatedCases(records);  // ambiguous
+  for (const Record& record : records) {
+    const std::string one = CaseText(record);
+    if (repeated.contains(one)) continue;
+    for (const char* measure : {"outcome", "warnings"}) {
+      if (record.Find(measure) == nullptr) continue;
+      std::string now = record.Text(measure);
+      const auto [at, is_new] = last->try_emplace({machine, one, measure}, now);
+      if (!is_new && at->second != now) {
+        changes->push_back({machine, one, measure, entry, at->second, now});
       }
+      at->second = std::move(now);
     }
   }
-
- private:
-  std::map<Key, std::string> last_;
-};
+}
 
 /// Returns the lower bound of values, so that logarithms exist; NaN if the measure has no levels.
 double FloorOf(const HistorySeries& series) {
-  switch (series.rule) {
-    case Rule::kError:
-      return kErrorFloor;
-    case Rule::kCount:
-    case Rule::kInstructions:
-      return 0.5;  // the step from 0 to 1 then equals the step from 1 to 2
-    default:
-      break;
+  if (series.rule == Rule::kError) return kErrorFloor;
+  if (series.rule == Rule::kCount || series.rule == Rule::kInstructions) {
+    return 0.5;  // the step from 0 to 1 then equals the step from 1 to 2
   }
   double smallest = std::numeric_limits<double>::quiet_NaN();
   for (const HistoryValue& one : series.values) {
@@ -311,8 +295,7 @@ double ChangeOfCases(const HistorySeries& pool, const std::vector<HistorySeries>
 
 /// Removes changes of a pool that most cases lack: changes of few cases shift its median, too.
 void RequireChangeOfCases(const std::vector<HistorySeries>& all, HistorySeries* pool) {
-  std::vector<double> values;
-  for (const HistoryValue& value : pool->values) values.push_back(value.value);
+  const std::vector<double> values = Mapped<double>(pool->values, &HistoryValue::value);
   std::vector<LevelChange>& changes = pool->changes;
   const auto entry_of = [pool](std::size_t i) {
     return i < pool->values.size() ? pool->values[i].entry : pool->values.back().entry + 1;
@@ -334,6 +317,12 @@ void RequireChangeOfCases(const std::vector<HistorySeries>& all, HistorySeries* 
   }
 }
 
+/// Returns a level as a cell: counts with all their digits.
+Value LevelOf(const HistorySeries& series, double level) {
+  const bool is_whole = series.rule == Rule::kCount && level == std::floor(level) && level < 1e15;
+  return is_whole ? Value(static_cast<std::int64_t>(level)) : Value(level);
+}
+
 }  // namespace
 
 std::size_t HistorySeries::Unsteady() const {
@@ -348,13 +337,13 @@ std::size_t HistoryFindings::Steps() const {
 
 HistoryFindings FindingsOf(const History& history) {
   HistoryFindings found;
-  Endings endings;
+  std::map<Key, std::string> endings;
   std::map<Key, std::size_t> places;
   std::vector<std::string> compilers;
   for (std::size_t e = 0; e < history.entries.size(); ++e) {
     const std::vector<Record> records = ReadResults(history.entries[e], &found.warnings);
     AddValues(history.entries[e].machine, e, records, &places, &found.series);
-    endings.Add(history.entries[e].machine, e, records, &found.endings);
+    AddEndings(history.entries[e].machine, e, records, &endings, &found.endings);
     compilers.push_back(records.empty() ? "" : OriginOf(records.front()).compiler);
   }
   MarkUnsteady(compilers, &found.series);
@@ -368,27 +357,13 @@ HistoryFindings FindingsOf(const History& history) {
   }
   return found;
 }
-namespace {
-
-/// Returns a level as a cell: counts with all their digits.
-Value LevelOf(const HistorySeries& series, double level) {
-  const bool is_whole = series.rule == Rule::kCount && level == std::floor(level) && level < 1e15;
-  return is_whole ? Value(static_cast<std::int64_t>(level)) : Value(level);
-}
-
-}  // namespace
 
 Table StepTable(const History& history, const HistoryFindings& found) {
   Table table;
   table.title = "Steps";
-  table.columns = {{"commit", "first commit"},
-                   {"date", "date"},
-                   {"case", "case"},
-                   {"measure", "measure"},
-                   {"before", "before", Format::kSeconds},
-                   {"after", "after", Format::kSeconds},
-                   {"ratio", "ratio", Format::kSeconds},
-                   {"confidence", "confidence", Format::kSeconds}};
+  table.columns = Columns(
+      "commit=first commit, date, case, measure, before:seconds, after:seconds, ratio:seconds, "
+      "confidence:seconds");
   std::vector<std::pair<std::size_t, Record>> rows;
   const auto add = [&](std::size_t place, const std::string& one, const std::string& measure,
                        const AnyValue& before, const AnyValue& after, const AnyValue& ratio,

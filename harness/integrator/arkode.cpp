@@ -1,90 +1,345 @@
 #include "harness/integrator/arkode.h"
 
+#include <arkode/arkode_arkstep.h>
+#include <arkode/arkode_erkstep.h>
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_version.h>
+#include <sunmatrix/sunmatrix_dense.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <string>
-#include <vector>
+#include <type_traits>
 
-#include "harness/config/options.h"
-#include "harness/integrator/arkode_memory.h"
 #include "harness/integrator/stepper.h"
+#include "mechanism/algebra/factors.h"
+
+// Explicit pairs run in ERKStep, implicit ones in ARKStep, which have the same calls under two
+// names. From 7.1 on they are one call, and this is the whole difference for most of them.
+#if SUNDIALS_VERSION_MAJOR >= 7
+#include <sundials/sundials_adaptcontroller.h>
+#define LOOPBENCH_ARK(implicit, call, ...) ARKode##call(__VA_ARGS__)
+#define LOOPBENCH_ARK_IMPLICIT(call, ...) ARKode##call(__VA_ARGS__)
+#else
+#define LOOPBENCH_ARK(implicit, call, ...) \
+  ((implicit) ? ARKStep##call(__VA_ARGS__) : ERKStep##call(__VA_ARGS__))
+#define LOOPBENCH_ARK_IMPLICIT(call, ...) ARKStep##call(__VA_ARGS__)
+#endif
+
+// A call that can fail only by a programming error.
+#define LOOPBENCH_SET(implicit, call, ...) \
+  ::loopbench::harness::arkode::Require(LOOPBENCH_ARK(implicit, call, __VA_ARGS__), #call)
+#define LOOPBENCH_SET_IMPLICIT(call, ...) \
+  ::loopbench::harness::arkode::Require(LOOPBENCH_ARK_IMPLICIT(call, __VA_ARGS__), #call)
 
 namespace loopbench::harness {
-namespace {
+namespace arkode {
 
-// w = theta^2 (1 - theta)^2 and its derivative vanish at both ends, so p + w (a + b theta) keeps
-// the end values of a cubic p. Its derivative at theta = 1/2 is zero. Derivatives are therefore
-// taken at 1/3 and 2/3.
-double W(double theta) { return theta * theta * (1 - theta) * (1 - theta); }
-double DW(double theta) { return 2 * theta * (1 - theta) * (1 - 2 * theta); }
-constexpr double kFirst = 1.0 / 3.0, kSecond = 2.0 / 3.0;
+/// A setting that ARKODE rejects is an error in the code, not an outcome of a run.
+void Require(int code, const char* what) {
+  if (code != 0) throw std::logic_error(std::string("ARKODE rejected ") + what);
+}
 
-}  // namespace
+template <auto kFree>
+struct Free {
+  template <class T>
+  void operator()(T* object) const {
+    kFree(object);
+  }
+};
+template <class Pointer, auto kFree>
+using Owned = std::unique_ptr<std::remove_pointer_t<Pointer>, Free<kFree>>;
 
-void DenseOutput::Cubic(double theta, std::span<double> y) const {
-  const double s = 1 - theta;
-  for (std::size_t i = 0; i < y0_.size(); ++i) {
-    const double rise = y1_[i] - y0_[i];
-    y[i] =
-        y0_[i] + theta * theta * (3 - 2 * theta) * rise + theta * s * (s * f0_[i] - theta * f1_[i]);
+struct FreeContext {
+  void operator()(std::remove_pointer_t<SUNContext>* context) const { SUNContext_Free(&context); }
+};
+using Context = std::unique_ptr<std::remove_pointer_t<SUNContext>, FreeContext>;
+struct FreeMemory {
+  bool implicit = false;
+  void operator()([[maybe_unused]] void* memory) const { LOOPBENCH_ARK(implicit, Free, &memory); }
+};
+
+#if SUNDIALS_VERSION_MAJOR >= 7
+using ControllerPtr = Owned<SUNAdaptController, SUNAdaptController_Destroy>;
+#else
+struct ControllerPtr {};  // ARKODE 6 keeps the controller inside its memory
+#endif
+
+std::span<double> Span(N_Vector v) { return {NV_DATA_S(v), static_cast<size_t>(NV_LENGTH_S(v))}; }
+
+// Debian's library goes through memory once per term; these give the same bits (same order of
+// additions) in one pass.
+void Scale(sunrealtype c, N_Vector x, N_Vector z) {
+  const std::span<double> from = Span(x), to = Span(z);
+  if (c == 1) {
+    std::copy(from.begin(), from.end(), to.begin());
+  } else {
+    std::transform(from.begin(), from.end(), to.begin(), [c](double v) { return c * v; });
   }
 }
 
-bool DenseOutput::Prepare(double t0, std::span<const double> y0, double t1,
-                          std::span<const double> y1, const Derivative& derivative) {
-  t0_ = t0;
-  h_ = t1 - t0;
-  y0_.assign(y0.begin(), y0.end());
-  y1_.assign(y1.begin(), y1.end());
-  const std::size_t n = y0_.size();
-  f0_.resize(n), f1_.resize(n), bump_.assign(n, 0.0), flat_.assign(n, 0.0), sloping_.assign(n, 0.0);
-  std::vector<double> y(n), rate(n);
-  const auto scaled = [&](double t, std::span<const double> at, std::vector<double>& f) {
-    if (!derivative(t, at, f)) return false;
-    for (double& value : f) value *= h_;
-    return std::ranges::all_of(f, [](double value) { return std::isfinite(value); });
-  };
-  constexpr double kBack = -std::numeric_limits<double>::infinity();
-  if (!scaled(t0, y0_, f0_) || !scaled(std::nextafter(t1, kBack), y1_, f1_)) return false;
-  // derivative at a point of the curve minus the cubic's own derivative
-  const auto excess = [&](double theta, std::vector<double>& more) {
-    Cubic(theta, y);
-    for (std::size_t i = 0; i < n; ++i) y[i] += W(theta) * bump_[i];
-    if (!scaled(t0_ + theta * h_, y, rate)) return false;
-    more.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      const double own = 6 * theta * (1 - theta) * (y1_[i] - y0_[i]) +
-                         (1 - theta) * (1 - 3 * theta) * f0_[i] + theta * (3 * theta - 2) * f1_[i];
-      more[i] = rate[i] - own;
+// One block of a linear combination, small enough to stay in registers.
+template <size_t kWidth>
+void CombineBlock(size_t first, int count, const sunrealtype* c, const N_Vector* x, double* to) {
+  std::array<double, kWidth> sum{};
+  for (int k = 0; k < count; ++k) {
+    const double* from = NV_DATA_S(x[k]) + first;
+    for (size_t j = 0; j < kWidth; ++j) sum[j] += c[k] * from[j];
+  }
+  std::copy(sum.begin(), sum.end(), to + first);
+}
+
+int LinearCombination(int count, sunrealtype* c, N_Vector* x, N_Vector z) {
+  const std::span<double> to = Span(z);
+  size_t i = 0;
+  for (; i + 8 <= to.size(); i += 8) CombineBlock<8>(i, count, c, x, to.data());
+  for (; i + 2 <= to.size(); i += 2) CombineBlock<2>(i, count, c, x, to.data());
+  if (i < to.size()) CombineBlock<1>(i, count, c, x, to.data());
+  return 0;
+}
+
+// Number of components in the norms: quadratures come last and have weight zero.
+size_t Weighted(std::span<const double> weight) {
+  size_t count = weight.size();
+  while (count > 0 && weight[count - 1] == 0) --count;
+  return count;
+}
+
+sunrealtype RmsNorm(N_Vector x, N_Vector w) {
+  const std::span<double> v = Span(x), weight = Span(w);
+  const size_t count = Weighted(weight);
+  double sum = 0;
+  for (size_t i = 0; i < count; ++i) {
+    const double term = v[i] * weight[i];
+    sum += term * term;
+  }
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+sunrealtype MaxNorm(N_Vector x, N_Vector w) {
+  const std::span<double> v = Span(x), weight = Span(w);
+  const size_t count = Weighted(weight);
+  double norm = 0;
+  for (size_t i = 0; i < count; ++i) norm = std::max(norm, std::abs(v[i]) * weight[i]);
+  return norm;
+}
+
+/// Sets the Runge-Kutta method of `memory`, of ERKStep for an explicit table, else of ARKStep.
+void SetTable(void* memory, const ButcherTable& table) {
+  std::vector<double> rows, b = table.b, c = table.c, d = table.b_embedded;
+  for (const std::vector<double>& row : table.A) rows.insert(rows.end(), row.begin(), row.end());
+  ARKodeButcherTable copy =
+      ARKodeButcherTable_Create(table.stages(), table.order, table.embedded_order, c.data(),
+                                rows.data(), b.data(), d.empty() ? nullptr : d.data());
+  const int code = table.is_implicit()
+                       ? ARKStepSetTables(memory, table.order, table.embedded_order, copy, nullptr)
+                       : ERKStepSetTable(memory, copy);
+  ARKodeButcherTable_Free(copy);
+  Require(code, "the table");
+}
+
+// Context, messages and step-size controller of the supported versions of SUNDIALS. Error texts of
+// the context go to `*message` after CaptureMessages(). The controller must live as long as
+// `memory`.
+#if SUNDIALS_VERSION_MAJOR >= 7
+
+void KeepMessage(int, const char*, const char*, const char* text, SUNErrCode, void* message,
+                 SUNContext) {
+  *static_cast<std::string*>(message) = text;
+}
+
+Context MakeContext(std::string* message) {
+  SUNContext context = nullptr;
+  Require(SUNContext_Create(SUN_COMM_NULL, &context), "the context");
+  SUNContext_ClearErrHandlers(context);
+  SUNContext_PushErrHandler(context, KeepMessage, message);
+  return Context(context);
+}
+
+void CaptureMessages(void*, bool, std::string*) {}
+
+ControllerPtr SetControl(void* memory, bool, SUNContext context, const Controller& c) {
+  // h_new = h e_n^(-k1/q) e_(n-1)^(-k2/q); the ready-made PI controller of 7.1 rejects every step.
+  ControllerPtr made(SUNAdaptController_Soderlind(context));
+  Require(SUNAdaptController_SetParams_Soderlind(made.get(), c.proportional ? 0.8 : 1,
+                                                 c.proportional ? -0.31 : 0, 0, 0, 0),
+          "the controller's parameters");
+  Require(SUNAdaptController_SetErrorBias(made.get(), c.bias), "the error bias");
+  LOOPBENCH_SET(, SetAdaptController, memory, made.get());
+  // Relative to one more than the lower of the two orders; -1 cancels this.
+  LOOPBENCH_SET(, SetAdaptivityAdjustment, memory, c.uses_method_order ? 0 : -1);
+  return made;
+}
+
+#else
+
+void KeepMessage(int code, const char*, const char*, char* text, void* message) {
+  if (code < 0) *static_cast<std::string*>(message) = text;  // warnings are positive
+}
+
+Context MakeContext(std::string*) {
+  SUNContext context = nullptr;
+  Require(SUNContext_Create(nullptr, &context), "the context");
+  return Context(context);
+}
+
+void CaptureMessages(void* memory, bool implicit, std::string* message) {
+  LOOPBENCH_SET(implicit, SetErrHandlerFn, memory, KeepMessage, message);
+}
+
+ControllerPtr SetControl(void* memory, bool implicit, SUNContext, const Controller& c) {
+  std::array<sunrealtype, 3> parameters{c.proportional ? 0.8 : 1, c.proportional ? 0.31 : 0, 0};
+  LOOPBENCH_SET(implicit, SetAdaptivityMethod, memory, c.proportional ? ARK_ADAPT_PI : ARK_ADAPT_I,
+                0, c.uses_method_order, parameters.data());
+  LOOPBENCH_SET(implicit, SetErrorBias, memory, c.bias);
+  return {};
+}
+
+#endif
+
+using Matrix = Eigen::Map<Eigen::MatrixXd>;
+
+Matrix View(SUNMatrix matrix) {
+  return {SM_DATA_D(matrix), SM_ROWS_D(matrix), SM_COLUMNS_D(matrix)};
+}
+
+/// I - gamma J, with the last Jacobian of `ode`.
+void SetMatrix(const GuardedOde& ode, double gamma, SUNMatrix matrix) {
+  Matrix A = View(matrix);
+  const auto controlled = static_cast<Eigen::Index>(ode.Controlled());
+  A.setIdentity();
+  A.leftCols(controlled) -=
+      gamma * Eigen::Map<const Eigen::MatrixXd>(ode.jacobian().data(), A.rows(), controlled);
+}
+
+// ARKODE's callback for the matrix; jok allows the Jacobian of an earlier stage.
+int LinearSystem(sunrealtype t, N_Vector y, N_Vector f, SUNMatrix matrix, SUNMatrix,
+                 sunbooleantype jok, sunbooleantype* is_current, sunrealtype gamma, void* data,
+                 N_Vector, N_Vector, N_Vector) {
+  auto& ode = *static_cast<GuardedOde*>(data);
+  *is_current = jok ? SUNFALSE : SUNTRUE;
+  if (!jok && !ode.EvaluateJacobian(t, Span(y), Span(f))) return -1;
+  SetMatrix(ode, gamma, matrix);
+  return 0;
+}
+
+SUNLinearSolver_Type IsDirect(SUNLinearSolver) { return SUNLINEARSOLVER_DIRECT; }
+
+std::int64_t NewtonIterations(void* memory) {
+  long count = 0;
+  LOOPBENCH_ARK_IMPLICIT(GetNumNonlinSolvIters, memory, &count);
+  return count;
+}
+
+/// The dense matrix I - gamma J of a stage and its factors. Quadratures come last in y, and f does
+/// not depend on them, so the matrix is block triangular. Only the leading block is factored; its
+/// solution does not depend on the quadratures in any bit.
+///
+/// The matrix belongs to the first implicit stage of a step. If this is not enough, a step that may
+/// shrink is shortened. At a fixed step the Jacobian is renewed at the iterate whenever a
+/// correction is more than half of the one before.
+class Newton {
+ public:
+  /// Makes ARKStep's `memory` solve its stages with Jacobians of `ode`, its user data. Must outlive
+  /// `memory`.
+  Newton(void* memory, N_Vector y, GuardedOde& ode, SUNContext context)
+      : memory_(memory),
+        ode_(ode),
+        controlled_(static_cast<Eigen::Index>(ode.Controlled())),
+        factors_(controlled_),
+        solution_(controlled_),
+        matrix_(SUNDenseMatrix(NV_LENGTH_S(y), NV_LENGTH_S(y), context)),
+        solver_(SUNLinSolNewEmpty(context)) {
+    solver_->content = this;
+    solver_->ops->gettype = IsDirect;
+    solver_->ops->setup = Factor;
+    solver_->ops->solve = Solve;
+    LOOPBENCH_SET_IMPLICIT(SetLinearSolver, memory, solver_.get(), matrix_.get());
+    LOOPBENCH_SET_IMPLICIT(SetLinSysFn, memory, LinearSystem);
+    // A solution scaled for a gamma that has changed would be wrong in the quadratures, whose
+    // convergence nothing tests.
+    LOOPBENCH_SET_IMPLICIT(SetLinearSolutionScaling, memory, SUNFALSE);
+    // f of a stage is (z - a) / gamma: evaluated at z it would multiply Newton's residual by J.
+    LOOPBENCH_SET_IMPLICIT(SetDeduceImplicitRhs, memory, SUNTRUE);
+    // ARKODE's own 20 and 51 steps between matrices and Jacobians let the error test fail until the
+    // run ends; a Jacobian per step costs less than the iterations and the rejected steps it saves.
+    LOOPBENCH_SET_IMPLICIT(SetLSetupFrequency, memory, 1);
+    LOOPBENCH_SET_IMPLICIT(SetJacEvalFrequency, memory, 1);
+    LOOPBENCH_SET_IMPLICIT(SetNonlinConvCoef, memory, ode.options().newton_coefficient);
+    LOOPBENCH_SET_IMPLICIT(SetMaxNonlinIters, memory, Stepper::MaxIterations(ode.options()));
+    if (ode.options().fixed_step > 0) {
+      // a correction that grows ends the iteration elsewhere; here it renews the Jacobian
+      LOOPBENCH_SET_IMPLICIT(SetNonlinRDiv, memory, 1e9);
     }
-    return true;
-  };
-  std::vector<double> first, second;
-  if (!excess(kFirst, first)) return false;
-  for (std::size_t i = 0; i < n; ++i) bump_[i] = first[i] / DW(kFirst);
-  if (!excess(kFirst, first) || !excess(kSecond, second)) return false;
-  // (w (a + b theta))' = w' a + (w' theta + w) b at both points
-  const double a1 = DW(kFirst), b1 = a1 * kFirst + W(kFirst);
-  const double a2 = DW(kSecond), b2 = a2 * kSecond + W(kSecond);
-  const double determinant = a1 * b2 - a2 * b1;
-  for (std::size_t i = 0; i < n; ++i) {
-    flat_[i] = (first[i] * b2 - second[i] * b1) / determinant;
-    sloping_[i] = (a1 * second[i] - a2 * first[i]) / determinant;
+    // A stage starts from the line through the last two states: fewer and less distant iterations
+    // than from the last state alone.
+    LOOPBENCH_SET_IMPLICIT(SetPredictorMethod, memory, 1);
   }
-  return true;
-}
 
-void DenseOutput::At(double t, std::span<double> y, std::span<double> lower) const {
-  const double theta = (t - t0_) / h_;
-  Cubic(theta, y);
-  for (std::size_t i = 0; i < y0_.size(); ++i) {
-    lower[i] = y[i] + W(theta) * bump_[i];
-    y[i] += W(theta) * (flat_[i] + theta * sloping_[i]);
+  Newton(const Newton&) = delete;
+  Newton& operator=(const Newton&) = delete;
+
+ private:
+  // Operations of the linear solver, whose content is the Newton object.
+  static int Factor(SUNLinearSolver solver, SUNMatrix matrix) {
+    Newton& self = *static_cast<Newton*>(solver->content);
+    self.factors_.compute(View(matrix).topLeftCorner(self.controlled_, self.controlled_));
+    // positive: Newton's iteration has failed, a shorter step may succeed
+    return (self.factors_.matrixLU().diagonal().array() == 0).any() ? 1 : 0;
   }
-}
-namespace {
+
+  static int Solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, sunrealtype) {
+    Newton& self = *static_cast<Newton*>(solver->content);
+    if (const int code = self.Renew(matrix); code != 0) return code;
+    const Eigen::Index n = self.controlled_, quadratures = NV_LENGTH_S(b) - n;
+    const Eigen::Map<const Eigen::VectorXd> rhs(NV_DATA_S(b), NV_LENGTH_S(b));
+    Eigen::Map<Eigen::VectorXd> to(NV_DATA_S(x), NV_LENGTH_S(x));
+    // in a vector of its own, whose alignment does not depend on the number of quadratures
+    Eigen::VectorXd& solution = self.solution_;
+    solution.noalias() = self.factors_.permutationP() * rhs.head(n);
+    self.factors_.matrixLU().triangularView<Eigen::UnitLower>().solveInPlace(solution);
+    self.factors_.matrixLU().triangularView<Eigen::Upper>().solveInPlace(solution);
+    self.corrections_ = {self.corrections_[1], solution.norm()};
+    to.head(n) = solution;
+    to.tail(quadratures) = rhs.tail(quadratures);
+    to.tail(quadratures).noalias() -= View(matrix).bottomLeftCorner(quadratures, n) * solution;
+    return 0;
+  }
+
+  /// At a fixed step: renews the factors if the last two corrections of this stage demand it.
+  /// Returns ARKODE's code.
+  int Renew(SUNMatrix matrix) {
+    if (ode_.options().fixed_step == 0) return 0;
+    if (const std::int64_t before = NewtonIterations(memory_); before != iterations_) {
+      iterations_ = before;
+      corrections_ = {};
+    }
+    if (corrections_[0] == 0 || corrections_[1] <= 0.5 * corrections_[0]) return 0;
+    sunrealtype t = 0, gamma = 0;
+    N_Vector y = nullptr;  // the iterate of the residual
+    LOOPBENCH_ARK_IMPLICIT(GetCurrentTime, memory_, &t);
+    LOOPBENCH_ARK_IMPLICIT(GetCurrentGamma, memory_, &gamma);
+    LOOPBENCH_ARK_IMPLICIT(GetCurrentState, memory_, &y);
+    std::vector<double> f(Span(y).size());
+    if (!ode_.Evaluate(t, Span(y), f) || !ode_.EvaluateJacobian(t, Span(y), f)) return -1;
+    SetMatrix(ode_, gamma, matrix);
+    return Factor(solver_.get(), matrix);
+  }
+
+  void* memory_;
+  GuardedOde& ode_;
+  std::int64_t iterations_ = -1;         ///< before this stage
+  std::array<double, 2> corrections_{};  ///< norms of the last two of this stage; 0: none
+  Eigen::Index controlled_;
+  Eigen::PartialPivLU<Eigen::MatrixXd> factors_;
+  Eigen::VectorXd solution_;
+  Owned<SUNMatrix, SUNMatDestroy> matrix_;
+  Owned<SUNLinearSolver, SUNLinSolFreeEmpty> solver_;
+};
 
 // Callbacks of ARKODE; `data` is the GuardedOde.
 int Derivative(sunrealtype t, N_Vector y, N_Vector ydot, void* data) {
@@ -105,15 +360,15 @@ std::vector<double> StepEnds(const std::vector<double>& stop_times, double t0, d
   std::vector<double> ends;
   double last = t0;
   for (const double t : stop_times) {
-    if (t > last + close && t < t_end - close) {
-      ends.push_back(last = t);
-    }
+    if (t > last + close && t < t_end - close) ends.push_back(last = t);
   }
   ends.push_back(t_end);
   return ends;
 }
 
-}  // namespace
+}  // namespace arkode
+
+using namespace arkode;
 
 // Members are destroyed in reverse order: the context must outlive the others, and the memory must
 // not.
@@ -125,11 +380,14 @@ struct Stepper::Arkode {
         context_(MakeContext(&message_)) {
     y_.reset(N_VNew_Serial(static_cast<sunindextype>(y0.size()), context_.get()));
     std::copy(y0.begin(), y0.end(), Span(y_.get()).begin());
-    UseOurOperations(y_.get(), profile_.is_ode45);  // every vector of ARKODE is a clone of this one
-    memory_ = Memory(profile_.is_implicit
-                         ? ARKStepCreate(nullptr, Derivative, t_start, y_.get(), context_.get())
-                         : ERKStepCreate(Derivative, t_start, y_.get(), context_.get()),
-                     FreeMemory{profile_.is_implicit});
+    // every vector of ARKODE is a clone of this one
+    y_->ops->nvscale = Scale;
+    y_->ops->nvlinearcombination = LinearCombination;
+    y_->ops->nvwrmsnorm = profile_.is_ode45 ? MaxNorm : RmsNorm;
+    memory_ = {profile_.is_implicit
+                   ? ARKStepCreate(nullptr, Derivative, t_start, y_.get(), context_.get())
+                   : ERKStepCreate(Derivative, t_start, y_.get(), context_.get()),
+               FreeMemory{profile_.is_implicit}};
     CaptureMessages(memory(), profile_.is_implicit, &message_);
     SetProblem();
     SetController(profile_.controller);
@@ -176,9 +434,7 @@ struct Stepper::Arkode {
     // higher degrees would evaluate derivatives for it.
     LOOPBENCH_SET(profile_.is_implicit, SetInterpolantDegree, memory(), 1);
     double longest = options.max_step;
-    if (longest == 0 && profile_.is_ode45) {
-      longest = 0.1 * (t_end() - t0);
-    }
+    if (longest == 0 && profile_.is_ode45) longest = 0.1 * (t_end() - t0);
     LOOPBENCH_SET(profile_.is_implicit, SetMaxStep, memory(), longest);  // 0 is none
     if (options.fixed_step > 0) {
       LOOPBENCH_SET(profile_.is_implicit, SetFixedStep, memory(), options.fixed_step);
@@ -232,10 +488,10 @@ struct Stepper::Arkode {
   double unclipped_ = 0;  // length of the last step that did not end at a stop time
   std::string message_;
   Context context_;
-  Vector y_;
+  Owned<N_Vector, N_VDestroy> y_;
   ControllerPtr controller_;
   std::unique_ptr<Newton> newton_;  // of implicit methods
-  Memory memory_;
+  std::unique_ptr<void, FreeMemory> memory_;
 };
 
 Stepper::Stepper(GuardedOde& ode, double t0, double t_end, const std::vector<double>& y0)
@@ -277,7 +533,11 @@ std::int64_t Stepper::newton_iterations() const {
 }
 
 std::int64_t Stepper::newton_failures() const {
-  return arkode_->newton_ ? NewtonFailures(arkode_->memory()) : 0;
+  long count = 0;
+  if (arkode_->newton_) {
+    LOOPBENCH_ARK_IMPLICIT(GetNumNonlinSolvConvFails, arkode_->memory(), &count);
+  }
+  return count;
 }
 
 Outcome OutcomeOfReturnCode(int code) {
@@ -288,9 +548,9 @@ Outcome OutcomeOfReturnCode(int code) {
       return Outcome::kFinished;
     case ARK_TOO_MUCH_WORK:
       return Outcome::kStepLimit;
-    case ARK_ERR_FAILURE:
+    case ARK_ERR_FAILURE:  // the error test failed too often in one step
       return Outcome::kStepTooSmall;
-    case ARK_CONV_FAILURE:
+    case ARK_CONV_FAILURE:  // Newton's iteration failed, too often in one step or at a fixed one
     case ARK_NLS_SETUP_RECVR:
       return Outcome::kNewtonFailure;
     default:

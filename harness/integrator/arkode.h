@@ -35,10 +35,9 @@ using StepObserver = std::function<StepAction(double t, std::span<double> y)>;
 // Dense output: the solution between the ends of a step.
 //
 // A polynomial of degree 5 through the ends of a step and their derivatives, improved twice by
-// derivatives at its own points (bootstrapping: W. Enright, K. Jackson, S. Norsett, P. Thomsen,
-// Interpolants for Runge-Kutta formulas, ACM Trans. Math. Softw. 12, 1986). Its error is of order
-// h^6; the polynomial of one degree less has order h^5. ARKODE's interpolant is of the same kind.
-// But ARKODE 6.4 evaluates it and derivatives at every stop time, so a run would depend on its
+// derivatives at its own points (W. Enright, K. Jackson, S. Norsett, P. Thomsen, Interpolants for
+// Runge-Kutta formulas, ACM Trans. Math. Softw. 12, 1986). Its error is of order h^6; the
+// polynomial of one degree less has order h^5. With ARKODE 6.4's own a run would depend on its
 // observers.
 
 /// f(t, y) to `ydot`; false when it cannot be had.
@@ -81,8 +80,7 @@ class DenseOutput {
 
 // Runge-Kutta integration by ARKODE, with named profiles and outcomes.
 //
-// SUNDIALS appears only in arkode.cpp and the files arkode_*; the rest of the harness includes this
-// header.
+// SUNDIALS appears only in arkode.cpp; the rest of the harness includes this header.
 
 /// Outcome of a run. Counters refer to the whole run, restarts included.
 struct IntegratorResult {
@@ -121,12 +119,8 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
                            const IntegratorOptions& options, const StepObserver& observe = {},
                            const DenseObserver* dense = nullptr);
 
-/// The one table from ARKODE's return codes (ARK_... in arkode.h of SUNDIALS) to outcomes:
-/// 0 and 1 (step taken, stop time reached) and 99 (warning) are kFinished; -1 (too much work) is
-/// kStepLimit; -3 (error test failed too often in one step) is kStepTooSmall; -4 and -31 (Newton's
-/// iteration failed too often in one step, or at all with a fixed one) are kNewtonFailure; every
-/// other code is kIntegratorError. A failure of the derivative (-8 to -11) is reported as the
-/// derivative's own outcome; it is kIntegratorError here because the code alone is ambiguous.
+/// Returns the outcome of a return code of ARKODE. A failure of the derivative is kIntegratorError
+/// here, because the code alone is ambiguous; a run reports the derivative's own outcome.
 Outcome OutcomeOfReturnCode(int code);
 
 // An external engine: a program with its own equations, integrator and projection. It replaces the

@@ -3,136 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <exception>
-#include <limits>
 #include <optional>
-#include <span>
 #include <stdexcept>
-#include <string>
-#include <vector>
-
-#include "harness/integrator/arkode.h"
 
 namespace loopbench::harness {
-
-GuardedOde::GuardedOde(Ode& ode, const IntegratorOptions& options)
-    : options_(options), ode_(ode), time_(options.time_limit_s) {
-  if (FindProfile(options.profile)->is_implicit) {
-    const auto size = static_cast<size_t>(ode.size());
-    jacobian_.resize(size * Controlled());
-    shifted_.resize(size);
-    shifted_f_.resize(size);
-  }
-}
-
-bool GuardedOde::Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept {
-  // Reading the clock costs a fifth of a small system's derivative, hence every 16th call only.
-  constexpr std::int64_t kCallsPerClock = 16;
-  if (failure_ != Outcome::kFinished || exception_) {
-    return false;
-  }
-  ++calls_;
-  try {
-    failure_ = ode_.Derivative(std::min(t, latest_), y, ydot);
-  } catch (...) {  // Integrate() throws it again
-    exception_ = std::current_exception();
-    return false;
-  }
-  if (failure_ == Outcome::kFinished &&
-      !std::all_of(ydot.begin(), ydot.end(), [](double v) { return std::isfinite(v); })) {
-    failure_ = Outcome::kNonFinite;
-  }
-  return failure_ == Outcome::kFinished && !(calls_ % kCallsPerClock == 0 && OutOfTime());
-}
-
-void GuardedOde::SetStop(double t) {
-  latest_ = std::isinf(t) ? t : std::nextafter(t, -std::numeric_limits<double>::infinity());
-}
-
-bool GuardedOde::OutOfTime() {
-  if (!time_.Reached()) {
-    return false;
-  }
-  failure_ = Outcome::kTimeLimit;
-  return true;
-}
-
-void GuardedOde::Weights(std::span<const double> y, std::span<double> weight, bool is_ode45) const {
-  const size_t controlled = Controlled();
-  for (size_t i = 0; i < controlled; ++i) {
-    const double relative = options_.rtol * std::abs(y[i]), atol = Atol(i);
-    weight[i] = 1 / (is_ode45 ? std::max(relative, atol) : relative + atol);
-  }
-  std::fill(weight.begin() + static_cast<std::ptrdiff_t>(controlled), weight.end(), 0.0);
-}
-
-double GuardedOde::FirstStepOfOde45(double t0, double t_end, std::span<const double> y0,
-                                    double longest) {
-  std::vector<double> f(y0.size());
-  if (!Evaluate(t0, y0, f)) {
-    return 0;
-  }
-  double rate = 0;
-  for (size_t i = 0; i < Controlled(); ++i) {
-    rate = std::max(rate, std::abs(f[i]) / std::max(std::abs(y0[i]), Atol(i) / options_.rtol));
-  }
-  rate /= 0.8 * std::pow(options_.rtol, 0.2);
-  const double h = std::min(longest, t_end - t0);
-  return h * rate > 1 ? 1 / rate : h;
-}
-
-// Jacobians for implicit methods: the problem's own, or difference quotients.
-
-bool GuardedOde::EvaluateJacobian(double t, std::span<const double> y,
-                                  std::span<const double> f) noexcept {
-  ++jacobians_;
-  std::fill(jacobian_.begin(), jacobian_.end(), 0.0);
-  std::optional<JacobianWork> own;
-  try {
-    own = ode_.Jacobian(std::min(t, latest_), y, jacobian_);
-  } catch (...) {  // Integrate() throws it again
-    exception_ = std::current_exception();
-    return false;
-  }
-  if (!own) {
-    return Differences(t, y, f);
-  }
-  calls_ += own->derivatives;
-  jacobian_calls_ += own->derivatives;
-  dual_evaluations_ += own->dual_evaluations;
-  if (!std::all_of(jacobian_.begin(), jacobian_.end(), [](double v) { return std::isfinite(v); })) {
-    failure_ = Outcome::kNonFinite;
-  }
-  return failure_ == Outcome::kFinished;
-}
-
-// One column per component. The increment is the root of round-off times the component's size, at
-// least atol / rtol, below which the tolerances call a component small: half the digits of the
-// quotient are good, which is plenty for Newton's iteration. It follows the direction of motion,
-// so as not to leave the region where f is defined (L. Shampine, M. Reichelt, The MATLAB ODE suite,
-// 1997, numjac).
-bool GuardedOde::Differences(double t, std::span<const double> y, std::span<const double> f) {
-  const double root = std::sqrt(std::numeric_limits<double>::epsilon());
-  std::copy(y.begin(), y.end(), shifted_.begin());
-  for (size_t j = 0; j < Controlled(); ++j) {
-    const double increment = root * std::max(std::abs(y[j]), Atol(j) / options_.rtol);
-    shifted_[j] = y[j] + std::copysign(increment, f[j]);
-    const std::int64_t before = calls_;
-    const bool is_good = Evaluate(t, shifted_, shifted_f_);
-    jacobian_calls_ += calls_ - before;
-    if (!is_good) {
-      return false;
-    }
-    const double shift = shifted_[j] - y[j];  // as it was rounded
-    double* column = jacobian_.data() + j * y.size();
-    for (size_t i = 0; i < y.size(); ++i) {
-      column[i] = (shifted_f_[i] - f[i]) / shift;
-    }
-    shifted_[j] = y[j];
-  }
-  return true;
-}
 namespace {
+
+// w = theta^2 (1 - theta)^2 and its derivative vanish at both ends, so p + w (a + b theta) keeps
+// the end values of a cubic p. Its derivative at theta = 1/2 is zero. Derivatives are therefore
+// taken at 1/3 and 2/3.
+double W(double theta) { return theta * theta * (1 - theta) * (1 - theta); }
+double DW(double theta) { return 2 * theta * (1 - theta) * (1 - 2 * theta); }
+constexpr double kFirst = 1.0 / 3.0, kSecond = 2.0 / 3.0;
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
@@ -140,9 +22,7 @@ std::string At(double t) { return " at t = " + std::to_string(t) + " s"; }
 
 // Ends the run with the failure of the derivative, the clock or ARKODE in the step after t_reached.
 bool Fails(const GuardedOde& ode, const Stepper& stepper, int code, IntegratorResult& result) {
-  if (ode.exception()) {
-    std::rethrow_exception(ode.exception());
-  }
+  if (ode.exception()) std::rethrow_exception(ode.exception());
   if (ode.failure() != Outcome::kFinished) {
     result.outcome = ode.failure();
     result.message = std::string(ToString(result.outcome)) + " in the step" + At(result.t_reached);
@@ -228,9 +108,7 @@ void Advance(GuardedOde& ode, Stepper& stepper, double t_end, std::vector<double
              const StepObserver& observe, Watcher& watcher, IntegratorResult& result) {
   for (double t = result.t_reached;;) {
     watcher.Leave(t, y);
-    if (Fails(ode, stepper, stepper.Step(t), result)) {
-      return;
-    }
+    if (Fails(ode, stepper, stepper.Step(t), result)) return;
     const std::span<const double> accepted = stepper.y();
     std::copy(accepted.begin(), accepted.end(), y.begin());
     watcher.Pass(t, y);
@@ -239,16 +117,12 @@ void Advance(GuardedOde& ode, Stepper& stepper, double t_end, std::vector<double
     ++result.steps;
     const StepAction action = observe ? observe(t, y) : StepAction::kContinue;
     watcher.Reach(t, y);
-    if (t >= t_end) {
-      return;
-    }
+    if (t >= t_end) return;
     if (action == StepAction::kStop) {
       result.message = "stopped by the observer" + At(t);
       return;
     }
-    if (Exhausted(ode, result)) {
-      return;
-    }
+    if (Exhausted(ode, result)) return;
     if (action == StepAction::kRestart) {
       stepper.Restart(t, y);
       ++result.restarts;
@@ -258,13 +132,179 @@ void Advance(GuardedOde& ode, Stepper& stepper, double t_end, std::vector<double
 
 }  // namespace
 
+void DenseOutput::Cubic(double theta, std::span<double> y) const {
+  const double s = 1 - theta;
+  for (std::size_t i = 0; i < y0_.size(); ++i) {
+    const double rise = y1_[i] - y0_[i];
+    y[i] =
+        y0_[i] + theta * theta * (3 - 2 * theta) * rise + theta * s * (s * f0_[i] - theta * f1_[i]);
+  }
+}
+
+bool DenseOutput::Prepare(double t0, std::span<const double> y0, double t1,
+                          std::span<const double> y1, const Derivative& derivative) {
+  t0_ = t0;
+  h_ = t1 - t0;
+  y0_.assign(y0.begin(), y0.end());
+  y1_.assign(y1.begin(), y1.end());
+  const std::size_t n = y0_.size();
+  f0_.resize(n), f1_.resize(n), bump_.assign(n, 0.0), flat_.assign(n, 0.0), sloping_.assign(n, 0.0);
+  std::vector<double> y(n), rate(n);
+  const auto scaled = [&](double t, std::span<const double> at, std::vector<double>& f) {
+    if (!derivative(t, at, f)) return false;
+    for (double& value : f) value *= h_;
+    return std::ranges::all_of(f, [](double value) { return std::isfinite(value); });
+  };
+  constexpr double kBack = -std::numeric_limits<double>::infinity();
+  if (!scaled(t0, y0_, f0_) || !scaled(std::nextafter(t1, kBack), y1_, f1_)) return false;
+  // derivative at a point of the curve minus the cubic's own derivative
+  const auto excess = [&](double theta, std::vector<double>& more) {
+    Cubic(theta, y);
+    for (std::size_t i = 0; i < n; ++i) y[i] += W(theta) * bump_[i];
+    if (!scaled(t0_ + theta * h_, y, rate)) return false;
+    more.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double own = 6 * theta * (1 - theta) * (y1_[i] - y0_[i]) +
+                         (1 - theta) * (1 - 3 * theta) * f0_[i] + theta * (3 * theta - 2) * f1_[i];
+      more[i] = rate[i] - own;
+    }
+    return true;
+  };
+  std::vector<double> first, second;
+  if (!excess(kFirst, first)) return false;
+  for (std::size_t i = 0; i < n; ++i) bump_[i] = first[i] / DW(kFirst);
+  if (!excess(kFirst, first) || !excess(kSecond, second)) return false;
+  // (w (a + b theta))' = w' a + (w' theta + w) b at both points
+  const double a1 = DW(kFirst), b1 = a1 * kFirst + W(kFirst);
+  const double a2 = DW(kSecond), b2 = a2 * kSecond + W(kSecond);
+  const double determinant = a1 * b2 - a2 * b1;
+  for (std::size_t i = 0; i < n; ++i) {
+    flat_[i] = (first[i] * b2 - second[i] * b1) / determinant;
+    sloping_[i] = (a1 * second[i] - a2 * first[i]) / determinant;
+  }
+  return true;
+}
+
+void DenseOutput::At(double t, std::span<double> y, std::span<double> lower) const {
+  const double theta = (t - t0_) / h_;
+  Cubic(theta, y);
+  for (std::size_t i = 0; i < y0_.size(); ++i) {
+    lower[i] = y[i] + W(theta) * bump_[i];
+    y[i] += W(theta) * (flat_[i] + theta * sloping_[i]);
+  }
+}
+
+GuardedOde::GuardedOde(Ode& ode, const IntegratorOptions& options)
+    : options_(options), ode_(ode), time_(options.time_limit_s) {
+  if (FindProfile(options.profile)->is_implicit) {
+    const auto size = static_cast<size_t>(ode.size());
+    jacobian_.resize(size * Controlled());
+    shifted_.resize(size);
+    shifted_f_.resize(size);
+  }
+}
+
+bool GuardedOde::Evaluate(double t, std::span<const double> y, std::span<double> ydot) noexcept {
+  // Reading the clock costs a fifth of a small system's derivative, hence every 16th call only.
+  constexpr std::int64_t kCallsPerClock = 16;
+  if (failure_ != Outcome::kFinished || exception_) return false;
+  ++calls_;
+  try {
+    failure_ = ode_.Derivative(std::min(t, latest_), y, ydot);
+  } catch (...) {  // Integrate() throws it again
+    exception_ = std::current_exception();
+    return false;
+  }
+  if (failure_ == Outcome::kFinished &&
+      !std::all_of(ydot.begin(), ydot.end(), [](double v) { return std::isfinite(v); })) {
+    failure_ = Outcome::kNonFinite;
+  }
+  return failure_ == Outcome::kFinished && !(calls_ % kCallsPerClock == 0 && OutOfTime());
+}
+
+void GuardedOde::SetStop(double t) {
+  latest_ = std::isinf(t) ? t : std::nextafter(t, -std::numeric_limits<double>::infinity());
+}
+
+bool GuardedOde::OutOfTime() {
+  if (!time_.Reached()) return false;
+  failure_ = Outcome::kTimeLimit;
+  return true;
+}
+
+void GuardedOde::Weights(std::span<const double> y, std::span<double> weight, bool is_ode45) const {
+  const size_t controlled = Controlled();
+  for (size_t i = 0; i < controlled; ++i) {
+    const double relative = options_.rtol * std::abs(y[i]), atol = Atol(i);
+    weight[i] = 1 / (is_ode45 ? std::max(relative, atol) : relative + atol);
+  }
+  std::fill(weight.begin() + static_cast<std::ptrdiff_t>(controlled), weight.end(), 0.0);
+}
+
+double GuardedOde::FirstStepOfOde45(double t0, double t_end, std::span<const double> y0,
+                                    double longest) {
+  std::vector<double> f(y0.size());
+  if (!Evaluate(t0, y0, f)) return 0;
+  double rate = 0;
+  for (size_t i = 0; i < Controlled(); ++i) {
+    rate = std::max(rate, std::abs(f[i]) / std::max(std::abs(y0[i]), Atol(i) / options_.rtol));
+  }
+  rate /= 0.8 * std::pow(options_.rtol, 0.2);
+  const double h = std::min(longest, t_end - t0);
+  return h * rate > 1 ? 1 / rate : h;
+}
+
+// Jacobians for implicit methods: the problem's own, or difference quotients.
+
+bool GuardedOde::EvaluateJacobian(double t, std::span<const double> y,
+                                  std::span<const double> f) noexcept {
+  ++jacobians_;
+  std::fill(jacobian_.begin(), jacobian_.end(), 0.0);
+  std::optional<JacobianWork> own;
+  try {
+    own = ode_.Jacobian(std::min(t, latest_), y, jacobian_);
+  } catch (...) {  // Integrate() throws it again
+    exception_ = std::current_exception();
+    return false;
+  }
+  if (!own) return Differences(t, y, f);
+  calls_ += own->derivatives;
+  jacobian_calls_ += own->derivatives;
+  dual_evaluations_ += own->dual_evaluations;
+  if (!std::all_of(jacobian_.begin(), jacobian_.end(), [](double v) { return std::isfinite(v); })) {
+    failure_ = Outcome::kNonFinite;
+  }
+  return failure_ == Outcome::kFinished;
+}
+
+// One column per component. The increment is the root of round-off times the component's size, at
+// least atol / rtol, below which the tolerances call a component small: half the digits of the
+// quotient are good, which is plenty for Newton's iteration. It follows the direction of motion,
+// so as not to leave the region where f is defined (L. Shampine, M. Reichelt, The MATLAB ODE suite,
+// 1997, numjac).
+bool GuardedOde::Differences(double t, std::span<const double> y, std::span<const double> f) {
+  const double root = std::sqrt(std::numeric_limits<double>::epsilon());
+  std::copy(y.begin(), y.end(), shifted_.begin());
+  for (size_t j = 0; j < Controlled(); ++j) {
+    const double increment = root * std::max(std::abs(y[j]), Atol(j) / options_.rtol);
+    shifted_[j] = y[j] + std::copysign(increment, f[j]);
+    const std::int64_t before = calls_;
+    const bool is_good = Evaluate(t, shifted_, shifted_f_);
+    jacobian_calls_ += calls_ - before;
+    if (!is_good) return false;
+    const double shift = shifted_[j] - y[j];  // as it was rounded
+    double* column = jacobian_.data() + j * y.size();
+    for (size_t i = 0; i < y.size(); ++i) column[i] = (shifted_f_[i] - f[i]) / shift;
+    shifted_[j] = y[j];
+  }
+  return true;
+}
+
 IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double>& y,
                            const IntegratorOptions& options, const StepObserver& observe,
                            const DenseObserver* dense) {
   std::string fault = Validate(options);
-  if (fault.empty() && y.empty()) {
-    fault = "the state is empty";
-  }
+  if (fault.empty() && y.empty()) fault = "the state is empty";
   if (fault.empty() && std::ssize(y) != ode.size()) {
     fault = "the state has " + std::to_string(y.size()) + " components, the problem " +
             std::to_string(ode.size());
@@ -281,9 +321,7 @@ IntegratorResult Integrate(Ode& ode, double t0, double t_end, std::vector<double
   if (fault.empty() && !(t_end >= t0)) {
     fault = "t_end is " + std::to_string(t_end) + "; it must not lie before t0";
   }
-  if (!fault.empty()) {
-    throw std::invalid_argument(fault);
-  }
+  if (!fault.empty()) throw std::invalid_argument(fault);
   GuardedOde guarded(ode, options);
   IntegratorResult result;
   result.t_reached = t0;

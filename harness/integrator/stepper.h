@@ -16,8 +16,6 @@
 
 namespace loopbench::harness {
 
-// The derivative as the integrator's C library may call it.
-
 /// An Ode behind the checks that ARKODE lacks: a derivative that is not finite (ARKODE would
 /// shorten the step for ever), the CPU clock, and exceptions, which must not travel through C
 /// frames. The first failure is kept for the result and ends every later evaluation. Also computes
@@ -49,8 +47,7 @@ class GuardedOde {
 
   /// MATLAB's first step: the time in which the fastest component changes by 0.8 rtol^(1/5) of its
   /// magnitude (at least atol / rtol), at most `longest` and the interval. Evaluates the
-  /// derivative; if that fails it returns 0, which leaves the choice to ARKODE, which never gets to
-  /// use it.
+  /// derivative; 0 if that fails.
   double FirstStepOfOde45(double t0, double t_end, std::span<const double> y0, double longest);
 
   /// Number of components that are not quadratures.
@@ -86,10 +83,9 @@ class GuardedOde {
   std::exception_ptr exception_;
 };
 
-// One run's integrator, advanced one accepted step at a time.
-
-/// ARKODE set up for one profile and one interval. The private part keeps SUNDIALS types out of
-/// this header; Integrate() (arkode.h) is the loop over Step() with limits and observers.
+/// ARKODE set up for one profile and one interval, advanced one accepted step at a time. The
+/// private part keeps SUNDIALS types out of this header; Integrate() (arkode.h) is the loop over
+/// Step().
 class Stepper {
  public:
   /// Returns the limit of Newton's iterations in a stage. A step that may shrink is cheaper

@@ -1,6 +1,7 @@
 // Analysis of runs and models: growth, warnings, findings on structures.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -17,8 +18,6 @@ namespace loopbench::harness {
 
 // Growth of drift with time and of time with size: fits and their tests.
 
-// Best-fitting law of growth: t^(1/2), t, t^(3/2), t^2, or e^(k t).
-
 /// One run's drift: times since release in s, increasing, and drift in the unit of a length (signs
 /// are dropped). Samples belong to accepted steps. A value that is not finite ends the run.
 struct DriftSeries {
@@ -26,136 +25,75 @@ struct DriftSeries {
   std::vector<double> value;
 };
 
-struct HypothesisOptions {
-  /// Readings of a running maximum are correlated. 64 readings over about ten swings carry the
-  /// information of this many independent ones. Used only for the penalty of a parameter.
-  double independent_readings = 16;
-
-  /// Maximum distance of the fitted exponent from an accepted hypothesis. It covers the bias of a
-  /// running maximum (0.05) and of finite windows (fitted exponents of mechanisms are 1.84 to 2.08
-  /// instead of 2). It is below a third of the half unit between hypotheses.
-  double exponent_tolerance = 0.15;
-
-  /// Minimum growth of e^(k t) within the window; slower growth looks like a plateau.
-  double least_factor = 2.718281828459045;
-
-  /// A rival is refuted when its mean score lags by so many standard errors: 99 % for 8 members
-  /// (Student's t, one-sided, 7 degrees of freedom: 3.0), more for more.
-  double standard_errors = 3.0;
-
-  /// Fewer members than this refute nothing.
-  int fewest_members = 8;
-};
-
-/// The answer.
+/// Best-fitting law of growth.
 struct Hypothesis {
   std::string name = "none";  ///< "t^0.5", "t^1", "t^1.5", "t^2", "exponential" or "none"
   bool refutes_rivals = false;
   /// Root-mean-square residual of log drift: best rival over winner (geometric means over the
   /// members). 1 is a tie, 3 is clear. NaN without data.
-  double ratio;
-  double rate;  ///< mean k of e^(k t) over the members [1/s], for any winner; NaN without data
+  double ratio = NAN;
+  /// Mean k of e^(k t) over the members [1/s], for any winner. NaN without data.
+  double rate = NAN;
 };
 
-/// Compares the hypotheses on running maxima read at times spaced evenly in log t, one series per
-/// member of the ensemble, all over the same window.
+/// Compares the laws t^(1/2), t, t^(3/2), t^2 and e^(k t) on running maxima read at times spaced
+/// evenly in log t, one series per member of the ensemble, all over the same window.
 ///
 /// Fit: least squares of log(drift), so that errors are relative and every decade counts the same.
 /// Power laws have one free number (the factor), e^(k t) has two. The score of a hypothesis in one
-/// member is ln(mean square residual) + m ln(n) / n with m free numbers and n
-/// `independent_readings`: the Bayesian information criterion per reading. The winner has the least
-/// mean score over the members. It is "none" when a power law wins whose exponent is further than
-/// `exponent_tolerance` from the mean of the fitted ones, or when e^(k t) wins without growing by
-/// `least_factor` or without beating a power law of free exponent.
+/// member is ln(mean square residual) + m ln(n) / n with m free numbers and n independent readings:
+/// the Bayesian information criterion per reading. The winner has the least mean score over the
+/// members. It is "none" when a power law wins whose exponent is far from the mean of the fitted
+/// ones, or when e^(k t) wins without growing by a factor e or without beating a power law of free
+/// exponent.
 ///
 /// Score differences between two hypotheses are formed member by member. Their standard error over
 /// the members decides whether a rival is refuted: members are independent, readings of one run are
 /// not (Vuong's model comparison, paired by run).
 ///
 /// @param exponent  mean of the fitted exponents over the members, same window.
-Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double exponent,
-                             const HypothesisOptions& options = {});
-
-// The exponent p in "drift grows like t^p", from an ensemble of runs, with an honest spread.
-
-/// Cut-offs and minimum window lengths. Fractions of time refer to the end of the usable part of
-/// the runs.
-struct GrowthOptions {
-  /// Starts of the two windows. Earlier growth is affected by the few first steps and by a first
-  /// swing that may differ from later ones.
-  double window_start = 0.1;
-  double late_window_start = 0.5;
-
-  /// Number of times at which the running maximum is read, evenly spaced in log t for equal weight
-  /// per decade. The integrator's own samples would give the last decade nine tenths.
-  int points = 64;
-
-  /// Drift above this fraction of `length` is no longer small, and stops growing: cut off.
-  double saturation = 0.1;
-
-  /// Drift below this many round-offs of `length` is the evaluation's own noise: cut off.
-  double floor = 10;
-
-  /// A final drift below this many round-offs of `length` is called "round-off". A thousand is the
-  /// effect of rounding after N = 1e4 steps: random velocity errors add up to eps v sqrt(N),
-  /// positions to eps v T sqrt(N / 3), with v T about ten lengths. Truncation at the tightest
-  /// tolerance in use (1e-12) leaves more than ten thousand.
-  double round_off = 1e3;
-
-  /// "too-short" unless the first window's end is this many times its start (saturation and floor
-  /// may have clipped it) and every run has this many samples in the late window.
-  double shortest_ratio = 4;
-  int fewest_samples = 16;
-
-  /// Fewer members than this never resolve an exponent.
-  int fewest_members = 8;
-
-  /// Means of the two windows that differ by less than this agree even if the spread is smaller.
-  /// The running maximum of a drift with period P lags by up to P, which alone raises a slope p by
-  /// some p P / (2 t), t being the window's start: 0.04 for p = 2 and seven periods. The spread
-  /// does not show this bias, so windows should start after several periods.
-  double slope_bias = 0.05;
-
-  /// Largest standard error of either mean. Exponents that theory offers (1/2, 1, 3/2, 2) lie half
-  /// a unit apart; two standard errors must stay within half of that.
-  double largest_error = 0.125;
-
-  HypothesisOptions hypotheses = {};
-};
+Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double exponent);
 
 /// Result of the analysis. Exponents and spreads are NaN if not available.
 struct Growth {
-  double exponent;       ///< mean over the members, window [0.1 T, T]
-  double spread;         ///< sample standard deviation over the members; NaN for one member
-  double exponent_late;  ///< the same for the window [0.5 T, T]
-  double spread_late;
-  bool resolved;          ///< see AnalyseGrowth()
-  std::string regime;     ///< "truncation", "round-off", "saturated" or "too-short"
-  int members;            ///< number of runs
-  double t_from;          ///< start of the first window, s; later than 0.1 T if the floor clips it
-  double t_to;            ///< T, end of both windows, s; before the runs' end if drift saturates
+  double exponent = NAN;       ///< mean over the members, window [0.1 T, T]
+  double spread = NAN;         ///< sample standard deviation over the members; NaN for one member
+  double exponent_late = NAN;  ///< the same for the window [0.5 T, T]
+  double spread_late = NAN;
+  bool resolved = false;             ///< see AnalyseGrowth()
+  std::string regime = "too-short";  ///< or "truncation", "round-off", "saturated"
+  int members = 0;                   ///< number of runs
+  double t_from = NAN;    ///< start of the first window, s; later than 0.1 T if the floor clips it
+  double t_to = NAN;      ///< T, end of both windows, s; before the runs' end if drift saturates
   Hypothesis hypothesis;  ///< which law fits best in the first window
-  bool hypothesis_resolved;  ///< see AnalyseGrowth()
+  bool hypothesis_resolved = false;  ///< see AnalyseGrowth()
 };
 
-/// Least-squares slope of log(running maximum) against log t, per run and window; mean and spread
-/// over the ensemble.
+/// A final drift below this many round-offs of the length is called "round-off". A thousand is the
+/// effect of rounding after N = 1e4 steps: random velocity errors add up to eps v sqrt(N),
+/// positions to eps v T sqrt(N / 3), with v T about ten lengths. Truncation at the tightest
+/// tolerance in use (1e-12) leaves more than ten thousand.
+inline constexpr double kRoundOffDrift = 1e3;
+
+/// Returns the exponent p in "drift grows like t^p": the least-squares slope of log(running
+/// maximum) against log t, per run and window; mean and spread over the ensemble.
 ///
 /// The residual scatter of one fit underestimates its error by a factor of 3 to 12 because
 /// residuals are periodic and correlated. The spread therefore comes from 16 to 32 runs with
 /// perturbed starts. One run resolves nothing.
 ///
-/// All members use the same windows: T is the earliest of t_end, a run's end and saturation, and
-/// the first window starts no earlier than the last member leaves the floor.
+/// All members use the same windows: T is the earliest of t_end, a run's end and saturation (a
+/// tenth of the length), and the first window starts no earlier than the last member leaves the
+/// floor of ten round-offs.
 ///
 /// *Resolved* means all of:
-///  1. at least `fewest_members` members and windows that are not too short;
-///  2. |exponent - exponent_late| <= max(s, slope_bias) with s^2 the mean of the squares of the two
+///  1. at least 8 members and windows that are not too short;
+///  2. |exponent - exponent_late| <= max(s, 0.05) with s^2 the mean of the squares of the two
 ///     spreads. The measure is the spread and not the standard error s / sqrt(m): the question is
 ///     whether one power law holds on both windows within the scatter of runs, and that must not
 ///     become harder to affirm the more runs there are;
-///  3. s / sqrt(m) <= largest_error for either spread, because with a large spread the second
-///     condition would hold for any numbers.
+///  3. s / sqrt(m) <= 0.125 for either spread, because with a large spread the second condition
+///     would hold for any numbers.
 ///
 /// *Regime*: "round-off" if the geometric mean of the final running maxima is below `round_off`;
 /// else "too-short" if a window is; else "saturated" if some member passes saturation before t_end
@@ -167,21 +105,19 @@ struct Growth {
 /// is.
 ///
 /// @param length  characteristic length of the mechanism (a link), in the unit of the drift.
+/// @param round_off  in round-offs of the length
 /// @throws std::invalid_argument if t and value differ in size or length is not positive.
 Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double length,
-                     const GrowthOptions& options = {});
+                     double round_off = kRoundOffDrift);
 
 /// Returns the running maximum of |value| at `points` times spaced evenly in log t, from the first
 /// positive time to the last. It is a compact log-log curve of drift. Empty if there is no interval
 /// or points < 2.
 DriftSeries Envelope(const DriftSeries& series, int points);
 
-// Fits the exponent p of cost = c size^p.
-//
-// Least squares of log(cost) against log(size), one point per size. Costs of real programs are not
-// powers (fixed costs at small sizes, caches at large ones), so the fit comes with two spreads: the
-// standard error from the residuals, and the range of slopes between neighbouring sizes.
-
+/// Fit of the exponent p of cost = c size^p. Costs of real programs are not powers (fixed costs at
+/// small sizes, caches at large ones), so the fit comes with two spreads: the standard error from
+/// the residuals, and the range of slopes between neighbouring sizes.
 struct PowerFit {
   int sizes = 0;                         ///< points used; below 2 everything else is NaN
   double smallest = 0.0, largest = 0.0;  ///< sizes at the ends
@@ -191,64 +127,37 @@ struct PowerFit {
   double slope_min = 0.0, slope_max = 0.0;  ///< between neighbouring sizes
 };
 
-/// Points with a size or cost that is not positive and finite are left out; of equal sizes the
-/// geometric mean of their costs counts as one point.
+/// Least squares of log(cost) against log(size). Points with a size or cost that is not positive
+/// and finite are left out; of equal sizes the geometric mean of their costs counts as one point.
 PowerFit FitPower(std::span<const double> sizes, std::span<const double> costs);
 
-// Warnings about unusual models, with lengths relative to the links.
+// Warnings about unusual models: sentences that name the parts.
 
-// The length that lengths of one mechanism are compared with.
-
-/// Returns the longest extent [m] of the joints of one moving body (their distance for two joints)
-/// or of a rod. If no body has two joints: the longest distance of a joint from a centre of mass,
-/// or else 1. Depends on geometry alone, not on the position in space.
+/// Returns the length that lengths of one mechanism are compared with: the longest extent [m] of
+/// the joints of one moving body (their distance for two joints) or of a rod. If no body has two
+/// joints: the longest distance of a joint from a centre of mass, or else 1. Depends on geometry
+/// alone, not on the position in space.
 double LinkLength(const MechanismDescription& description);
 
-// Warnings about a mechanism before any run.
-
-enum class WarningKind {
-  kInconsistentStart,  ///< the start cannot be assembled
-  kLocked,             ///< nothing can move
-  kSingularStart,      ///< the start is a singular configuration
-  kNearSingular,       ///< the loops are almost dependent at the start: bodies nearly in line
-  kFloating,           ///< a part that no joint connects to ground
-  kMassRatio,          ///< masses further apart than their equations can resolve well
-  kFarCentre,          ///< a centre of mass so far from its joints that poses lose digits
-  kNotAnalysed,        ///< too large for an analysis of rank
-  kRounded,            ///< constraints are redundant within the accuracy of the input only
-  kMissedGuess,        ///< a joint starts far from its guess
-  kDegrees,            ///< angles of more than a turn, which may have been meant in degrees
-};
-
-struct Warning {
-  WarningKind kind = WarningKind::kLocked;
-  std::string text;  ///< a sentence that names the parts
-};
-
-/// The heaviest body over the lightest: beyond it half the digits of a double are the light body's.
-inline constexpr double kLargestMassRatio = 1e8;
 /// Ratio of singular values (Structure::conditioning) below which a start is near singular. Loop
 /// forces are then about a hundred times their causes. The paper's problems stay above 0.1 except
 /// at their singular configurations.
 inline constexpr double kNearSingularRatio = 1e-2;
 
-/// Distance of a centre of mass from the middle of its joints over the mechanism's length. Poses
-/// refer to centres of mass, so joint positions have rounding errors eps times as large. Beyond
-/// this limit a tolerance of 1e-12 cannot be met.
-inline constexpr double kFarthestCentre = 1e3;
-
 /// Returns warnings from the numbers alone, without assembly. Angles above one turn in initial
-/// coordinates, frames and spring rest angles give one combined warning. It is a guess: such an
-/// angle may be intended.
-std::vector<Warning> FindUnitWarnings(const MechanismDescription& description);
+/// coordinates, frames and spring rest angles give one combined warning: they may have been meant
+/// in degrees.
+std::vector<std::string> FindUnitWarnings(const MechanismDescription& description);
 
-/// A warning for each guess that a start q in joint coordinates misses.
-std::vector<Warning> FindGuessWarnings(const MechanismDescription& description,
-                                       const VectorX<double>& q);
+/// Returns a warning for each guess that a start q in joint coordinates misses.
+std::vector<std::string> FindGuessWarnings(const MechanismDescription& description,
+                                           const VectorX<double>& q);
 
-/// Returns all warnings.
-std::vector<Warning> FindWarnings(const MechanismDescription& description,
-                                  const Structure& structure);
+/// Returns all warnings. They concern units and guesses; starts that are inconsistent, singular or
+/// nearly so; locked mechanisms; redundancy within the accuracy of the input; parts that no joint
+/// connects to ground; and masses or centres of mass that lose digits.
+std::vector<std::string> FindWarnings(const MechanismDescription& description,
+                                      const Structure& structure);
 
 // Findings of `explain` on a structure: idle degrees of freedom, hints on parts that may be
 // mistakes, the degrees of freedom that a file expects, and the range of a driven coordinate.
@@ -273,12 +182,8 @@ std::vector<IdleFreedom> FindIdleFreedoms(const MechanismDescription& descriptio
 std::vector<std::string> NamesOf(const MechanismDescription& description,
                                  const std::vector<IdleFreedom>& idle);
 
-/// Radius of gyration over the size of a body beyond which, or below its inverse, units may be
-/// mixed. Bodies of usual shapes have 0.1 to 1; g for kg gives 1/30, mm for m 1000 times.
-inline constexpr double kOddGyration = 100.0;
-
-/// Returns sentences on unusual parts: bodies that hang by one joint beside
-/// loops, and radii of gyration out of proportion with the distances of joints and centres of mass.
+/// Returns sentences on unusual parts: bodies that hang by one joint beside loops, and radii of
+/// gyration out of proportion with the distances of joints and centres of mass.
 std::vector<std::string> FindHints(const MechanismDescription& description,
                                    const Structure& structure);
 
@@ -288,13 +193,7 @@ std::vector<std::string> FindHints(const MechanismDescription& description,
 std::string FreedomFault(const MechanismDescription& description, const ObservedQuantities& observe,
                          const Structure& structure);
 
-// Range of a driven coordinate: from the start to the positions beyond which loops do not close.
-//
-// The coordinate is held and moved in small steps, each from the last position. A step that does
-// not close, or that ends far from the last position (on another branch), is halved until it is
-// negligible. The gap of the loops grows in proportion to the way beyond a limit, so that limits
-// are accurate to a few times the accepted gap, 1e-11 of the mechanism's size.
-
+/// End of the range of a driven coordinate, beyond which loops do not close.
 struct RangeEnd {
   double value = 0.0;       ///< [rad] or [m]
   bool binds = false;       ///< else the search ended: a turn, or ten lengths from the start
@@ -309,14 +208,17 @@ struct CoordinateRange {
   RangeEnd low, high;
 };
 
+/// The coordinate is held and moved in small steps, each from the last position. A step that does
+/// not close, or that ends far from the last position (on another branch), is halved until it is
+/// negligible. The gap of the loops grows in proportion to the way beyond a limit, so that limits
+/// are accurate to a few times the accepted gap, 1e-11 of the mechanism's size.
+///
 /// `joint` has one coordinate; a motion of the file is ignored. All other motions, except idle
 /// ones, must follow from it and from "fixed" joints; these do not count if they leave no motion.
 CoordinateRange FindRange(MechanismDescription description, int joint);
 
-// Warnings about runs: agreement between runs, tolerance refinement, drift growth.
-
-// Compares the final poses of runs of one problem. Drift and energy do not reveal a wrong branch; a
-// comparison with other runs does.
+// Reasons not to rely on a finished run: warnings from its own record and from other runs of its
+// problem. Drift and energy do not reveal a wrong branch; a comparison of final poses does.
 
 /// Final poses are alike that differ by at most so many tolerances: over links and in rad.
 inline constexpr double kMaxTolerances = 1000.0;
@@ -341,12 +243,10 @@ struct Agreement {
 /// all agree, they decide for that tolerance. Engines with compliant constraints
 /// (FormulationRow::is_soft) are compared but not used as evidence.
 ///
-/// Only trusted runs decide, one flag for each record: runs with own warnings are only compared. If
-/// no run is trusted, all decide.
+/// Only trusted runs decide, one flag for each record (none: all are trusted): runs with own
+/// warnings are only compared. If no run is trusted, all decide.
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
-                                         const std::vector<bool>& testifies);
-/// Compares with all runs trusted.
-std::vector<Agreement> CompareFinalPoses(std::span<const Record> records);
+                                         std::vector<bool> testifies = {});
 
 /// Returns true if an external engine made the run.
 bool IsPeer(const Record& record);
@@ -357,53 +257,36 @@ struct PoseDifference {
   double largest = 0.0;
   std::string body;
 };
-/// Largest differences of the poses of bodies that occur in both records.
-PoseDifference DifferenceOf(const Record& a, const Record& b);
-/// Returns the largest difference between any two of `runs` of one problem, in any order.
+/// Returns the largest difference between any two of `runs` of one problem, in any order, over the
+/// bodies that both have.
 PoseDifference LargestDifference(std::span<const Record> runs);
-
-// Reasons not to rely on a finished run: warnings from its own record and from other runs of its
-// problem.
+PoseDifference DifferenceOf(const Record& a, const Record& b);
 
 /// The codes of `warnings` (docs/reference/outcomes-and-warnings.md); programs may rely on them.
 inline constexpr const char* kEnergyWarning = "energy";
 inline constexpr const char* kSingularWarning = "singular-crossing";
 inline constexpr const char* kRegularizedWarning = "regularized";
 inline constexpr const char* kDriftWarning = "drift";
-inline constexpr const char* kMembersWarning = "ensemble-failures";
-inline constexpr const char* kExponentWarning = "exponent";
-inline constexpr const char* kDisagreementWarning = "disagreement";
-
 inline constexpr const char* kErrorWarning = "error";
 inline constexpr const char* kRefinementWarning = "refinement";
 inline constexpr const char* kDriveWarning = "drive";
 inline constexpr const char* kStepsWarning = "steps";
+inline constexpr const char* kMembersWarning = "ensemble-failures";
+inline constexpr const char* kExponentWarning = "exponent";
+inline constexpr const char* kDisagreementWarning = "disagreement";
+
+/// A warning that one record can raise.
+struct WarningRow {
+  const char* code;
+  const char* sentence;                         ///< its meaning
+  bool (*is_raised)(const Record& record);      ///< by a finished accuracy run
+  std::string (*number)(const Record& record);  ///< the run's number, and the expected one
+};
+/// Returns all warnings, except of disagreement with other runs, in the order of codes.
+std::span<const WarningRow> WarningRows();
 
 /// Returns the expected drift growth at the record's level; empty for unknown levels.
 std::optional<DriftGrowth> GrowthAt(const Record& record);
-
-/// Return the largest energy balance error over the exchanged energy (`energy_scale`; in records
-/// without it the largest kinetic energy), and the share expected from tolerance and steps. NaN if
-/// not measured.
-double EnergyErrorShare(const Record& record);
-double ExpectedEnergyShare(const Record& record);
-
-/// Return the drift of a run and the drift expected at its level, both over a link length, or in
-/// rad if rotations drift further. NaN if not measured.
-///
-/// A step of tolerance rtol leaves errors of about rtol in positions and speeds (docs/theory/
-/// constraints-and-drift.md). At velocity level position errors add up to n rtol. At acceleration
-/// level speed errors persist: n^2 rtol times the angle per step. Baumgarte feedback damps all but
-/// the last steps; projection leaves round-off, and some tolerance in regularized directions. Fixed
-/// steps have no expected drift except with projection.
-double DriftShare(const Record& record);
-double ExpectedDriftShare(const Record& record);
-
-/// Returns the largest global error of points over the link length; NaN without a reference.
-double TrueErrorShare(const Record& record);
-/// Returns the longest step in periods of the fastest driver; NaN without a driver. Fewer than two
-/// samples per period cause aliasing.
-double PeriodsPerStep(const Record& record);
 
 /// Returns the warning codes from an accuracy record alone, separated by spaces. Returns "" if
 /// there are none or if the run did not finish.
@@ -412,6 +295,9 @@ std::string OwnWarnings(const Record& record);
 /// Sets `warnings` of every finished accuracy record, including warnings from comparisons of runs.
 /// Sets `agreement`: the runs of equal problem, horizon and tolerance with equal final poses.
 void SetWarnings(std::vector<Record>* records);
+
+/// Returns the words of the record's warnings, in their order.
+std::vector<std::string> WarningsOf(const Record& record);
 
 /// Returns true if the record has warning `code`, or any warning if `code` is "".
 bool HasWarning(const Record& record, const std::string& code = "");

@@ -4,15 +4,14 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <set>
-#include <sstream>
 #include <string>
 #include <string_view>
 
 #include "harness/base/record.h"
 #include "harness/base/text.h"
+#include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
 #include "harness/judge/tables.h"
 
@@ -27,8 +26,9 @@ bool IsQuantified(const Check& check) {
 
 // Rows of one selection, counted by usability.
 struct Sample {
-  std::vector<Record> rows;
-  std::vector<double> values;  // finite measures of usable runs
+  const Selection& selection;
+  std::vector<Record> rows = {};
+  std::vector<double> values = {};  // finite measures of usable runs
   std::size_t failed = 0, unmet = 0, missing = 0;
   bool is_selected = false;  // records match, with the measure or without
 };
@@ -37,19 +37,14 @@ Sample Take(const Check& check, const Selection& selection, std::span<const Reco
   const std::string& measure = check.demand.measure;
   // if the outcome is checked, a failed run is a valid observation
   const bool examines_outcome =
-      measure == "outcome" ||
-      std::ranges::find(check.select, "outcome", &Condition::key) != check.select.end();
-  Sample sample;
-  std::vector<const Record*> selected;
+      measure == "outcome" || Contains(check.select, "outcome", &Condition::key);
+  const std::vector<Record> selected = Filter(records, selection);
   std::set<std::string> kinds;  // kinds of records with the measure
-  for (const Record& record : records) {
-    if (!Matches(record, selection)) continue;
-    sample.is_selected = true;
-    selected.push_back(&record);
+  for (const Record& record : selected) {
     if (record.Find(measure) != nullptr) kinds.insert(record.Text("kind"));
   }
-  for (const Record* one : selected) {
-    const Record& record = *one;
+  Sample sample{.selection = selection, .is_selected = !selected.empty()};
+  for (const Record& record : selected) {
     const bool failed = HasFailed(record) && !examines_outcome;
     if (!kinds.contains(record.Text("kind")) && !failed) continue;
     sample.rows.push_back(record);
@@ -67,8 +62,8 @@ Sample Take(const Check& check, const Selection& selection, std::span<const Reco
 }
 
 // Returns "no record of formulation=odca has drift".
-std::string NoneHas(const Selection& selection, const std::string& key) {
-  return fmt::format("no record of {} has {}", ToText(selection), key);
+std::string NoneHas(const Sample& sample, const std::string& key) {
+  return fmt::format("no record of {} has {}", ToText(sample.selection), key);
 }
 
 // Returns "2 of 3 runs failed", or "" if all rows of the sample are usable.
@@ -77,42 +72,34 @@ std::string Defect(const Check& check, const Sample& sample) {
   if (sample.failed > 0 && !check.failed_runs_hold) {
     return fmt::format("{} of {} runs did not finish", sample.failed, rows);
   }
-  if (sample.unmet > 0) {
-    return fmt::format("{} of {} rows without {}", sample.unmet, rows, ToText(check.require));
-  }
-  return "";
+  if (sample.unmet == 0) return "";
+  return fmt::format("{} of {} rows without {}", sample.unmet, rows, ToText(check.require));
 }
 
 // Returns "no record of formulation=odca has colour" for a required key that no row has, or "".
-std::string KeyMissing(const Check& check, const Selection& selection, const Sample& sample) {
+std::string KeyMissing(const Check& check, const Sample& sample) {
   for (const Condition& one : check.require) {
     const bool is_there = std::ranges::any_of(
         sample.rows, [&one](const Record& row) { return row.Find(one.key) != nullptr; });
-    if (sample.unmet > 0 && sample.failed == 0 && !is_there) return NoneHas(selection, one.key);
+    if (sample.unmet > 0 && sample.failed == 0 && !is_there) return NoneHas(sample, one.key);
   }
   return "";
 }
 
 // Returns "12 of 24 runs have warnings: energy, drift", or "".
-std::string Flagged(std::initializer_list<const Sample*> samples) {
+std::string Flagged(const std::vector<Sample>& samples) {
   std::set<std::string> words;
   std::size_t rows = 0, flagged = 0;
-  for (const Sample* sample : samples) {
-    for (const Record& row : sample->rows) {
-      std::istringstream codes(row.Text("warnings"));
-      for (std::string code; codes >> code;) words.insert(code);
-      if (!row.Text("warnings").empty()) ++flagged;
+  for (const Sample& sample : samples) {
+    for (const Record& row : sample.rows) {
+      const std::vector<std::string> codes = WarningsOf(row);
+      words.insert(codes.begin(), codes.end());
+      if (HasWarning(row)) ++flagged;
     }
-    rows += sample->rows.size();
+    rows += sample.rows.size();
   }
   if (flagged == 0) return "";
   return fmt::format("{} of {} runs have warnings: {}", flagged, rows, fmt::join(words, ", "));
-}
-
-// Returns "1 of 2 values missing or not finite", or "". Incomplete samples decide nothing.
-std::string NumbersMissing(const Sample& sample) {
-  if (sample.missing == 0) return "";
-  return fmt::format("{} of {} values missing or not finite", sample.missing, sample.rows.size());
 }
 
 double Apply(Statistic statistic, const std::vector<double>& values) {
@@ -132,13 +119,9 @@ bool Quantify(const Check& check, const std::vector<Value>& values) {
 
 // HoldsOf...(): return true if the demand is met, with the numbers in `measured`.
 bool HoldsOfTexts(const Check& check, const Sample& sample, std::string* measured) {
-  std::vector<std::string> words;
-  std::map<std::string, int> counts;
-  for (const Record& row : sample.rows) words.push_back(row.Text(check.demand.measure));
-  for (const std::string& word : words) ++counts[word];
-  for (const auto& [word, count] : counts) {
-    *measured += fmt::format("{}{} ({})", measured->empty() ? "" : ", ", word, count);
-  }
+  const std::vector<std::string> words = Mapped<std::string>(
+      sample.rows, [&](const Record& row) { return row.Text(check.demand.measure); });
+  *measured = CountWords(words, "{} ({})");
   return Quantify(check, words);
 }
 
@@ -161,10 +144,10 @@ bool HoldsOfNumbers(const Check& check, const Sample& sample, std::string* measu
 }
 
 /// Returns the ratio of machine speeds between these rows; 1 if the measure is not a time.
-double OtherSpeed(const Check& check, const Sample& above, const Sample& below) {
+double OtherSpeed(const Check& check, const std::vector<Sample>& samples) {
   double least = std::numeric_limits<double>::infinity(), most = 0.0;
-  for (const Sample* sample : {&above, &below}) {
-    for (const Record& row : sample->rows) {
+  for (const Sample& sample : samples) {
+    for (const Record& row : sample.rows) {
       const double calibration = CalibrationOf(row, check.demand.measure);
       if (!(calibration > 0.0)) continue;
       least = std::min(least, calibration);
@@ -175,10 +158,10 @@ double OtherSpeed(const Check& check, const Sample& above, const Sample& below) 
 }
 
 /// An infinite ratio counts as the largest number, at any speed of the machine.
-bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below, CheckResult* result,
+bool HoldsOfRatio(const Check& check, const std::vector<Sample>& samples, CheckResult* result,
                   std::string* uncertain) {
-  const double numerator = Apply(check.statistic, above.values);
-  const double denominator = Apply(check.statistic, below.values);
+  const double numerator = Apply(check.statistic, samples.front().values);
+  const double denominator = Apply(check.statistic, samples.back().values);
   constexpr double kMost = std::numeric_limits<double>::max();
   const double quotient = numerator / denominator, ratio = std::clamp(quotient, -kMost, kMost);
   const std::string parts = fmt::format("{:.3g} / {:.3g}", numerator, denominator);
@@ -189,7 +172,7 @@ bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below, 
   }
   result->measured = fmt::format("{:.3g} ({})", quotient, parts);
   if (std::isinf(quotient)) result->remark = fmt::format("the ratio {} is infinite", parts);
-  const double speed = std::isinf(quotient) ? 1.0 : OtherSpeed(check, above, below);
+  const double speed = std::isinf(quotient) ? 1.0 : OtherSpeed(check, samples);
   const bool holds = Meets(check.demand, ratio);
   if (Meets(check.demand, ratio * speed) != holds || Meets(check.demand, ratio / speed) != holds) {
     *uncertain = fmt::format(
@@ -200,49 +183,6 @@ bool HoldsOfRatio(const Check& check, const Sample& above, const Sample& below, 
   return holds;
 }
 
-}  // namespace
-
-CheckResult Evaluate(const Check& check, std::span<const Record> records) {
-  const bool is_ratio = !check.relative_to.empty();
-  const Sample sample = Take(check, check.select, records);
-  const Sample base = is_ratio ? Take(check, check.relative_to, records) : Sample{};
-  CheckResult result;
-  result.label = check.label;
-  result.rows = sample.rows.size() + base.rows.size();
-  const auto statistic = kStatistics[static_cast<std::size_t>(check.statistic)];
-  result.expected = ToText(
-      check.demand,
-      fmt::format("{}{} {}", is_ratio ? "ratio of " : "", statistic, check.demand.measure), true);
-  if (sample.rows.empty() || (is_ratio && base.rows.empty())) {
-    const Sample& empty = sample.rows.empty() ? sample : base;
-    const Selection& selection = sample.rows.empty() ? check.select : check.relative_to;
-    result.reason = empty.is_selected ? NoneHas(selection, check.demand.measure)
-                                      : "no record of " + ToText(selection);
-    return result;
-  }
-  result.reason = KeyMissing(check, check.select, sample);
-  if (result.reason.empty()) result.reason = KeyMissing(check, check.relative_to, base);
-  if (!result.reason.empty()) return result;
-  std::string uncertain;
-  const bool holds = is_ratio ? HoldsOfRatio(check, sample, base, &result, &uncertain)
-                     : check.demand.IsText() ? HoldsOfTexts(check, sample, &result.measured)
-                                             : HoldsOfNumbers(check, sample, &result.measured);
-  const std::string defect = Defect(check, sample);
-  result.reason = defect.empty() ? Defect(check, base) : defect;
-  result.state = holds && result.reason.empty() ? CheckState::kHolds : CheckState::kFails;
-  for (const Sample* one : {&sample, &base}) {
-    if (const std::string missing = NumbersMissing(*one); !missing.empty()) uncertain = missing;
-  }
-  if (result.reason.empty() && !uncertain.empty()) {
-    result.reason = uncertain;
-    result.state = CheckState::kNotMeasured;
-  }
-  const std::string flagged = Flagged({&sample, &base});
-  if (!flagged.empty()) result.remark += (result.remark.empty() ? "" : "; ") + flagged;
-  return result;
-}
-namespace {
-
 std::string VerdictColour(const Record& row, const TableColumn& column) {
   if (column.key != "verdict") return "";
   const std::string verdict = row.Text("verdict");
@@ -252,10 +192,52 @@ std::string VerdictColour(const Record& row, const TableColumn& column) {
 
 }  // namespace
 
+CheckResult Evaluate(const Check& check, std::span<const Record> records) {
+  const bool is_ratio = !check.relative_to.empty();
+  std::vector<Sample> samples = {Take(check, check.select, records)};
+  if (is_ratio) samples.push_back(Take(check, check.relative_to, records));
+  CheckResult result;
+  result.label = check.label;
+  for (const Sample& sample : samples) result.rows += sample.rows.size();
+  const auto statistic = kStatistics[static_cast<std::size_t>(check.statistic)];
+  result.expected = ToText(
+      check.demand,
+      fmt::format("{}{} {}", is_ratio ? "ratio of " : "", statistic, check.demand.measure), true);
+  for (const Sample& sample : samples) {
+    if (!sample.rows.empty()) continue;
+    result.reason = sample.is_selected ? NoneHas(sample, check.demand.measure)
+                                       : "no record of " + ToText(sample.selection);
+    return result;
+  }
+  for (const Sample& sample : samples) {
+    result.reason = KeyMissing(check, sample);
+    if (!result.reason.empty()) return result;
+  }
+  std::string uncertain;
+  const bool holds = is_ratio ? HoldsOfRatio(check, samples, &result, &uncertain)
+                     : check.demand.IsText()
+                         ? HoldsOfTexts(check, samples.front(), &result.measured)
+                         : HoldsOfNumbers(check, samples.front(), &result.measured);
+  for (const Sample& sample : samples) {
+    if (result.reason.empty()) result.reason = Defect(check, sample);
+    if (sample.missing == 0) continue;  // incomplete samples decide nothing
+    uncertain =
+        fmt::format("{} of {} values missing or not finite", sample.missing, sample.rows.size());
+  }
+  result.state = holds && result.reason.empty() ? CheckState::kHolds : CheckState::kFails;
+  if (result.reason.empty() && !uncertain.empty()) {
+    result.reason = uncertain;
+    result.state = CheckState::kNotMeasured;
+  }
+  const std::string flagged = Flagged(samples);
+  if (!flagged.empty()) result.remark += (result.remark.empty() ? "" : "; ") + flagged;
+  return result;
+}
+
 Table VerdictTable(std::span<const ClaimResult> results) {
   Table table;
   table.colour = &VerdictColour;
-  table.columns = {{"id", "id"}, {"where", "paper"}, {"claim", "claim"}, {"verdict", "verdict"}};
+  table.columns = Columns("id, where=paper, claim, verdict");
   for (const auto& [rule, checks, verdict, text] : results) {
     AddRow({rule.id, rule.where, rule.claim, verdict}, &table);
   }
@@ -264,9 +246,7 @@ Table VerdictTable(std::span<const ClaimResult> results) {
 
 Table CheckTable(const ClaimResult& result) {
   Table table;
-  table.columns = {{"condition", "condition"},         {"result", "result"},
-                   {"measured", "measured"},           {"expected", "expected"},
-                   {"rows", "rows", Format::kInteger}, {"reason", "remark"}};
+  table.columns = Columns("condition, result, measured, expected, rows:integer, reason=remark");
   for (const auto& [label, state, rows, measured, expected, reason, remark] : result.checks) {
     const char* between = reason.empty() || remark.empty() ? "" : "; ";
     AddRow({label, state, measured, expected, rows, reason + between + remark}, &table);
@@ -290,28 +270,17 @@ std::string ClaimsMarkdown(std::span<const ClaimResult> results,
   return out + (notes.empty() ? "" : "\n");
 }
 
-// Verdict on a claim, from the states of its checks.
-
-namespace {
-
-std::string Labels(const std::vector<CheckResult>& checks, CheckState state) {
-  std::string labels;
-  for (const CheckResult& check : checks) {
-    if (check.state == state) labels += (labels.empty() ? "" : "; ") + check.label;
-  }
-  return labels;
-}
-
-}  // namespace
-
 ClaimResult Evaluate(const ClaimRule& rule, std::span<const Record> records) {
   ClaimResult result;
   result.rule = rule;
   for (const Check& check : rule.checks) result.checks.push_back(Evaluate(check, records));
-  const std::string holds = Labels(result.checks, CheckState::kHolds);
-  const std::string fails = Labels(result.checks, CheckState::kFails);
-  const std::string missing = Labels(result.checks, CheckState::kNotMeasured);
-
+  const auto labels = [&result](CheckState state) {
+    std::vector<CheckResult> checks = result.checks;
+    std::erase_if(checks, [=](const CheckResult& check) { return check.state != state; });
+    return Joined(checks, "; ", &CheckResult::label);
+  };
+  const std::string holds = labels(CheckState::kHolds), fails = labels(CheckState::kFails),
+                    missing = labels(CheckState::kNotMeasured);
   if (holds.empty()) {
     result.verdict = fails.empty() ? Verdict::kNotMeasured : Verdict::kNotReproduced;
   } else {

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -37,9 +36,8 @@ Ruling CompareTexts(Rule rule, const std::string& base, const std::string& fresh
   if (base == fresh) return {};
   if (rule == Rule::kHash) return {Judgement::kWorse, "other bits"};
   if (rule == Rule::kOutcome) {
-    const Demand ends_well{.relation = Relation::kIs, .word = "finished"};
-    return Meets(ends_well, fresh) ? Ruling{Judgement::kBetter, "failed before"}
-                                   : Ruling{Judgement::kWorse, "ends otherwise"};
+    return fresh == "finished" ? Ruling{Judgement::kBetter, "failed before"}
+                               : Ruling{Judgement::kWorse, "ends otherwise"};
   }
   // worse with a warning that BASE does not have, better without a warning of BASE
   const auto codes = [](const std::string& text) {
@@ -54,11 +52,8 @@ Ruling CompareTexts(Rule rule, const std::string& base, const std::string& fresh
 
 /// Worse above one limit, better below another.
 Ruling Between(double value, double lower, double upper, const std::string& why) {
-  if (!Meets({.relation = Relation::kAtMost, .number = upper}, value)) {
-    return {Judgement::kWorse, why};
-  }
-  if (Meets({.relation = Relation::kAtLeast, .number = lower}, value)) return {};
-  return {Judgement::kBetter, why};
+  if (!std::isfinite(value) || value > upper) return {Judgement::kWorse, why};
+  return value >= lower ? Ruling{} : Ruling{Judgement::kBetter, why};
 }
 
 Ruling CompareRatio(double ratio, double allowed) {
@@ -126,11 +121,11 @@ void TestTimes(const Pair& pair, const CompareOptions& options, Finding* finding
   if (speed != 1.0) {
     finding->why = fmt::format("the machine took {:.3g} of the time for equal work", speed);
   }
-  std::vector<double> lifted_base = base, lifted_fresh = fresh;
-  for (double& time : lifted_base) time *= options.time_ratio * margin;
-  for (double& time : lifted_fresh) time *= options.time_ratio * margin;
-  const double slower = MannWhitney(fresh, lifted_base).p_greater;
-  const double faster = MannWhitney(base, lifted_fresh).p_greater;
+  const auto lifted = [factor = options.time_ratio * margin](const std::vector<double>& times) {
+    return Mapped<double>(times, [factor](double time) { return time * factor; });
+  };
+  const double slower = MannWhitney(fresh, lifted(base)).p_greater;
+  const double faster = MannWhitney(base, lifted(fresh)).p_greater;
   finding->p = std::min(1.0, 2.0 * std::min(slower, faster));
   finding->least_p = 2.0 * SmallestP(base.size(), fresh.size());
   finding->is_apart = AreApart(base, fresh, margin);
@@ -209,18 +204,14 @@ Finding Compared(const std::string& one, const Measure& measure, const Pair& pai
 
 /// Adjusts the p-values of all times together and judges them.
 void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) {
-  std::vector<Finding*> times;
-  std::vector<double> p;
-  for (Finding& finding : *findings) {
-    if (std::isnan(finding.p)) continue;  // not a time, or not tested
-    times.push_back(&finding);
-    p.push_back(finding.p);
-  }
+  std::vector<double> p = Mapped<double>(*findings, &Finding::p);
+  std::erase_if(p, [](double one) { return std::isnan(one); });  // not a time, or not tested
   const std::vector<double> adjusted = HolmAdjusted(p);
-  const double tests = static_cast<double>(times.size());
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    Finding& finding = *times[i];
-    finding.p = adjusted[i];
+  const double tests = static_cast<double>(p.size());
+  std::size_t time = 0;
+  for (Finding& finding : *findings) {
+    if (std::isnan(finding.p)) continue;
+    finding.p = adjusted[time++];
     const bool is_sure = finding.p <= options.alpha;
     if (std::isnan(finding.ratio)) {
       finding.judgement = Judgement::kNotMeasured;
@@ -236,7 +227,7 @@ void DecideTimes(const CompareOptions& options, std::vector<Finding>* findings) 
       finding.judgement = Judgement::kNotMeasured;
     } else if (finding.least_p * tests > options.alpha) {
       finding.judgement = Judgement::kNotMeasured;
-      finding.why = "too few repetitions to decide among " + WithCount(times.size(), "time");
+      finding.why = "too few repetitions to decide among " + WithCount(p.size(), "time");
     } else if (finding.ratio > kGap || finding.ratio < 1.0 / kGap) {
       finding.judgement = Judgement::kNotMeasured;
       finding.why = fmt::format("ratio {:.3g} of medians, but samples overlap", finding.ratio);
@@ -253,25 +244,17 @@ std::vector<Record> WithOwnWarnings(std::vector<Record> records) {
   return records;
 }
 
-std::string NameOf(const Record& record, const CompareOptions& options) {
-  return options.match.empty() ? CaseText(record) : CaseText(record, options.match);
-}
-
-/// Cases that occur twice, in the order of their finding.
-struct Ambiguous {
-  std::vector<std::string> cases;
-  std::set<std::string> known;
-};
-
-/// Records by case; cases that occur twice go to `ambiguous`.
+/// Returns the records by case. Adds cases that occur twice to `repeated`, and to `in_order` if
+/// they are new there.
 std::map<std::string, const Record*> ByCase(const std::vector<Record>& records,
-                                            const CompareOptions& options, Ambiguous* ambiguous) {
+                                            const CompareOptions& options,
+                                            std::set<std::string>* repeated,
+                                            std::vector<std::string>* in_order) {
   std::map<std::string, const Record*> cases;
   for (const Record& record : records) {
-    const std::string one = NameOf(record, options);
-    if (!cases.emplace(one, &record).second && ambiguous->known.insert(one).second) {
-      ambiguous->cases.push_back(one);
-    }
+    const std::string one = CaseText(record, options.match);
+    const bool is_new = cases.emplace(one, &record).second;
+    if (!is_new && repeated->insert(one).second) in_order->push_back(one);
   }
   return cases;
 }
@@ -279,9 +262,8 @@ std::map<std::string, const Record*> ByCase(const std::vector<Record>& records,
 }  // namespace
 
 std::string_view ToString(Judgement judgement) {
-  constexpr std::string_view kJudgements[] = {"same", "better", "worse", "different",
-                                              "not measured"};
-  return kJudgements[static_cast<int>(judgement)];
+  constexpr std::string_view kWords[] = {"same", "better", "worse", "different", "not measured"};
+  return kWords[static_cast<std::size_t>(judgement)];
 }
 
 int ComparisonReport::Count(Judgement judgement, std::string_view group) const {
@@ -300,18 +282,20 @@ std::string ComparisonReport::Obstacle(const CompareOptions& options) const {
   if (!options.added) count(only_fresh, "only in NEW");
   count(ambiguous, "there more than once");
   count(other_content, "of other content");
-  std::vector<const Finding*> times;
-  for (const Finding& finding : findings) {
-    if (finding.measure.rule == Rule::kTime && finding.on_both) times.push_back(&finding);
+  std::vector<Finding> times = findings;
+  std::erase_if(times, [](const Finding& finding) {
+    return finding.measure.rule != Rule::kTime || !finding.on_both;
+  });
+  const auto is_measured = [](const Finding& finding) {
+    return finding.judgement != Judgement::kNotMeasured;
+  };
+  if (!times.empty() && std::ranges::none_of(times, is_measured)) {
+    reasons.push_back(WithCount(times.size(), "time") + " not comparable: " + times.front().why);
   }
-  const bool no_time = std::ranges::all_of(
-      times, [](const Finding* finding) { return finding->judgement == Judgement::kNotMeasured; });
-  if (!times.empty() && no_time) {
-    reasons.push_back(WithCount(times.size(), "time") + " not comparable: " + times.front()->why);
+  if (reasons.empty() && std::ranges::none_of(findings, is_measured)) {
+    reasons.emplace_back("too little in common");
   }
-  const bool is_any = Count(Judgement::kNotMeasured) < static_cast<int>(findings.size());
-  if (reasons.empty() && !is_any) reasons.emplace_back("too little in common");
-  return fmt::format("{}", fmt::join(reasons, "; "));
+  return Joined(reasons, "; ");
 }
 
 int ComparisonReport::ExitCode(const CompareOptions& options) const {
@@ -324,13 +308,12 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
   ComparisonReport comparison;
   const std::vector<Record> base = WithOwnWarnings(given_base),
                             fresh = WithOwnWarnings(given_fresh);
-  Ambiguous ambiguous;
-  const auto in_base = ByCase(base, options, &ambiguous);
-  const auto in_fresh = ByCase(fresh, options, &ambiguous);
-  comparison.ambiguous = ambiguous.cases;
+  std::set<std::string> repeated;
+  const auto in_base = ByCase(base, options, &repeated, &comparison.ambiguous);
+  const auto in_fresh = ByCase(fresh, options, &repeated, &comparison.ambiguous);
   for (const Record& record : base) {
-    const std::string one = NameOf(record, options);
-    if (in_base.at(one) != &record || ambiguous.known.contains(one)) continue;
+    const std::string one = CaseText(record, options.match);
+    if (in_base.at(one) != &record || repeated.contains(one)) continue;
     const auto other = in_fresh.find(one);
     if (other == in_fresh.end()) {
       comparison.only_base.push_back(one);
@@ -349,16 +332,15 @@ ComparisonReport Compare(const std::vector<Record>& given_base,
     const Pair pair{record, *other->second, base_origin.SameArithmetic(fresh_origin),
                     base_origin.SameMachine(fresh_origin), same_settings};
     for (const Measure& measure : Measures()) {
-      const bool chosen =
-          measure.rule != Rule::kNone &&
-          (options.only.empty() || std::ranges::count(options.only, GroupOf(measure.rule)) > 0);
+      const bool chosen = measure.rule != Rule::kNone &&
+                          (options.only.empty() || Contains(options.only, GroupOf(measure.rule)));
       const bool anywhere =
           pair.base.Find(measure.key) != nullptr || pair.fresh.Find(measure.key) != nullptr;
       if (chosen && anywhere) comparison.findings.push_back(Compared(one, measure, pair, options));
     }
   }
   for (const Record& record : fresh) {
-    const std::string one = NameOf(record, options);
+    const std::string one = CaseText(record, options.match);
     if (!in_base.contains(one)) comparison.only_fresh.push_back(one);
   }
   DecideTimes(options, &comparison.findings);

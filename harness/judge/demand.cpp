@@ -4,16 +4,24 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
+#include "harness/base/text.h"
 #include "harness/judge/judge.h"
 
 namespace loopbench::harness {
 
 namespace {
 
-/// Returns true for keys that end the case keys (CaseKeys) at the start of a record.
-bool EndsCase(std::string_view key) {
-  return key == "case_id" || key == "id" || key == "version" || key == "outcome";
+/// Returns the keys of the case, at the start of the record.
+std::vector<std::string> CaseKeys(const Record& record) {
+  constexpr std::string_view kEnds[] = {"case_id", "id", "version", "outcome"};
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : record.items()) {
+    if (Contains(kEnds, key)) break;
+    keys.push_back(key);
+  }
+  return keys;
 }
 
 bool IsTime(double time) { return std::isfinite(time) && time >= 0.0; }
@@ -23,28 +31,16 @@ struct FieldSet {
   std::string_view group, expected;
 };
 
-FieldSet FieldSetOf(Rule rule) {
-  switch (rule) {
-    case Rule::kOutcome:
-    case Rule::kWarnings:
-      return {"outcomes", "a text"};
-    case Rule::kEqual:
-      return {"counts", "a finite number"};
-    case Rule::kCount:
-      return {"counts", "a finite number >= 0"};
-    case Rule::kHash:
-      return {"hashes", "a text"};
-    case Rule::kError:
-      return {"errors", "a finite number >= 0"};
-    case Rule::kInstructions:
-      return {"instructions", "a finite number > 0"};
-    case Rule::kTime:
-      return {"times", "finite times >= 0"};
-    case Rule::kNone:
-      break;
-  }
-  return {};
-}
+/// By Rule.
+constexpr FieldSet kFieldSets[] = {{"", ""},
+                                   {"outcomes", "a text"},
+                                   {"outcomes", "a text"},
+                                   {"counts", "a finite number"},
+                                   {"counts", "a finite number >= 0"},
+                                   {"hashes", "a text"},
+                                   {"errors", "a finite number >= 0"},
+                                   {"instructions", "a finite number > 0"},
+                                   {"times", "finite times >= 0"}};
 
 void AppendKey(const Record& record, const std::string& key, std::string* text) {
   const std::string shown = record.Text(key);
@@ -58,11 +54,27 @@ bool IsNumber(const Value& value) {
   return std::holds_alternative<double>(value) || std::holds_alternative<std::int64_t>(value);
 }
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Returns the value relative to its limit.
+double Ratio(const Demand& demand, double value, double limit) {
+  switch (demand.relation) {
+    case Relation::kAtMost:
+      return value / limit;
+    case Relation::kAtLeast:
+      return value > 0.0 ? limit / value : kInfinity;
+    default:
+      return value == limit ? 0.0 : kInfinity;
+  }
+}
+
+std::string InBrackets(const std::string& unit) { return unit.empty() ? "" : " [" + unit + "]"; }
+
 }  // namespace
 
-std::string_view GroupOf(Rule rule) { return FieldSetOf(rule).group; }
+std::string_view GroupOf(Rule rule) { return kFieldSets[static_cast<std::size_t>(rule)].group; }
 
-std::string_view Expected(Rule rule) { return FieldSetOf(rule).expected; }
+std::string_view Expected(Rule rule) { return kFieldSets[static_cast<std::size_t>(rule)].expected; }
 
 const std::vector<std::string>& GroupNames() {
   static const std::vector<std::string> names = {"outcomes", "counts",       "hashes",
@@ -110,62 +122,42 @@ double CalibrationOf(const Record& record, std::string_view key) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string CaseText(const Record& record) {
+std::string CaseText(const Record& record, const std::vector<std::string>& keys) {
   std::string text;
-  for (const auto& [key, value] : record.items()) {
-    if (EndsCase(key)) break;
-    AppendKey(record, key, &text);
+  if (!keys.empty()) AppendKey(record, "kind", &text);
+  for (const std::string& key : keys.empty() ? CaseKeys(record) : keys) {
+    if (keys.empty() || key != "kind") AppendKey(record, key, &text);
   }
   return text;
 }
 
-std::string CaseText(const Record& record, const std::vector<std::string>& keys) {
-  std::string text;
-  AppendKey(record, "kind", &text);
-  for (const std::string& key : keys) {
-    if (key != "kind") AppendKey(record, key, &text);
+std::string CountWords(const std::vector<std::string>& words, std::string_view format) {
+  std::map<std::string, int> counts;
+  for (const std::string& word : words) ++counts[word];
+  return Joined(counts, ", ", [format](const auto& one) {
+    return fmt::format(fmt::runtime(format), one.first, one.second);
+  });
+}
+
+std::set<std::string> RepeatedCases(std::span<const Record> records) {
+  std::set<std::string> once, repeated;
+  for (const Record& record : records) {
+    const std::string one = CaseText(record);
+    if (!once.insert(one).second) repeated.insert(one);
   }
-  return text;
+  return repeated;
 }
 
 std::string OtherSettings(const Record& base, const Record& fresh) {
-  std::vector<std::string> keys;
-  for (const Record* record : {&base, &fresh}) {
-    for (const auto& [key, value] : record->items()) {
-      if (EndsCase(key)) break;
-      if (std::ranges::count(keys, key) == 0) keys.push_back(key);
-    }
-  }
-  if (std::ranges::count(keys, "config_hash") == 0) keys.emplace_back("config_hash");
+  std::vector<std::string> keys = CaseKeys(base);
+  for (const std::string& key : CaseKeys(fresh)) AddOnce(keys, key);
+  AddOnce(keys, "config_hash");
+  std::erase_if(keys, [&](const std::string& key) { return base.Text(key) == fresh.Text(key); });
   const auto shown = [](const std::string& text) { return text.empty() ? "none" : text; };
-  std::string text;
-  for (const std::string& key : keys) {
-    const std::string before = base.Text(key), now = fresh.Text(key);
-    if (before == now) continue;
-    text += fmt::format("{}{} {} before, {} now", text.empty() ? "" : ", ", key, shown(before),
-                        shown(now));
-  }
-  return text;
+  return Joined(keys, ", ", [&](const std::string& key) {
+    return fmt::format("{} {} before, {} now", key, shown(base.Text(key)), shown(fresh.Text(key)));
+  });
 }
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Returns the value relative to its limit.
-double Ratio(const Demand& demand, double value, double limit) {
-  switch (demand.relation) {
-    case Relation::kAtMost:
-      return value / limit;
-    case Relation::kAtLeast:
-      return value > 0.0 ? limit / value : kInfinity;
-    default:
-      return value == limit ? 0.0 : kInfinity;
-  }
-}
-
-std::string InBrackets(const std::string& unit) { return unit.empty() ? "" : " [" + unit + "]"; }
-
-}  // namespace
 
 bool Meets(const Demand& demand, double value) {
   if (!std::isfinite(value)) return false;
@@ -178,11 +170,9 @@ bool Meets(const Demand& demand, double value) {
       return value == demand.number;
     case Relation::kWithin:
       return std::abs(value - demand.number) <= demand.tolerance;
-    case Relation::kIs:
-    case Relation::kIsNot:
-      break;
+    default:
+      return false;
   }
-  return false;
 }
 
 bool Meets(const Demand& demand, const std::string& text) {

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -15,20 +14,32 @@ namespace loopbench::harness {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Laws of growth.
 
 constexpr std::array<double, 4> kExponents = {0.5, 1.0, 1.5, 2.0};
 constexpr std::array<const char*, 5> kNames = {"t^0.5", "t^1", "t^1.5", "t^2", "exponential"};
 constexpr std::size_t kExponential = kExponents.size();
 constexpr std::size_t kHypotheses = kNames.size();
 
-// Residuals below this are a perfect fit; their logarithm would be minus infinity.
+/// Residuals below this are a perfect fit; their logarithm would be minus infinity.
 constexpr double kMinMeanSquare = 1e-20;
-
-// Least squares of y over x with a free offset: slope and mean square residual.
-struct Line {
-  double slope;
-  double mean_square;
-};
+/// Readings of a running maximum are correlated. 64 readings over about ten swings carry the
+/// information of this many independent ones. Used only for the penalty of a parameter.
+constexpr double kIndependentReadings = 16;
+/// Maximum distance of the fitted exponent from an accepted hypothesis. It covers the bias of a
+/// running maximum (0.05) and of finite windows (fitted exponents of mechanisms are 1.84 to 2.08
+/// instead of 2). It is below a third of the half unit between hypotheses.
+constexpr double kExponentTolerance = 0.15;
+/// Logarithm of the minimum growth of e^(k t) within the window; slower growth looks like a
+/// plateau.
+constexpr double kLeastGrowth = 1.0;
+/// A rival is refuted when its mean score lags by so many standard errors: 99 % for 8 members
+/// (Student's t, one-sided, 7 degrees of freedom: 3.0), more for more.
+constexpr double kStandardErrors = 3.0;
+/// Fewer members than this refute nothing and resolve no exponent.
+constexpr int kFewestMembers = 8;
 
 double Mean(const std::vector<double>& values) {
   double sum = 0;
@@ -36,44 +47,49 @@ double Mean(const std::vector<double>& values) {
   return sum / static_cast<double>(values.size());
 }
 
-Line FitLine(const std::vector<double>& x, const std::vector<double>& y) {
-  const double mean_x = Mean(x), mean_y = Mean(y);
-  double xx = 0, xy = 0, yy = 0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    xx += (x[i] - mean_x) * (x[i] - mean_x);
-    xy += (x[i] - mean_x) * (y[i] - mean_y);
-    yy += (y[i] - mean_y) * (y[i] - mean_y);
-  }
-  const double slope = xy / xx;
-  return {slope, std::max(0.0, yy - slope * xy) / static_cast<double>(x.size())};
+/// Returns the sum of the squares of the distances from the mean.
+double SquaresAbout(double mean, const std::vector<double>& values) {
+  double squares = 0;
+  for (const double value : values) squares += (value - mean) * (value - mean);
+  return squares;
 }
 
-// Variance of y - slope x: the mean square residual of a line with that slope and a free offset.
+/// Least squares of y over x with a free offset: slope and mean square residual.
+struct Line {
+  double slope;
+  double mean_square;
+};
+
+Line FitLine(const std::vector<double>& x, const std::vector<double>& y) {
+  const double mean_x = Mean(x), mean_y = Mean(y);
+  double xy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) xy += (x[i] - mean_x) * (y[i] - mean_y);
+  const double slope = xy / SquaresAbout(mean_x, x);
+  return {slope,
+          std::max(0.0, SquaresAbout(mean_y, y) - slope * xy) / static_cast<double>(x.size())};
+}
+
+/// Returns the mean square residual of a line with that slope and a free offset.
 double MeanSquareAtSlope(const std::vector<double>& x, const std::vector<double>& y, double slope) {
   std::vector<double> rest(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) rest[i] = y[i] - slope * x[i];
-  const double mean = Mean(rest);
-  double squares = 0;
-  for (const double value : rest) squares += (value - mean) * (value - mean);
-  return squares / static_cast<double>(x.size());
+  return SquaresAbout(Mean(rest), rest) / static_cast<double>(x.size());
 }
 
-// One member: scores of the hypotheses, of a power law with a free exponent, and e^(k t)'s k.
+/// Scores of one member: of the hypotheses, of a power law with a free exponent, and e^(k t)'s k.
 struct Scores {
   std::array<double, kHypotheses> of;
   std::array<double, kHypotheses> log_mean_square;
   double free_power;
   double rate;
-  double growth;  // k times the window's length
+  double growth;  ///< k times the window's length
 };
 
-Scores ScoreMember(const DriftSeries& readings, const HypothesisOptions& options) {
-  std::vector<double> log_t, log_drift;
-  for (std::size_t i = 0; i < readings.t.size(); ++i) {
-    log_t.push_back(std::log(readings.t[i]));
-    log_drift.push_back(std::log(readings.value[i]));
-  }
-  const double price = std::log(options.independent_readings) / options.independent_readings;
+Scores ScoreMember(const DriftSeries& readings) {
+  const auto log = [](double value) { return std::log(value); };
+  const std::vector<double> log_t = Mapped<double>(readings.t, log),
+                            log_drift = Mapped<double>(readings.value, log);
+  const double price = std::log(kIndependentReadings) / kIndependentReadings;
   const auto log_of = [](double square) { return std::log(std::max(square, kMinMeanSquare)); };
   Scores scores{};
   for (std::size_t h = 0; h < kExponents.size(); ++h) {
@@ -90,72 +106,89 @@ Scores ScoreMember(const DriftSeries& readings, const HypothesisOptions& options
 }
 
 template <class Get>
-std::vector<double> Collect(const std::vector<Scores>& members, const Get& get) {
-  return Mapped<double>(members, [&](const Scores& member) { return get(member); });
+double MeanOf(const std::vector<Scores>& members, const Get& get) {
+  return Mean(Mapped<double>(members, get));
 }
 
-// Returns true if the mean of the values exceeds zero by so many standard errors.
-bool IsPositive(const std::vector<double>& values, double standard_errors) {
+/// Returns true if the mean of the values exceeds zero by kStandardErrors.
+bool IsPositive(const std::vector<double>& values) {
   const double mean = Mean(values), count = static_cast<double>(values.size());
-  double squares = 0;
-  for (const double value : values) squares += (value - mean) * (value - mean);
-  return mean > standard_errors * std::sqrt(squares / (count - 1) / count);
+  return mean > kStandardErrors * std::sqrt(SquaresAbout(mean, values) / (count - 1) / count);
 }
 
-// Returns true if the winner describes the data.
-bool Holds(std::size_t winner, const std::vector<Scores>& members, double exponent,
-           const HypothesisOptions& options) {
+/// Returns true if the winner describes the data.
+bool Holds(std::size_t winner, const std::vector<Scores>& members, double exponent) {
   if (winner != kExponential) {
-    return std::abs(exponent - kExponents[winner]) <= options.exponent_tolerance;
+    return std::abs(exponent - kExponents[winner]) <= kExponentTolerance;
   }
-  const double growth = Mean(Collect(members, [](const Scores& m) { return m.growth; }));
-  const double margin =
-      Mean(Collect(members, [](const Scores& m) { return m.free_power - m.of[kExponential]; }));
-  return growth >= std::log(options.least_factor) && margin > 0;
+  const auto margin = [](const Scores& m) { return m.free_power - m.of[kExponential]; };
+  return MeanOf(members, &Scores::growth) >= kLeastGrowth && MeanOf(members, margin) > 0;
 }
 
 }  // namespace
 
-Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double exponent,
-                             const HypothesisOptions& options) {
-  Hypothesis answer{.ratio = kNaN, .rate = kNaN};
-  std::vector<Scores> members;
-  for (const DriftSeries& member : readings) {
-    if (member.t.size() < 3) return answer;
-    members.push_back(ScoreMember(member, options));
-  }
-  if (members.empty()) return answer;
+Hypothesis CompareHypotheses(std::span<const DriftSeries> readings, double exponent) {
+  Hypothesis answer;
+  const bool is_short =
+      std::ranges::any_of(readings, [](const DriftSeries& member) { return member.t.size() < 3; });
+  if (is_short || readings.empty()) return answer;
+  const std::vector<Scores> members = Mapped<Scores>(readings, ScoreMember);
 
   const auto mean_score = [&](std::size_t h) {
-    return Mean(Collect(members, [h](const Scores& m) { return m.of[h]; }));
+    return MeanOf(members, [h](const Scores& m) { return m.of[h]; });
   };
   std::size_t winner = 0;
   for (std::size_t h = 1; h < kHypotheses; ++h) {
     if (mean_score(h) < mean_score(winner)) winner = h;
   }
-  double lead = std::numeric_limits<double>::infinity();  // of log mean squares
-  bool refutes = static_cast<int>(members.size()) >= options.fewest_members;
+  double lead = kInfinity;  // of log mean squares
+  bool refutes = static_cast<int>(members.size()) >= kFewestMembers;
   for (std::size_t h = 0; h < kHypotheses; ++h) {
     if (h == winner) continue;
     const auto lag = [&](const auto& list) {
-      return Collect(members, [&](const Scores& m) { return (m.*list)[h] - (m.*list)[winner]; });
+      return Mapped<double>(members,
+                            [&](const Scores& m) { return (m.*list)[h] - (m.*list)[winner]; });
     };
-    refutes = refutes && IsPositive(lag(&Scores::of), options.standard_errors);
+    refutes = refutes && IsPositive(lag(&Scores::of));
     lead = std::min(lead, Mean(lag(&Scores::log_mean_square)));
   }
   answer.ratio = std::exp(lead / 2);
-  answer.rate = Mean(Collect(members, [](const Scores& m) { return m.rate; }));
-  if (Holds(winner, members, exponent, options)) {
+  answer.rate = MeanOf(members, &Scores::rate);
+  if (Holds(winner, members, exponent)) {
     answer.name = kNames[winner];
     answer.refutes_rivals = refutes;
   }
   return answer;
 }
+
+// Exponents of ensembles. Fractions of time refer to the end of the usable part of the runs.
+
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Starts of the two windows. Earlier growth is affected by the few first steps and by a first
+/// swing that may differ from later ones.
+constexpr double kWindowStart = 0.1, kLateWindowStart = 0.5;
+/// Number of times at which the running maximum is read, evenly spaced in log t for equal weight
+/// per decade. The integrator's own samples would give the last decade nine tenths.
+constexpr int kPoints = 64;
+/// Drift above this fraction of the length is no longer small, and stops growing: cut off.
+constexpr double kSaturation = 0.1;
+/// Drift below this many round-offs of the length is the evaluation's own noise: cut off.
+constexpr double kFloor = 10;
+/// "too-short" unless the first window's end is this many times its start (saturation and floor
+/// may have clipped it) and every run has this many samples in the late window.
+constexpr double kShortestRatio = 4;
+constexpr int kFewestSamples = 16;
+/// Means of the two windows that differ by less than this agree even if the spread is smaller.
+/// The running maximum of a drift with period P lags by up to P, which alone raises a slope p by
+/// some p P / (2 t), t being the window's start: 0.04 for p = 2 and seven periods. The spread
+/// does not show this bias, so windows should start after several periods.
+constexpr double kSlopeBias = 0.05;
+/// Largest standard error of either mean. Exponents that theory offers (1/2, 1, 3/2, 2) lie half
+/// a unit apart; two standard errors must stay within half of that.
+constexpr double kLargestError = 0.125;
 
-// The running maximum at every sample, up to the first value that is not finite.
+/// Returns the running maximum at every sample, up to the first value that is not finite.
 DriftSeries RunningMaximum(const DriftSeries& run) {
   if (run.t.size() != run.value.size()) {
     throw std::invalid_argument("a drift series has " + std::to_string(run.t.size()) +
@@ -171,92 +204,88 @@ DriftSeries RunningMaximum(const DriftSeries& run) {
   return maximum;
 }
 
-// The time of the first sample above `level`, or infinity.
+/// Returns the time of the first sample above `level`, or infinity.
 double TimeAbove(const DriftSeries& maximum, double level) {
-  const auto above = std::upper_bound(maximum.value.begin(), maximum.value.end(), level);
-  return above == maximum.value.end() ? kInfinity
-                                      : maximum.t[std::distance(maximum.value.begin(), above)];
+  const auto above = std::ranges::upper_bound(maximum.value, level);
+  return above == maximum.value.end() ? kInfinity : maximum.t[above - maximum.value.begin()];
 }
 
-// A running maximum read at `points` times from t_from to t_to, evenly in log t: at each, the
-// value of the last sample that is not later.
+/// Returns a running maximum read at `points` times from t_from to t_to, evenly in log t: at each,
+/// the value of the last sample that is not later.
 DriftSeries Resample(const DriftSeries& maximum, double t_from, double t_to, int points) {
   DriftSeries samples;
   for (int i = 0; i < points; ++i) {
-    // Both ends exactly; pow would miss the last sample by a round-off.
+    // both ends exactly; pow would miss the last sample by a round-off
     const double t = i == points - 1
                          ? t_to
                          : t_from * std::pow(t_to / t_from, static_cast<double>(i) / (points - 1));
-    const auto after = std::upper_bound(maximum.t.begin(), maximum.t.end(), t);
-    if (after != maximum.t.begin()) {
-      samples.t.push_back(t);
-      samples.value.push_back(maximum.value[std::distance(maximum.t.begin(), after) - 1]);
-    }
+    const auto after = std::ranges::upper_bound(maximum.t, t);
+    if (after == maximum.t.begin()) continue;
+    samples.t.push_back(t);
+    samples.value.push_back(maximum.value[after - maximum.t.begin() - 1]);
   }
   return samples;
 }
 
-double LogLogSlope(const DriftSeries& samples) {
-  const auto count = static_cast<double>(samples.t.size());
-  double mean_x = 0, mean_y = 0;
-  for (size_t i = 0; i < samples.t.size(); ++i) {
-    mean_x += std::log(samples.t[i]) / count;
-    mean_y += std::log(samples.value[i]) / count;
-  }
-  double xx = 0, xy = 0;
-  for (size_t i = 0; i < samples.t.size(); ++i) {
-    const double x = std::log(samples.t[i]) - mean_x;
-    xx += x * x;
-    xy += x * (std::log(samples.value[i]) - mean_y);
-  }
-  return xy / xx;
-}
+/// Logarithms of two quantities, and sums over their distances from their means.
+struct LogLog {
+  std::vector<std::pair<double, double>> points;
+  double x_mean = 0.0, y_mean = 0.0, xx = 0.0, xy = 0.0;
 
-struct Statistics {
-  double mean;
-  double spread;  // sample standard deviation; NaN for one value
+  explicit LogLog(std::vector<std::pair<double, double>> logarithms)
+      : points(std::move(logarithms)) {
+    const auto count = static_cast<double>(points.size());
+    for (const auto& [x, y] : points) {
+      x_mean += x / count;
+      y_mean += y / count;
+    }
+    for (const auto& [x, y] : points) {
+      xx += (x - x_mean) * (x - x_mean);
+      xy += (x - x_mean) * (y - y_mean);
+    }
+  }
+  double Slope() const { return xy / xx; }
 };
 
-std::vector<DriftSeries> Readings(std::span<const DriftSeries> maxima, double t_from, double t_to,
-                                  int points) {
+std::vector<DriftSeries> Readings(std::span<const DriftSeries> maxima, double t_from, double t_to) {
   return Mapped<DriftSeries>(
-      maxima, [&](const DriftSeries& maximum) { return Resample(maximum, t_from, t_to, points); });
+      maxima, [&](const DriftSeries& maximum) { return Resample(maximum, t_from, t_to, kPoints); });
 }
 
-Statistics Slopes(std::span<const DriftSeries> readings) {
+/// Sets mean and sample standard deviation (NaN for one value) of the slopes.
+void SetSlopes(std::span<const DriftSeries> readings, double* mean, double* spread) {
   const auto count = static_cast<double>(readings.size());
   std::vector<double> slopes;
-  double mean = 0;
+  *mean = 0;
   for (const DriftSeries& member : readings) {
-    slopes.push_back(LogLogSlope(member));
-    mean += slopes.back() / count;
+    std::vector<std::pair<double, double>> points;
+    for (std::size_t i = 0; i < member.t.size(); ++i) {
+      points.emplace_back(std::log(member.t[i]), std::log(member.value[i]));
+    }
+    slopes.push_back(LogLog(std::move(points)).Slope());
+    *mean += slopes.back() / count;
   }
-  double squares = 0;
-  for (const double slope : slopes) {
-    squares += (slope - mean) * (slope - mean);
-  }
-  return {mean, count > 1 ? std::sqrt(squares / (count - 1)) : kNaN};
+  *spread = count > 1 ? std::sqrt(SquaresAbout(*mean, slopes) / (count - 1)) : kNaN;
 }
 
-// The part of the runs that all members can use, and how each of its ends came about.
+/// The part of the runs that all members can use, and how each of its ends came about.
 struct Usable {
-  double t_from = 0;       // the last member leaves the floor
-  double t_to = 0;         // the first member saturates or ends, or t_end
-  bool saturates = false;  // before t_end
-  double final_drift = 0;  // geometric mean of the final running maxima
+  double t_from = 0;       ///< the last member leaves the floor
+  double t_to = 0;         ///< the first member saturates or ends, or t_end
+  bool saturates = false;  ///< before t_end
+  double final_drift = 0;  ///< geometric mean of the final running maxima
 };
 
-Usable FindUsable(std::span<const DriftSeries> maxima, double t_end, double length,
-                  const GrowthOptions& options) {
-  const double floor = options.floor * std::numeric_limits<double>::epsilon() * length;
+Usable FindUsable(std::span<const DriftSeries> maxima, double t_end, double length) {
+  const double floor = kFloor * std::numeric_limits<double>::epsilon() * length;
   Usable usable{.t_to = t_end};
   double log_final = 0;
   for (const DriftSeries& maximum : maxima) {
-    const double t_saturated = TimeAbove(maximum, options.saturation * length);
+    const double t_saturated = TimeAbove(maximum, kSaturation * length);
     const double t_last = maximum.t.empty() ? 0 : maximum.t.back();
     usable.saturates = usable.saturates || t_saturated <= t_end;
     usable.t_from = std::max(usable.t_from, TimeAbove(maximum, floor));
-    // The sample that saturates is the first one not to be used.
+    // the sample that saturates is the first one not to be used
     usable.t_to = std::min({usable.t_to, std::nextafter(t_saturated, 0.0), t_last});
     log_final += std::log(maximum.value.empty() ? 0 : maximum.value.back());
   }
@@ -264,75 +293,52 @@ Usable FindUsable(std::span<const DriftSeries> maxima, double t_end, double leng
   return usable;
 }
 
-bool IsTooShort(std::span<const DriftSeries> maxima, double t_from, double t_to,
-                const GrowthOptions& options) {
-  if (!(t_to >= options.shortest_ratio * t_from && t_from > 0)) {
-    return true;
-  }
-  return std::any_of(maxima.begin(), maxima.end(), [&](const DriftSeries& maximum) {
-    const auto samples = std::count_if(maximum.t.begin(), maximum.t.end(), [&](double t) {
-      return t >= options.late_window_start * t_to && t <= t_to;
-    });
-    return samples < options.fewest_samples;
+bool IsTooShort(std::span<const DriftSeries> maxima, double t_from, double t_to) {
+  if (!(t_to >= kShortestRatio * t_from && t_from > 0)) return true;
+  return std::ranges::any_of(maxima, [&](const DriftSeries& maximum) {
+    const auto samples = std::ranges::count_if(
+        maximum.t, [&](double t) { return t >= kLateWindowStart * t_to && t <= t_to; });
+    return samples < kFewestSamples;
   });
 }
 
-bool IsResolved(const Growth& growth, const GrowthOptions& options) {
-  if (growth.members < options.fewest_members) {
-    return false;
-  }
+bool IsResolved(const Growth& growth) {
+  if (growth.members < kFewestMembers) return false;
   const double s = std::hypot(growth.spread, growth.spread_late) / std::sqrt(2.0);
   const double error = std::max(growth.spread, growth.spread_late) / std::sqrt(growth.members);
   // false if anything is NaN
-  return std::abs(growth.exponent - growth.exponent_late) <= std::max(s, options.slope_bias) &&
-         error <= options.largest_error;
+  return std::abs(growth.exponent - growth.exponent_late) <= std::max(s, kSlopeBias) &&
+         error <= kLargestError;
 }
 
 }  // namespace
 
 Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double length,
-                     const GrowthOptions& options) {
+                     double round_off) {
   if (!(length > 0)) {
     throw std::invalid_argument("length is " + std::to_string(length) + "; it must be positive");
   }
-  Growth growth{.exponent = kNaN,
-                .spread = kNaN,
-                .exponent_late = kNaN,
-                .spread_late = kNaN,
-                .resolved = false,
-                .regime = "too-short",
-                .members = static_cast<int>(runs.size()),
-                .t_from = kNaN,
-                .t_to = kNaN,
-                .hypothesis = {.ratio = kNaN, .rate = kNaN},
-                .hypothesis_resolved = false};
-  std::vector<DriftSeries> maxima;
-  std::transform(runs.begin(), runs.end(), std::back_inserter(maxima), RunningMaximum);
-  if (maxima.empty()) {
-    return growth;
-  }
-  const Usable usable = FindUsable(maxima, t_end, length, options);
+  Growth growth;
+  growth.members = static_cast<int>(runs.size());
+  if (runs.empty()) return growth;
+  const std::vector<DriftSeries> maxima = Mapped<DriftSeries>(runs, RunningMaximum);
+  const Usable usable = FindUsable(maxima, t_end, length);
   const double t_to = usable.t_to;
-  const double t_from = std::max(usable.t_from, options.window_start * t_to);
-  const bool too_short = IsTooShort(maxima, t_from, t_to, options);
-  if (!too_short) {
-    const double t_late = std::max(t_from, options.late_window_start * t_to);
-    const std::vector<DriftSeries> readings = Readings(maxima, t_from, t_to, options.points);
-    const Statistics whole = Slopes(readings);
-    const Statistics late = Slopes(Readings(maxima, t_late, t_to, options.points));
-    growth.exponent = whole.mean;
-    growth.spread = whole.spread;
-    growth.exponent_late = late.mean;
-    growth.spread_late = late.spread;
+  const double t_from = std::max(usable.t_from, kWindowStart * t_to);
+  if (!IsTooShort(maxima, t_from, t_to)) {
+    const double t_late = std::max(t_from, kLateWindowStart * t_to);
+    const std::vector<DriftSeries> readings = Readings(maxima, t_from, t_to);
+    SetSlopes(readings, &growth.exponent, &growth.spread);
+    SetSlopes(Readings(maxima, t_late, t_to), &growth.exponent_late, &growth.spread_late);
     growth.t_from = t_from;
     growth.t_to = t_to;
-    growth.resolved = IsResolved(growth, options);
-    growth.hypothesis = CompareHypotheses(readings, whole.mean, options.hypotheses);
+    growth.resolved = IsResolved(growth);
+    growth.hypothesis = CompareHypotheses(readings, growth.exponent);
     growth.hypothesis_resolved = growth.hypothesis.refutes_rivals &&
                                  (growth.hypothesis.name == "exponential" || growth.resolved);
     growth.regime = usable.saturates ? "saturated" : "truncation";
   }
-  if (usable.final_drift < options.round_off * std::numeric_limits<double>::epsilon() * length) {
+  if (usable.final_drift < round_off * std::numeric_limits<double>::epsilon() * length) {
     growth.regime = "round-off";
   }
   return growth;
@@ -340,19 +346,13 @@ Growth AnalyseGrowth(std::span<const DriftSeries> runs, double t_end, double len
 
 DriftSeries Envelope(const DriftSeries& series, int points) {
   const DriftSeries maximum = RunningMaximum(series);
-  const auto first = std::upper_bound(maximum.t.begin(), maximum.t.end(), 0.0);
-  if (points < 2 || std::distance(first, maximum.t.end()) < 2) {
-    return {};
-  }
+  const auto first = std::ranges::upper_bound(maximum.t, 0.0);
+  if (points < 2 || maximum.t.end() - first < 2) return {};
   return Resample(maximum, *first, maximum.t.back(), points);
 }
 
-namespace {
-
-/// (log size, mean log cost), by growing size.
-std::vector<std::pair<double, double>> LogPoints(std::span<const double> sizes,
-                                                 std::span<const double> costs) {
-  std::map<double, std::pair<double, int>> sums;
+PowerFit FitPower(std::span<const double> sizes, std::span<const double> costs) {
+  std::map<double, std::pair<double, int>> sums;  // of log costs, and their number, by log size
   for (std::size_t i = 0; i < std::min(sizes.size(), costs.size()); ++i) {
     const double x = std::log(sizes[i]), y = std::log(costs[i]);
     if (!std::isfinite(x) || !std::isfinite(y)) continue;
@@ -360,15 +360,10 @@ std::vector<std::pair<double, double>> LogPoints(std::span<const double> sizes,
     sum += y;
     ++count;
   }
-  std::vector<std::pair<double, double>> points;
-  for (const auto& [x, sum] : sums) points.emplace_back(x, sum.first / sum.second);
-  return points;
-}
-
-}  // namespace
-
-PowerFit FitPower(std::span<const double> sizes, std::span<const double> costs) {
-  const auto points = LogPoints(sizes, costs);
+  std::vector<std::pair<double, double>> means;
+  for (const auto& [x, sum] : sums) means.emplace_back(x, sum.first / sum.second);
+  const LogLog fitted(std::move(means));
+  const auto& points = fitted.points;
   PowerFit fit;
   fit.sizes = static_cast<int>(points.size());
   if (points.size() < 2) {
@@ -378,30 +373,22 @@ PowerFit FitPower(std::span<const double> sizes, std::span<const double> costs) 
   }
   fit.smallest = std::exp(points.front().first);
   fit.largest = std::exp(points.back().first);
-  const double n = static_cast<double>(points.size());
-  double x_mean = 0.0, y_mean = 0.0, xx = 0.0, xy = 0.0, rest = 0.0;
-  for (const auto& [x, y] : points) {
-    x_mean += x / n;
-    y_mean += y / n;
-  }
-  for (const auto& [x, y] : points) {
-    xx += (x - x_mean) * (x - x_mean);
-    xy += (x - x_mean) * (y - y_mean);
-  }
-  fit.exponent = xy / xx;
-  fit.coefficient = std::exp(y_mean - fit.exponent * x_mean);
-  fit.slope_min = std::numeric_limits<double>::infinity();
+  fit.exponent = fitted.Slope();
+  fit.coefficient = std::exp(fitted.y_mean - fit.exponent * fitted.x_mean);
+  fit.slope_min = kInfinity;
   fit.slope_max = -fit.slope_min;
+  double rest = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto& [x, y] = points[i];
-    const double residual = y - y_mean - fit.exponent * (x - x_mean);
+    const double residual = y - fitted.y_mean - fit.exponent * (x - fitted.x_mean);
     rest += residual * residual;
     if (i == 0) continue;
     const double slope = (y - points[i - 1].second) / (x - points[i - 1].first);
     fit.slope_min = std::min(fit.slope_min, slope);
     fit.slope_max = std::max(fit.slope_max, slope);
   }
-  fit.standard_error = points.size() > 2 ? std::sqrt(rest / (n - 2.0) / xx) : kNaN;
+  const double n = static_cast<double>(points.size());
+  fit.standard_error = points.size() > 2 ? std::sqrt(rest / (n - 2.0) / fitted.xx) : kNaN;
   return fit;
 }
 

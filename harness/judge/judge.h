@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,9 +17,7 @@
 
 namespace loopbench::harness {
 
-// Demands on measures: keys, relations, and rules of comparison.
-
-// Rules for the comparison of measures (harness/base/record.h): their groups and valid values.
+// Demands on measures: keys, relations, and rules of comparison (harness/base/record.h).
 
 /// Returns the group of a rule, for `--only` and the summary.
 std::string_view GroupOf(Rule rule);
@@ -44,24 +43,26 @@ std::string Shown(const Record& record, std::string_view key);
 /// (harness/run/timing.h); NaN if unknown or if the value is not a time.
 double CalibrationOf(const Record& record, std::string_view key);
 
-/// Returns the text that identifies a case of a store: the keys before "case_id" or "outcome" in
-/// the record.
-std::string CaseText(const Record& record);
+/// Returns the text that identifies a case of a store: the keys before "case_id", "outcome", "id"
+/// or "version". With `keys`, only these and "kind", which separates runs from timings.
+std::string CaseText(const Record& record, const std::vector<std::string>& keys = {});
 
-/// Returns the text of these keys and "kind" only; "kind" separates runs from timings.
-std::string CaseText(const Record& record, const std::vector<std::string>& keys);
+/// Returns "drift 1, energy 2": each word with its number, in this format.
+std::string CountWords(const std::vector<std::string>& words, std::string_view format = "{} {}");
+
+/// Returns the cases that occur in several records.
+std::set<std::string> RepeatedCases(std::span<const Record> records);
 
 /// Returns the settings in which two compared records differ, or "": "rtol 1e-09 before, 1e-06 now,
 /// content ...". Content is the mechanism, limits and ensemble (harness/run/run.h).
 std::string OtherSettings(const Record& base, const Record& fresh);
 
-// Demand on a measure, and its evaluation. A claim makes demands on a statistic of records, a
-// robustness map on every record of a cell, a comparison on a new and a base value.
-
 /// Relation of a value: a number at most, at least, equal to or within a tolerance of another
 /// number, or a text equal to or different from a word.
 enum class Relation { kAtMost, kAtLeast, kEqual, kWithin, kIs, kIsNot };
 
+/// Demand on a measure. A claim makes demands on a statistic of records, a robustness map on every
+/// record of a cell, a comparison on a new and a base value.
 struct Demand {
   std::string measure = {};  ///< key in the record
   std::string name = {};     ///< short name for cells, or ""
@@ -102,9 +103,7 @@ Judged Judge(const Demand& demand, const Record& record);
 std::string ToText(const Demand& demand, const std::string& subject, bool rounded);
 inline std::string ToText(const Demand& demand) { return ToText(demand, demand.measure, false); }
 
-// Claims about stored records: their file, verdicts and report.
-
-// Verdicts on claims, computed from records by rules.
+// Claims about stored records: verdicts, computed from records by rules.
 //
 // A rule (configs/experiments/paper/claims.json) restates one claim as checks. Each check selects
 // records, takes a statistic of one measure and compares it with a threshold. The verdict depends
@@ -185,18 +184,13 @@ std::string_view ToString(Verdict verdict);
 /// "holds", "fails", "not measured".
 std::string_view ToString(CheckState state);
 
-// Reads the rules that turn results into verdicts (configs/experiments/paper/claims.json). Keys of
-// the file: docs/fields.md, claims.
-
-/// Reads a file. Throws ConfigError with all errors (unknown keys, wrong types, missing or
-/// misplaced thresholds, repeated ids or labels), each with file, JSON Pointer, found and expected
-/// value.
+/// Reads a file (docs/fields.md, claims). Throws ConfigError with all errors (unknown keys, wrong
+/// types, missing or misplaced thresholds, repeated ids or labels), each with file, JSON Pointer,
+/// found and expected value.
 std::vector<ClaimRule> ReadClaims(const std::filesystem::path& path);
 
 /// Reads rules from text; `file` is the name used in messages.
 std::vector<ClaimRule> ParseClaims(std::string_view text, const std::string& file);
-
-// Page of verdicts: every claim with its verdict and the measured numbers.
 
 /// Returns one row per claim: id, claim, section of the paper, verdict.
 Table VerdictTable(std::span<const ClaimResult> results);
@@ -279,8 +273,6 @@ struct ComparisonReport {
 
 ComparisonReport Compare(const std::vector<Record>& base, const std::vector<Record>& fresh,
                          const CompareOptions& options);
-
-// Robustness map of methods and stress tests: rules, their file, cells.
 
 // Robustness map: methods and stress tests, each cell evaluated from records by rules.
 //
@@ -427,21 +419,17 @@ std::string HoldingCount(const MapCell& cell);
 /// not hold.
 std::vector<std::string> BrokenDemands(const RobustnessMap& map);
 
-// Reads the rules of a robustness map (configs/experiments/extremes/map.json). Keys of the file:
-// docs/fields.md, map.
-
-/// Reads a file. Throws ConfigError with all errors (unknown keys, wrong types, unknown outcomes or
-/// column labels, repeated labels, rows without criteria), each with file, JSON Pointer, found and
-/// expected value.
+/// Reads a file (docs/fields.md, map). Throws ConfigError with all errors (unknown keys, wrong
+/// types, unknown outcomes or column labels, repeated labels, rows without criteria), each with
+/// file, JSON Pointer, found and expected value.
 MapRules ReadMapRules(const std::filesystem::path& path);
 
 /// Reads rules from text; `file` is the name used in messages.
 MapRules ParseMapRules(std::string_view text, const std::string& file);
 
-// Work-precision comparison: Pareto fronts, and equality of settings among the compared methods.
-
-// Cost of accuracy: each accuracy run of a store with the time of the same case, the Pareto front
-// of each problem, and the cheapest method of each formulation for an error.
+// Work-precision comparison. Cost of accuracy: each accuracy run of a store with the time of the
+// same case, the Pareto front of each problem, and the cheapest method of each formulation for an
+// error.
 //
 // A run that failed or has warnings is a row with its reason. It is excluded from fronts and from
 // the cheapest methods, because its error is unreliable.
@@ -509,29 +497,21 @@ struct WorkPrecision {
 WorkPrecision MakeWorkPrecision(std::span<const Record> records,
                                 const WorkPrecisionOptions& options);
 
-// Fairness of the comparison: settings that were equal and different among the compared rows, read
-// from the records.
-
-/// Returns one line each: equal settings, with values shared by all problems; different settings,
-/// with values and numbers of rows; settings missing in records; the error and the cost, with their
-/// accuracy; numbers of rows not compared, with reasons; warnings ("warning: ...") if costs are
-/// incomparable times.
+/// Returns the fairness of the comparison as lines. They name equal settings of the compared rows,
+/// different settings with numbers of rows, and settings missing in records. Then follow the error
+/// and the cost with their accuracy, and numbers of rows not compared with reasons. Warnings
+/// ("warning: ...") are for costs that are incomparable times.
 std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision);
 
 // Tables and documents of robustness maps and work-precision comparisons.
 
-// The robustness map as CSV and as text.
-
-// Robustness map read from its CSV, for pictures: the original store is large and rarely kept.
-
-/// Returns the map of these rules with the cells of robustness-map.csv (MapCellTable()). Each cell
-/// has its state and requirement; numbers and reasons are not read.
+/// Returns the map of these rules with the cells of robustness-map.csv (MapCellTable()), for
+/// pictures: the original store is large and rarely kept. Each cell has its state and requirement;
+/// numbers and reasons are not read.
 ///
 /// @throws ConfigError with file, line and found text if the CSV is invalid or its cells differ
 /// from the rules.
 RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file);
-
-// Robustness map as tables for a terminal and for programs, and as a page.
 
 /// Returns "3 of 877 cells that hold have runs with warnings".
 std::string CountFlagged(const RobustnessMap& map);
@@ -547,8 +527,6 @@ Table MapCellTable(const RobustnessMap& map);
 /// Returns robustness-map.md: a table per group, the limits with reasons, and every cell that does
 /// not hold with number and message. `notes` (provenance) are at the end.
 std::string MapMarkdown(const RobustnessMap& map, const std::vector<std::string>& notes);
-
-// Work-precision comparison as tables for a terminal and for programs, and as a page.
 
 /// Rows and width of a table.
 struct WorkPrecisionView {
@@ -576,8 +554,6 @@ std::string WorkPrecisionMarkdown(const WorkPrecision& work_precision,
 
 // Statistics of samples, and fitted exponents.
 
-// Test whether one sample of times is larger than another, and correction for multiple tests.
-
 /// Returns the median; NaN for an empty sample or a sample with NaN.
 double Median(std::span<const double> sample);
 
@@ -601,21 +577,17 @@ double SmallestP(std::size_t a, std::size_t b);
 /// dependence.
 std::vector<double> HolmAdjusted(std::span<const double> p);
 
-// Exponents of time over size, from benchmarks and from the timings of a store.
-
-/// Returns one row per family of right-hand sides: benchmarks with names equal except one numeric
-/// part ("rhs/chain/10/odca/..." and "rhs/chain/30/odca/..."), or timings of equal methods with
-/// mechanisms "chain-10" and "chain-30". Sizes are numbers of bodies (counter "bodies"), or the
-/// numeric part without this counter. Keys: "family", "sizes", "bodies_min", "bodies_max",
-/// "exponent", "standard_error", "slope_min", "slope_max", "ns_per_body" at the largest size,
-/// "failed" (members of the family that ended with an error, of any size). Names without a numeric
-/// part and families with one member are left out; families with fewer than two measured sizes have
-/// no exponent. Sizes below `from` are ignored.
+/// Returns exponents of time over size, one row per family of right-hand sides. A family is a set
+/// of benchmarks whose names differ in one number ("rhs/chain/10/odca/...",
+/// "rhs/chain/30/odca/..."), or timings of equal methods with mechanisms "chain-10" and "chain-30".
+/// Sizes are numbers of bodies (counter "bodies"), or the numeric part without this counter. Keys:
+/// "family", "sizes", "bodies_min", "bodies_max", "exponent", "standard_error", "slope_min",
+/// "slope_max", "ns_per_body" at the largest size, "failed" (members of the family that ended with
+/// an error, of any size). Names without a numeric part and families with one member are left out;
+/// families with fewer than two measured sizes have no exponent. Sizes below `from` are ignored.
 std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from);
 
 // Measurements over commits, for trackers and for a table.
-
-// Measurements in JSON formats of continuous-benchmarking trackers.
 
 /// Tracked number; smaller is better.
 struct TrackedValue {
@@ -635,8 +607,6 @@ std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values);
 /// Bencher Metric Format: {benchmark: {measure: {"value", "lower_value", "upper_value"}}}. Units
 /// are part of the measure's name, "cpu (ns)": the format has no place for them.
 std::string ToBencherMetricFormat(const std::vector<TrackedValue>& values);
-
-// Selection of numbers of a record to track over commits.
 
 struct TrackedRecords {
   /// Counts, errors, instructions and times (median, with the 10th and 90th percentile as spread)

@@ -4,9 +4,10 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <map>
-#include <optional>
 #include <set>
+#include <sstream>
 #include <vector>
 
 #include "harness/base/text.h"
@@ -39,42 +40,28 @@ std::vector<std::string> FieldsOf(std::string_view line) {
 /// Returns the label as in the file.
 std::string Written(const std::string& label) { return FieldsOf(EscapeCsv(label)).front(); }
 
-std::optional<CellState> StateNamed(std::string_view name) {
-  const auto* state =
-      std::ranges::find(kCellStates, name, [](CellState one) { return ToString(one); });
-  if (state == kCellStates.end()) return std::nullopt;
-  return *state;
-}
-
 using Place = std::vector<std::string>;  // group, row, column
-
-std::map<Place, MapCell*> PlacesOf(RobustnessMap& map) {
-  std::map<Place, MapCell*> places;
-  EachCell(map,
-           [&](const MapGroup& group, const MapRow& row, const MapMethod& column, MapCell& cell) {
-             places[{Written(group.label), Written(row.label), Written(column.label)}] = &cell;
-           });
-  return places;
-}
 
 }  // namespace
 
 RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std::string& file) {
   RobustnessMap map = MakeRobustnessMap(rules, {});
   map.remarks.clear();
-  std::map<Place, MapCell*> places = PlacesOf(map);
+  std::map<Place, MapCell*> places;
+  EachCell(map,
+           [&](const MapGroup& group, const MapRow& row, const MapMethod& method, MapCell& cell) {
+             places[{Written(group.label), Written(row.label), Written(method.label)}] = &cell;
+           });
   std::vector<std::string> heading;
   std::size_t number = 0;
-  for (std::size_t start = 0; start < csv.size(); ++number) {
-    const std::size_t end = std::min(csv.find('\n', start), csv.size());
-    const std::string_view line = csv.substr(start, end - start);
-    start = end + 1;
+  const auto fail = [&](const std::string& found, const char* expected) {
+    throw ConfigError(fmt::format("{}:{}: found {}, expected {}", file, number, found, expected));
+  };
+  std::istringstream lines{std::string(csv)};
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
     if (line.empty() || line.front() == '#') continue;
     const std::vector<std::string> fields = FieldsOf(line);
-    const auto fail = [&](const std::string& found, const char* expected) {
-      throw ConfigError(
-          fmt::format("{}:{}: found {}, expected {}", file, number + 1, found, expected));
-    };
     if (heading.empty()) {
       heading = fields;
       continue;
@@ -96,8 +83,11 @@ RobustnessMap MapFromCsv(const MapRules& rules, std::string_view csv, const std:
           fmt::format("\"{}\" of \"{}\" for \"{}\"", field("row"), field("group"), field("method")),
           "each cell of the rules once");
     }
-    const auto state = StateNamed(field("state"));
-    if (!state) fail(fmt::format("state \"{}\"", field("state")), "a state of cells");
+    const auto* state =
+        std::ranges::find(kCellStates, field("state"), [](CellState one) { return ToString(one); });
+    if (state == kCellStates.end()) {
+      fail(fmt::format("state \"{}\"", field("state")), "a state of cells");
+    }
     cell->second->state = *state;
     cell->second->demanded = field("required") == "true";
     cell->second->flagged = 0;
@@ -115,9 +105,8 @@ namespace {
 
 std::string ColumnKey(std::size_t column) { return fmt::format("column{}", column); }
 
-// Returns `shown`, the number and the count, if present.
-std::string MapCellText(const MapCell& cell, const std::string& shown) {
-  std::string text = shown;
+// Returns `text`, the number and the count, if present.
+std::string MapCellText(const MapCell& cell, std::string text) {
   for (const std::string& part : {DecidingNumber(cell), HoldingCount(cell)}) {
     if (!part.empty()) text += " " + part;
   }
@@ -172,16 +161,11 @@ std::vector<TableColumn> MatrixColumns(const RobustnessMap& map, bool letters) {
 
 Table LimitTable(const RobustnessMap& map) {
   Table table{.title = "Limits",
-              .columns = {{"row", "stress test"},
-                          {"right", "expected outcome"},
-                          {"demands", "criteria"},
-                          {"why", "why"}}};
+              .columns = Columns("row=stress test, right=expected outcome, demands=criteria, why")};
+  const auto text = [](const Demand& demand) { return ToText(demand); };
   for (const MapGroup& group : map.rules.groups) {
     for (const MapRow& row : group.rows) {
-      std::vector<std::string> demands;
-      for (const Demand& demand : row.decides) demands.push_back(ToText(demand));
-      AddRow({row.label, fmt::format("{}", fmt::join(row.right, " or ")),
-              fmt::format("{}", fmt::join(demands, "; ")), row.why},
+      AddRow({row.label, Joined(row.right, " or "), Joined(row.decides, "; ", text), row.why},
              &table);
     }
   }
@@ -190,19 +174,17 @@ Table LimitTable(const RobustnessMap& map) {
 
 /// Returns "24 cells: 15 holds, 3 stopped, 1 inaccurate, 5 not measured".
 std::string CountCells(const RobustnessMap& map) {
-  std::string text;
+  std::map<CellState, std::size_t> counts;
   std::size_t total = 0;
+  EachCell(map, [&](const MapGroup&, const MapRow&, const MapMethod&, const MapCell& cell) {
+    ++counts[cell.state];
+    ++total;
+  });
+  std::vector<std::string> texts;
   for (const CellState state : kCellStates) {
-    std::size_t count = 0;
-    EachCell(map, [&](const MapGroup&, const MapRow&, const MapMethod&, const MapCell& cell) {
-      count += cell.state == state ? 1 : 0;
-    });
-    total += count;
-    if (count > 0) {
-      text += fmt::format("{} {} {}", text.empty() ? "" : ",", count, ToString(state));
-    }
+    if (counts[state] > 0) texts.push_back(fmt::format(" {} {}", counts[state], ToString(state)));
   }
-  return WithCount(total, "cell") + ":" + text;
+  return WithCount(total, "cell") + ":" + Joined(texts, ",");
 }
 
 }  // namespace
@@ -288,8 +270,8 @@ std::string FrontColour(const Record& row, const TableColumn& column) {
 
 /// Returns true for keys that identify a method, not shared by all rows of a problem.
 bool NamesMethod(const std::string& key) {
-  static const std::set<std::string> others = {"kind", "experiment", "mechanism", "horizon"};
-  return !others.contains(key);
+  constexpr std::string_view kOthers[] = {"kind", "experiment", "mechanism", "horizon"};
+  return !Contains(kOthers, key);
 }
 
 std::vector<Record> RecordsOfRows(const WorkPrecision& work_precision) {
@@ -298,11 +280,6 @@ std::vector<Record> RecordsOfRows(const WorkPrecision& work_precision) {
     for (const WorkPrecisionRow& row : problem.rows) records.push_back(row.record);
   }
   return records;
-}
-
-bool IsAlike(const std::vector<Record>& records, const std::string& key) {
-  return std::ranges::all_of(
-      records, [&](const Record& record) { return record.Text(key) == records.front().Text(key); });
 }
 
 /// Returns the columns of methods. Compact tables have short words and no constant columns except
@@ -336,30 +313,22 @@ Format FormatOfCost(const WorkPrecision& work_precision) {
                                                               : measure->heading.format;
 }
 
-std::vector<TableColumn> FullColumns(const WorkPrecision& work_precision,
-                                     const std::vector<Record>& records) {
-  std::vector<TableColumn> columns = {{"problem", "problem"}};
-  for (TableColumn& column : MethodColumns(records, false)) columns.push_back(std::move(column));
+/// Returns the columns of the rows; compact tables have the front first, and no details.
+std::vector<TableColumn> RowColumns(const WorkPrecision& work_precision,
+                                    const std::vector<Record>& records, bool compact) {
+  std::vector<TableColumn> columns = Columns(compact ? "front=" : "problem");
+  std::ranges::move(MethodColumns(records, compact), std::back_inserter(columns));
   columns.push_back({"error", WithUnit("error", work_precision.error), Format::kScientific});
-  columns.push_back({"error_is_bound", "is bound"});
+  if (!compact) columns.push_back({"error_is_bound", "is bound"});
   columns.push_back({"cost", WithUnit("cost", work_precision.cost), FormatOfCost(work_precision)});
-  columns.push_back({"front", "front"});
-  for (const char* key : {"outcome", "warnings", "reference_error", "reference_valid_until",
-                          "steps", "rejected", "rhs_evaluations", "aa_spread_wall"}) {
-    if (std::ranges::any_of(records, [&](const Record& one) { return one.Find(key) != nullptr; })) {
-      columns.push_back(ColumnOf(key, records));
+  if (!compact) {
+    columns.push_back({"front", "front"});
+    const std::vector<std::string> keys = KeysOf(records);
+    for (const char* key : {"outcome", "warnings", "reference_error", "reference_valid_until",
+                            "steps", "rejected", "rhs_evaluations", "aa_spread_wall"}) {
+      if (Contains(keys, key)) columns.push_back(ColumnOf(key, records));
     }
   }
-  columns.push_back({"reason", "not compared because"});
-  return columns;
-}
-
-std::vector<TableColumn> FrontColumns(const WorkPrecision& work_precision,
-                                      const std::vector<Record>& records) {
-  std::vector<TableColumn> columns = {{"front", ""}};
-  for (TableColumn& column : MethodColumns(records, true)) columns.push_back(std::move(column));
-  columns.push_back({"error", WithUnit("error", work_precision.error), Format::kScientific});
-  columns.push_back({"cost", WithUnit("cost", work_precision.cost), FormatOfCost(work_precision)});
   columns.push_back({"reason", "not compared because"});
   return columns;
 }
@@ -380,14 +349,6 @@ const WorkPrecisionRow& RowOf(const WorkPrecisionProblem& problem, const Cheapes
   return problem.rows[static_cast<std::size_t>(one.row)];
 }
 
-std::vector<std::string> FormulationsOfAll(const WorkPrecision& work_precision) {
-  std::set<std::string> names;
-  for (const WorkPrecisionProblem& problem : work_precision.problems) {
-    for (const Cheapest& one : problem.cheapest) names.insert(one.formulation);
-  }
-  return {names.begin(), names.end()};
-}
-
 }  // namespace
 
 Table WorkPrecisionTable(const WorkPrecision& work_precision, const WorkPrecisionView& view) {
@@ -396,8 +357,7 @@ Table WorkPrecisionTable(const WorkPrecision& work_precision, const WorkPrecisio
   table.title = fmt::format("{} against {}", work_precision.error, work_precision.cost);
   table.group = "problem";
   table.colour = &FrontColour;
-  table.columns =
-      view.compact ? FrontColumns(work_precision, records) : FullColumns(work_precision, records);
+  table.columns = RowColumns(work_precision, records, view.compact);
   std::size_t hidden = 0;
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     for (const WorkPrecisionRow& row : problem.rows) {
@@ -418,14 +378,17 @@ Table WorkPrecisionTable(const WorkPrecision& work_precision, const WorkPrecisio
 }
 
 Table OverviewTable(const WorkPrecision& work_precision) {
+  std::set<std::string> names;
+  for (const WorkPrecisionProblem& problem : work_precision.problems) {
+    for (const Cheapest& one : problem.cheapest) names.insert(one.formulation);
+  }
   Table table;
   table.title =
       fmt::format("The cheapest method for an error: {}, and its ratio to the cheapest of all",
                   WithUnit(work_precision.cost, work_precision.cost));
   table.columns = {{"problem", "problem"},
                    {"error_class", WithUnit("error <=", work_precision.error), Format::kShortest}};
-  for (const std::string& name : FormulationsOfAll(work_precision))
-    table.columns.push_back({name, name});
+  for (const std::string& name : names) table.columns.push_back({name, name});
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
     Record* row = nullptr;
     double last = std::numeric_limits<double>::quiet_NaN();
@@ -473,8 +436,7 @@ std::string WorkPrecisionMarkdown(const WorkPrecision& work_precision,
                                   const std::vector<std::string>& notes) {
   Table overview = OverviewTable(work_precision);
   overview.notes = work_precision.remarks;
-  for (std::string& line : FairnessStatement(work_precision))
-    overview.notes.push_back(std::move(line));
+  std::ranges::move(FairnessStatement(work_precision), std::back_inserter(overview.notes));
   Table rows = WorkPrecisionTable(work_precision, {.compact = false, .all = true});
   rows.notes.insert(rows.notes.end(), notes.begin(), notes.end());
   return ToMarkdown(overview) + "\n" + ToMarkdown(CheapestTable(work_precision)) + "\n" +

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <tuple>
 #include <utility>
 
@@ -19,10 +17,6 @@ namespace loopbench::harness {
 namespace {
 
 constexpr const char* kFinishedWord = "finished";
-
-bool Names(const std::vector<std::string>& words, const std::string& word) {
-  return std::ranges::find(words, word) != words.end();
-}
 
 CellState StateOfEnding(const std::string& outcome) {
   const auto known = std::ranges::find(kRunEndings, outcome, &RunEnding::word);
@@ -38,9 +32,7 @@ auto SeverityKey(const MapCell& cell) {
 Selection RowAndColumn(const Selection& one, const Selection& other) {
   Selection both = one;
   both.insert(both.end(), other.begin(), other.end());
-  if (std::ranges::find(both, "kind", &Condition::key) == both.end()) {
-    both.push_back({"kind", {"accuracy"}});
-  }
+  if (!Contains(both, "kind", &Condition::key)) both.push_back({"kind", {"accuracy"}});
   return both;
 }
 
@@ -62,7 +54,7 @@ std::vector<std::string> UnknownKeys(const MapRules& rules, std::span<const Reco
   const std::vector<std::string> known = KeysOf(records);
   std::vector<std::string> remarks;
   for (const std::string& key : named) {
-    if (records.empty() || Names(known, key)) continue;
+    if (records.empty() || Contains(known, key)) continue;
     const std::string nearest = NearestSpelling(key, known);
     remarks.push_back(fmt::format("no record has the key \"{}\"{}", key,
                                   nearest.empty() ? "" : " (did you mean \"" + nearest + "\"?)"));
@@ -88,13 +80,13 @@ MapCell JudgeRun(const MapRow& row, const Record& record) {
   cell.case_id = record.Text("case_id");
   cell.t_reached = record.Number("t_reached");
   cell.records = 1;
-  if (!Names(row.right, cell.outcome)) {
+  if (!Contains(row.right, cell.outcome)) {
     JudgeEnding(row, record, &cell);
     return cell;
   }
   std::string beyond, lacking;
   for (const Demand& demand : row.decides) {
-    if (!Names(demand.when, cell.outcome)) continue;
+    if (!Contains(demand.when, cell.outcome)) continue;
     const Judged judged = Judge(demand, record);
     if (!judged.measured) {
       lacking = judged.reason;
@@ -130,15 +122,14 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method
   const Selection selection = RowAndColumn(row.select, method.select);
   std::optional<MapCell> worst;
   std::size_t holding = 0, count = 0, flagged = 0;
-  std::map<std::string, int> warnings;
+  std::vector<std::string> warnings;
   for (const Record& record : records) {
     if (!Matches(record, selection)) continue;
     const MapCell one = JudgeRun(row, record);
     holding += one.holding;
     if (one.holding > 0 && HasWarning(record)) {
       ++flagged;
-      std::istringstream codes(record.Text("warnings"));
-      for (std::string code; codes >> code;) ++warnings[code];
+      std::ranges::move(WarningsOf(record), std::back_inserter(warnings));
     }
     ++count;
     if (!worst || SeverityKey(one) > SeverityKey(*worst)) worst = one;
@@ -161,9 +152,7 @@ MapCell JudgeCell(const MapRow& row, std::size_t column, const MapMethod& method
   cell.holding = holding;
   cell.records = count;
   cell.flagged = flagged;
-  for (const auto& [code, times] : warnings) {
-    cell.warnings += fmt::format("{}{} {}", cell.warnings.empty() ? "" : ", ", code, times);
-  }
+  cell.warnings = CountWords(warnings);
   cell.cases = std::max(count, row.cases);
   cell.demanded = row.must_hold.at(column);
   return cell;

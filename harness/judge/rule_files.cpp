@@ -56,13 +56,20 @@ FieldValue<T> SelectionOf(Selection T::*member, std::size_t least = 0) {
           [=](const JsonNode& node, T& owner) { owner.*member = ReadSelection(node, least); }};
 }
 
-/// Reports `owner`'s `key` if `name` is in `taken`, and adds the name: labels and ids must be
-/// unique.
-void ReportRepeated(const JsonNode& owner, const std::string& key, const std::string& name,
-                    std::vector<std::string>* taken) {
-  const std::optional<JsonNode> member = owner.Optional(key);
-  if (member && std::ranges::find(*taken, name) != taken->end()) member->Fail("each name once");
-  taken->push_back(name);
+/// Reads the objects of an array (JsonNode::Elements) into `list`. Their names, under `key`, must
+/// be unique. `start` has the defaults.
+template <class T, class Part>
+void ReadNamed(const std::vector<JsonNode>& elements, const char* key, std::string T::*name,
+               const Part& start, const Fields<Part>& fields, std::vector<T>* list) {
+  std::vector<std::string> names;
+  for (const JsonNode& element : elements) {
+    Part part = start;
+    fields.Read(element, &part);
+    const std::optional<JsonNode> member = element.Optional(key);
+    if (member && Contains(names, part.*name)) member->Fail("each name once");
+    names.push_back(part.*name);
+    list->push_back(std::move(part));
+  }
 }
 
 /// Reads a file of this kind.
@@ -168,15 +175,12 @@ struct RuleInFile : ClaimRule {
 };
 
 void ReadChecks(const JsonNode& node, RuleInFile& rule) {
-  std::vector<std::string> labels;
-  for (const JsonNode& element : node.Elements("checks", "at least one check")) {
-    Check& check = rule.checks.emplace_back();
-    if (CheckFields().Read(element, &check)) {
-      check.select.insert(check.select.begin(), rule.common.begin(), rule.common.end());
-      Selection& base = check.relative_to;
-      if (!base.empty()) base.insert(base.begin(), rule.common.begin(), rule.common.end());
-    }
-    ReportRepeated(element, "label", check.label, &labels);
+  ReadNamed(node.Elements("checks", "at least one check"), "label", &Check::label, Check(),
+            CheckFields(), &rule.checks);
+  for (Check& check : rule.checks) {
+    check.select.insert(check.select.begin(), rule.common.begin(), rule.common.end());
+    Selection& base = check.relative_to;
+    if (!base.empty()) base.insert(base.begin(), rule.common.begin(), rule.common.end());
   }
 }
 
@@ -200,13 +204,7 @@ struct ClaimsFile {
 
 void ReadRules(const JsonNode& node, ClaimsFile& file) {
   if (node.value().empty()) node.Fail("at least one claim");
-  std::vector<std::string> ids;
-  for (const JsonNode& element : node.Elements("claims")) {
-    RuleInFile rule;
-    RuleFields().Read(element, &rule);
-    ReportRepeated(element, "id", rule.id, &ids);
-    file.rules.push_back(std::move(rule));
-  }
+  ReadNamed(node.Elements("claims"), "id", &ClaimRule::id, RuleInFile(), RuleFields(), &file.rules);
 }
 
 const Fields<ClaimsFile>& ClaimsFields() {
@@ -422,13 +420,8 @@ void ReadCommon(const JsonNode& node, GroupOfMap& group) {
 }
 
 void ReadMapRows(const JsonNode& node, GroupOfMap& group) {
-  std::vector<std::string> labels;
-  for (const JsonNode& element : node.Elements("rows", "at least one row")) {
-    RowOfMap row = group.common;
-    RowFields().Read(element, &row);
-    ReportRepeated(element, "label", row.label, &labels);
-    group.rows.push_back(row);
-  }
+  ReadNamed(node.Elements("rows", "at least one row"), "label", &MapRow::label, group.common,
+            RowFields(), &group.rows);
 }
 
 const Fields<GroupOfMap>& MapGroupFields() {
@@ -455,25 +448,17 @@ const Fields<MapMethod>& MethodFields() {
 }
 
 void ReadMapColumns(const JsonNode& node, MapRules& rules) {
-  std::vector<std::string> labels;
-  for (const JsonNode& element : node.Elements("methods", "at least one method")) {
-    MapMethod& column = rules.columns.emplace_back();
-    if (!MethodFields().Read(element, &column)) continue;
-    ReportRepeated(element, "label", column.label, &labels);
-  }
+  ReadNamed(node.Elements("methods", "at least one method"), "label", &MapMethod::label,
+            MapMethod(), MethodFields(), &rules.columns);
 }
 
 void ReadMapGroups(const JsonNode& node, MapRules& rules) {
   NameList columns;
   for (const MapMethod& column : rules.columns) columns.Add(column.label);
-  std::vector<std::string> labels;
-  for (const JsonNode& element : node.Elements("groups", "at least one group")) {
-    GroupOfMap group;
-    group.common.columns = &columns;
-    MapGroupFields().Read(element, &group);
-    ReportRepeated(element, "label", group.label, &labels);
-    rules.groups.push_back(group);
-  }
+  GroupOfMap start;
+  start.common.columns = &columns;
+  ReadNamed(node.Elements("groups", "at least one group"), "label", &MapGroup::label, start,
+            MapGroupFields(), &rules.groups);
 }
 
 const Fields<MapRules>& MapFields() {

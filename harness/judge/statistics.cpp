@@ -1,9 +1,14 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <numeric>
+#include <ranges>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -40,17 +45,12 @@ std::vector<double> ExactDistribution(std::size_t a, std::size_t b) {
 
 /// Sum over groups of equal values of t^3 - t.
 double TieTerm(std::span<const double> a, std::span<const double> b) {
-  std::vector<double> all(a.begin(), a.end());
-  all.insert(all.end(), b.begin(), b.end());
-  std::ranges::sort(all);
-  double term = 0.0;
-  for (std::size_t i = 0; i < all.size();) {
-    std::size_t end = i + 1;
-    while (end < all.size() && all[end] == all[i]) ++end;
-    const double t = static_cast<double>(end - i);
-    term += t * t * t - t;
-    i = end;
+  std::map<double, double> counts;
+  for (const std::span<const double> sample : {a, b}) {
+    for (const double x : sample) ++counts[x];
   }
+  double term = 0.0;
+  for (const auto& [x, t] : counts) term += t * t * t - t;
   return term;
 }
 
@@ -59,6 +59,37 @@ double NormalTail(double u, double a, double b, double ties) {
   const double variance = a * b / 12.0 * (n + 1.0 - ties / (n * (n - 1.0)));
   if (!(variance > 0.0)) return 1.0;  // all values equal
   return 0.5 * std::erfc((u - a * b / 2.0 - 0.5) / std::sqrt(2.0 * variance));
+}
+
+using TrackerDocument = nlohmann::ordered_json;
+
+bool HasSpread(const TrackedValue& value) {
+  return std::isfinite(value.lower) && std::isfinite(value.upper) && value.lower < value.upper;
+}
+
+std::string DumpTracker(const TrackerDocument& document) {
+  return document.dump(2, ' ', false, TrackerDocument::error_handler_t::replace) + "\n";
+}
+
+bool IsTracked(Rule rule) {
+  return rule == Rule::kCount || rule == Rule::kError || rule == Rule::kInstructions ||
+         rule == Rule::kTime;
+}
+
+TrackedValue Tracked(const std::string& one, const Measure& measure, const Record& record) {
+  TrackedValue value{one, std::string(measure.key), std::string(measure.heading.unit)};
+  if (measure.rule == Rule::kTime) {
+    const std::vector<double>& sample = record.Numbers(measure.key);
+    value.measure = value.measure.substr(value.measure.find('.') + 1);
+    value.value = Median(sample);
+    value.lower = Quantile(sample, 0.1);
+    value.upper = Quantile(sample, 0.9);
+    value.least = *std::ranges::min_element(sample);
+    value.calibration = CalibrationOf(record, measure.key);
+  } else {
+    value.value = value.lower = value.upper = value.least = record.Number(measure.key);
+  }
+  return value;
 }
 
 }  // namespace
@@ -132,17 +163,17 @@ struct FamilyName {
 FamilyName Split(const std::string& benchmark) {
   FamilyName family;
   int numbers = 0;
-  for (std::size_t start = 0; start <= benchmark.size();) {
-    const std::size_t end = std::min(benchmark.find('/', start), benchmark.size());
-    const std::string_view part = std::string_view(benchmark).substr(start, end - start);
+  std::string gap;
+  for (const auto each : std::views::split(benchmark, '/')) {
+    const std::string_view part(each.begin(), each.end());
     double value = 0.0;
     const auto [rest, error] = std::from_chars(part.data(), part.data() + part.size(), value);
     const bool is_number =
         error == std::errc() && rest == part.data() + part.size() && std::isfinite(value);
     if (is_number) family.size = value;
     numbers += is_number;
-    family.name += (start > 0 ? "/" : "") + (is_number ? std::string("N") : std::string(part));
-    start = end + 1;
+    family.name += gap + (is_number ? "N" : std::string(part));
+    gap = "/";
   }
   if (numbers != 1) family.name.clear();
   return family;
@@ -216,6 +247,60 @@ std::vector<Record> FitFamilies(const std::vector<Record>& measured, double from
     rows.back() = std::move(row);
   }
   return rows;
+}
+
+// Measurements for trackers.
+
+std::string ToCustomSmallerIsBetter(const std::vector<TrackedValue>& values) {
+  TrackerDocument document = TrackerDocument::array();
+  for (const TrackedValue& value : values) {
+    TrackerDocument entry = {{"name", value.benchmark + " " + value.measure},
+                             {"unit", value.unit.empty() ? "1" : value.unit},
+                             {"value", value.value}};
+    if (HasSpread(value)) entry["range"] = fmt::format("{} .. {}", value.lower, value.upper);
+    document.push_back(std::move(entry));
+  }
+  return DumpTracker(document);
+}
+
+std::string ToBencherMetricFormat(const std::vector<TrackedValue>& values) {
+  TrackerDocument document = TrackerDocument::object();
+  for (const TrackedValue& value : values) {
+    TrackerDocument metric = {{"value", value.value}};
+    if (HasSpread(value)) {
+      metric["lower_value"] = value.lower;
+      metric["upper_value"] = value.upper;
+    }
+    const std::string measure =
+        value.unit.empty() ? value.measure : fmt::format("{} ({})", value.measure, value.unit);
+    document[value.benchmark][measure] = std::move(metric);
+  }
+  return DumpTracker(document);
+}
+
+TrackedRecords TrackRecords(const std::vector<Record>& records) {
+  TrackedRecords tracked;
+  const std::set<std::string> repeated = RepeatedCases(records);
+  for (const Record& record : records) {
+    const std::string one = CaseText(record);
+    const auto leave_out = [&](const std::string& why) {
+      tracked.left_out.push_back(fmt::format("{}: {}", one.empty() ? "a nameless case" : one, why));
+    };
+    const bool is_repeated = repeated.contains(one);
+    if (is_repeated || record.Text("outcome") != "finished") {
+      leave_out(is_repeated ? "there more than once" : "outcome " + Shown(record, "outcome"));
+      continue;
+    }
+    for (const Measure& measure : Measures()) {
+      if (!IsTracked(measure.rule)) continue;
+      const Presence held = PresenceOf(record, measure);
+      if (held == Presence::kFit) tracked.values.push_back(Tracked(one, measure, record));
+      if (held != Presence::kUnfit) continue;
+      leave_out(fmt::format("{}: found {}, expected {}", measure.key, Shown(record, measure.key),
+                            Expected(measure.rule)));
+    }
+  }
+  return tracked;
 }
 
 }  // namespace loopbench::harness

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <set>
 
 #include "harness/base/text.h"
@@ -12,7 +13,7 @@
 #include "mechanism/model/kinematics.h"
 #include "mechanism/simplify/compile.h"
 #include "mechanism/start/branches.h"
-#include "mechanism/start/guesses.h"
+#include "mechanism/start/closure.h"
 
 namespace loopbench::harness {
 
@@ -20,12 +21,15 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// Radius of gyration over the size of a body beyond which, or below its inverse, units may be
+/// mixed. Bodies of usual shapes have 0.1 to 1; g for kg gives 1/30, mm for m 1000 times.
+constexpr double kOddGyration = 100.0;
+
 std::string BodyNames(const MechanismDescription& description, const std::vector<int>& bodies) {
   constexpr std::size_t kMaxNames = 6;
-  std::vector<std::string> names;
-  for (std::size_t i = 0; i < bodies.size() && i < kMaxNames; ++i) {
-    names.push_back(description.bodies[bodies[i]].name);
-  }
+  std::vector<std::string> names =
+      Mapped<std::string>(bodies | std::views::take(kMaxNames),
+                          [&](int body) { return description.bodies[body].name; });
   if (bodies.size() > kMaxNames) names.push_back(fmt::format("{} more", bodies.size() - kMaxNames));
   return ListInWords(names);
 }
@@ -172,8 +176,8 @@ std::vector<std::string> NamesOf(const MechanismDescription& description,
                                  const std::vector<IdleFreedom>& idle) {
   std::vector<std::string> names;
   for (const auto& [bodies, joints] : idle) {
-    std::vector<std::string> points;
-    for (const int j : joints) points.push_back(description.joints[j].name);
+    const std::vector<std::string> points =
+        Mapped<std::string>(joints, [&](int j) { return description.joints[j].name; });
     names.push_back(fmt::format("spin of {} about the line of its joints {}",
                                 BodyNames(description, bodies), ListInWords(points)));
   }
@@ -259,8 +263,6 @@ std::string FreedomFault(const MechanismDescription& description, const Observed
 
 namespace {
 
-using Eigen::Vector3d;
-
 /// First step, and the negligible one: about the accepted gaps [rad, or lengths].
 constexpr double kStep = 0.05, kLeast = 1e-11;
 /// Largest change of a pose in one step that is no jump to another branch [rad, or lengths].
@@ -289,22 +291,21 @@ class RangeSearch {
   RangeEnd Run(int sign) const {
     RangeEnd end;
     Place here = start_;
-    const double from = ValueIn(here.description);
+    const double from = ValueIn(here);
     double step = kStep * unit_;
-    while (!end.binds && std::abs(ValueIn(here.description) - from) < far_) {
-      MechanismDescription next = here.description;
+    while (!end.binds && std::abs(ValueIn(here) - from) < far_) {
+      Place next = here, there;
       double& value = ValueIn(next);
       const double least = kLeast * std::max(unit_, std::abs(value));
       value = from + sign * std::min(far_, std::abs(value - from) + step);
-      Place there;
-      if (Close(std::move(next), &there).empty() && Apart(here, there) <= kJump) {
+      if (Close(std::move(next.description), &there).empty() && Apart(here, there) <= kJump) {
         here = std::move(there);
       } else {
         step /= 2;
         end.binds = step < least;
       }
     }
-    end.value = ValueIn(here.description);
+    end.value = ValueIn(here);
     if (end.binds) end.in_line = InLine(here.bodies);
     end.at = std::move(here.description);
     return end;
@@ -331,12 +332,8 @@ class RangeSearch {
   }
 
  private:
-  double& ValueIn(MechanismDescription& description) const {
-    return std::ranges::find(description.initial.coordinates, joint_, &JointValues::joint)
-        ->values.front();
-  }
-  double ValueIn(const MechanismDescription& description) const {
-    return std::ranges::find(description.initial.coordinates, joint_, &JointValues::joint)
+  double& ValueIn(Place& place) const {
+    return std::ranges::find(place.description.initial.coordinates, joint_, &JointValues::joint)
         ->values.front();
   }
 

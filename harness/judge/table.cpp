@@ -4,7 +4,9 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <iterator>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
@@ -29,11 +31,9 @@ std::string FormatNumber(double number, Format format) {
       return fmt::format("{:.1f}", number);
     case Format::kSeconds:
       return fmt::format("{:.4g}", number);
-    case Format::kText:
-    case Format::kShortest:
-      break;
+    default:
+      return NumberCell(number);
   }
-  return NumberCell(number);
 }
 
 // Returns every digit, for CSV: absent and NaN values are empty as in the other writers.
@@ -47,6 +47,30 @@ std::string FullPrecision(const Record& row, const std::string& key) {
     return "";
   }
   return row.Text(key);
+}
+
+std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
+  std::vector<TableColumn> columns = table.columns;
+  std::erase_if(columns, [&](const TableColumn& column) { return column.key == table.group; });
+  return columns;
+}
+
+// Returns columns of machine-readable lists: the group's key comes first unless it is a column.
+std::vector<TableColumn> FlatColumns(const Table& table) {
+  std::vector<TableColumn> columns = table.columns;
+  if (!table.group.empty() && !Contains(columns, table.group, &TableColumn::key)) {
+    columns.insert(columns.begin(), ColumnOf(table.group, table.rows));
+  }
+  return columns;
+}
+
+/// Returns the text of each group, with an empty line between them; `heading` writes its heading.
+std::string TextOfGroups(const Table& table,
+                         const std::function<std::string(const std::string&)>& heading,
+                         const std::function<std::string(const std::vector<Record>&)>& rows) {
+  return Joined(Groups(table), "\n", [&](const RowGroup& group) {
+    return (group.heading.empty() ? "" : heading(group.heading) + "\n\n") + rows(group.rows);
+  });
 }
 
 }  // namespace
@@ -64,17 +88,6 @@ std::string NumberCell(double number) {
   const double size = std::abs(number);
   const int before_point = size < 1e15 && size >= 1.0 ? static_cast<int>(std::log10(size)) + 1 : 0;
   return fmt::format("{:.{}g}", number, std::max(kLeast, before_point));
-}
-
-bool IsFlagged(const Record& row, const std::string& key) {
-  const Value* value = row.Find(key);
-  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
-  if (key == "outcome") return !HasFailed(row) && !row.Text("warnings").empty();
-  if (key == "growth_hypothesis") return row.Text("growth_hypothesis_resolved") != "true";
-  if (std::isnan(row.Number(key))) return false;
-  if (key == "energy_growth_exponent" || key == "correction_growth_exponent") return true;
-  return (key == "growth_exponent" || key == "growth_exponent_late") &&
-         row.Text("growth_resolved") != "true";
 }
 
 std::string Cell(const Record& row, const TableColumn& column) {
@@ -113,38 +126,20 @@ Record& AddRow(std::initializer_list<AnyValue> values, Table* table) {
   return row;
 }
 
-bool HasFailed(const Record& row) {
-  const std::string outcome = row.Text("outcome");
-  return !outcome.empty() && outcome != "finished";
-}
-
-std::string OutcomeColour(const Record& row, const TableColumn& column) {
-  if (column.key != "outcome") return "";
-  if (HasFailed(row)) return "31";
-  return IsFlagged(row, column.key) ? "33" : "";
-}
-
-std::vector<TableColumn> ColumnsUnderHeading(const Table& table) {
-  std::vector<TableColumn> columns = table.columns;
-  std::erase_if(columns, [&](const TableColumn& column) { return column.key == table.group; });
-  return columns;
-}
-
 std::string ToCsv(const Table& table) {
-  std::string out;
-  for (std::size_t c = 0; c < table.columns.size(); ++c) {
-    out += (c == 0 ? "" : ",") + EscapeCsv(table.columns[c].key);
-  }
-  out += '\n';
+  std::string out =
+      Joined(table.columns, ",", [](const TableColumn& column) { return EscapeCsv(column.key); }) +
+      '\n';
   for (const Record& row : table.rows) {
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      const std::string& key = table.columns[c].key;
-      const Value* value = row.Find(key);
-      const bool is_text = value != nullptr && std::holds_alternative<std::string>(*value);
-      const std::string cell = FullPrecision(row, key);
-      out += (c == 0 ? "" : ",") + (is_text ? EscapeCsv(cell) : cell);
-    }
-    out += '\n';
+    out += Joined(table.columns, ",",
+                  [&row](const TableColumn& column) {
+                    const Value* value = row.Find(column.key);
+                    const bool is_text =
+                        value != nullptr && std::holds_alternative<std::string>(*value);
+                    const std::string cell = FullPrecision(row, column.key);
+                    return is_text ? EscapeCsv(cell) : cell;
+                  }) +
+           '\n';
   }
   for (const std::string& note : table.notes) out += "# " + EscapeTerminal(note) + '\n';
   return out;
@@ -154,27 +149,24 @@ std::string ToMarkdown(const Table& table) {
   std::string out =
       table.title.empty() ? "" : fmt::format("## {}\n\n", EscapeMarkdown(table.title));
   const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
-  std::string head = "|";
-  std::string rule = "|";
+  std::string head = "|", rule = "|";
   for (const TableColumn& column : columns) {
     head += fmt::format(" {} |", EscapeMarkdown(column.header));
     rule += column.format == Format::kText ? " --- |" : " ---: |";
   }
-  bool is_first = true;
-  for (const RowGroup& group : Groups(table)) {
-    if (!is_first) out += '\n';
-    is_first = false;
-    if (!group.heading.empty()) out += fmt::format("### {}\n\n", EscapeMarkdown(group.heading));
-    out += head + '\n' + rule + '\n';
-    for (const Record& row : group.rows) {
-      out += '|';
+  const auto heading = [](const std::string& words) { return "### " + EscapeMarkdown(words); };
+  out += TextOfGroups(table, heading, [&](const std::vector<Record>& rows) {
+    std::string text = head + '\n' + rule + '\n';
+    for (const Record& row : rows) {
+      text += '|';
       for (const TableColumn& column : columns) {
         const std::string cell = EscapeMarkdown(Cell(row, column));
-        out += cell.empty() ? "  |" : fmt::format(" {} |", cell);
+        text += cell.empty() ? "  |" : fmt::format(" {} |", cell);
       }
-      out += '\n';
+      text += '\n';
     }
-  }
+    return text;
+  });
   // each note is a paragraph; some renderers read a list as part of the table
   for (const std::string& note : table.notes) {
     out += fmt::format("\n{}\n", EscapeMarkdownParagraph(note));
@@ -183,19 +175,6 @@ std::string ToMarkdown(const Table& table) {
 }
 
 // JSON writer for programs, and selection among all writers.
-
-namespace {
-
-// Returns columns of machine-readable lists: the group's key comes first unless it is a column.
-std::vector<TableColumn> FlatColumns(const Table& table) {
-  std::vector<TableColumn> columns = table.columns;
-  if (!table.group.empty() && !Contains(columns, table.group, &TableColumn::key)) {
-    columns.insert(columns.begin(), ColumnOf(table.group, table.rows));
-  }
-  return columns;
-}
-
-}  // namespace
 
 std::string ToJson(const Table& table) {
   const std::vector<TableColumn> columns = FlatColumns(table);
@@ -222,6 +201,135 @@ std::string Render(const Table& table, const std::string& format) {
   Table flat = table;
   flat.columns = FlatColumns(table);
   return ToCsv(flat);
+}
+
+// Fit of tables to a terminal.
+
+namespace {
+
+/// Column as text: digits are aligned, with or without a mark after them.
+struct TextColumn {
+  TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
+      : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
+          return shown.format != Format::kText && IsFlagged(row, shown.key);
+        })) {
+    width = CellsOf(EscapeTerminal(column.header));
+    for (const Record& row : rows) {
+      for (const std::string& line : LinesOf(row)) width = std::max(width, CellsOf(line));
+    }
+  }
+
+  /// Returns at least one line.
+  std::vector<std::string> LinesOf(const Record& row) const {
+    const std::string cell =
+        EscapeTerminal(Cell(row, column)) + (marked && !IsFlagged(row, column.key) ? " " : "");
+    if (column.most_cells == 0) return {cell};
+    return BrokenInto(cell, column.most_cells);
+  }
+
+  TableColumn column;
+  bool marked;
+  std::size_t width = 0;  ///< [cells]
+};
+
+bool IsSameInAllRows(const Table& table, const TableColumn& column) {
+  if (table.rows.size() < 2) return false;
+  const std::string first = Cell(table.rows.front(), column);
+  return std::ranges::all_of(table.rows,
+                             [&](const Record& row) { return Cell(row, column) == first; });
+}
+
+/// Returns column indices among ColumnsUnderHeading() in drop order (FitWidth()).
+std::vector<std::size_t> OrderOfLeaving(const Table& table) {
+  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
+  const auto outcome = std::ranges::find(columns, "outcome", &TableColumn::key);
+  const auto rank = [&](std::size_t place) {
+    int importance = columns[place].importance;
+    if (outcome != columns.end() && columns.begin() + static_cast<std::ptrdiff_t>(place) <= outcome)
+      ++importance;
+    if (columns[place].key == "outcome") ++importance;
+    return std::pair(!IsSameInAllRows(table, columns[place]), importance);
+  };
+  std::vector<std::size_t> places(columns.empty() ? 0 : columns.size() - 1);
+  std::iota(places.rbegin(), places.rend(), std::size_t{1});
+  std::ranges::stable_sort(places, {}, rank);
+  return places;
+}
+
+/// Returns "dE [J]; t^p; the same in all rows: T/s 10": the dropped columns, by their indices, with
+/// the values that all rows share.
+std::string DroppedColumnsNote(const Table& table, std::vector<std::size_t> places) {
+  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
+  std::vector<std::string> gone, same;
+  std::ranges::sort(places);
+  for (const std::size_t place : places) {
+    const TableColumn& column = columns[place];
+    const std::string value = Cell(table.rows.front(), column);
+    const bool is_same = !value.empty() && IsSameInAllRows(table, column);
+    (is_same ? same : gone).push_back(is_same ? column.header + " " + value : column.header);
+  }
+  if (!same.empty()) gone.push_back("the same in all rows: " + Joined(same, "; "));
+  return Joined(gone, "; ");
+}
+
+/// Column with its preferred and its smallest width [cells].
+struct Fitting {
+  std::size_t widest = 0, narrowest = 0;
+  bool stays = true;
+};
+
+/// Returns the total width including gaps.
+std::size_t Taken(const std::vector<Fitting>& columns, std::size_t Fitting::*width) {
+  std::size_t sum = 0;
+  for (const Fitting& one : columns) {
+    if (one.stays) sum += (sum > 0 ? kColumnGap : 0) + one.*width;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::size_t TextWidth(const TableColumn& column, const std::vector<Record>& rows) {
+  return TextColumn(column, rows).width;
+}
+
+Table FitWidth(Table table, std::size_t width) {
+  constexpr std::size_t kNarrowestText = 24;  // [cells]: a few words; headings are not broken
+  const std::vector<TableColumn> columns = ColumnsUnderHeading(table);
+  std::vector<Fitting> fittings = Mapped<Fitting>(columns, [&](const TableColumn& column) {
+    const std::size_t widest = TextWidth(column, table.rows);
+    if (column.format != Format::kText) return Fitting{widest, widest};
+    return Fitting{widest, std::max(CellsOf(EscapeTerminal(column.header)),
+                                    std::min({widest, kNarrowestText, width}))};
+  });
+  if (width == 0 || Taken(fittings, &Fitting::widest) <= width) return table;
+  std::vector<std::size_t> left;
+  for (const std::size_t place : OrderOfLeaving(table)) {
+    if (Taken(fittings, &Fitting::narrowest) <= width) break;
+    fittings[place].stays = false;
+    left.push_back(place);
+  }
+  if (!left.empty()) {
+    table.notes.insert(table.notes.begin(),
+                       fmt::format("left out for a width of {} (--wide shows all): {}", width,
+                                   DroppedColumnsNote(table, left)));
+  }
+  std::size_t room = width - std::min(width, Taken(fittings, &Fitting::narrowest));
+  table.columns.clear();
+  for (std::size_t place = 0; place < columns.size(); ++place) {
+    const Fitting& one = fittings[place];
+    if (!one.stays) continue;
+    const std::size_t more = std::min(room, one.widest - one.narrowest);
+    room -= more;
+    table.columns.push_back(columns[place]);
+    if (one.narrowest + more < one.widest) table.columns.back().most_cells = one.narrowest + more;
+  }
+  return table;
+}
+
+std::string ToScreen(const Table& table) {
+  const Screen screen = OutputScreen();
+  return ToText(FitWidth(table, screen.width), screen.colour);
 }
 
 // LaTeX writer: tables that fit the page.
@@ -255,11 +363,11 @@ double WidthOfText(std::string_view text) {
   double width = 0.0;
   for (const char c : EscapeTerminal(text)) {
     const auto byte = static_cast<unsigned char>(c);
-    if (std::isupper(byte) != 0 || byte >= 0x80) {
-      width += 7.8;  // non-Latin letters are written as numbers, which are longer
-    } else {
-      width += c == 'm' || c == 'w' || c == '\\' || c == '%' || c == '@' ? 8.4 : 5.1;
-    }
+    const bool is_wide = std::isupper(byte) != 0 || byte >= 0x80;
+    // non-Latin letters are written as numbers, which are longer
+    width += is_wide                                                        ? 7.8
+             : std::string_view("mw\\%@").find(c) != std::string_view::npos ? 8.4
+                                                                            : 5.1;
   }
   return width;
 }
@@ -353,11 +461,11 @@ std::string Preamble(const std::vector<LatexColumn>& columns, const Setting& set
 }  // namespace
 
 std::string ToLatex(const Table& table) {
-  std::vector<LatexColumn> columns =
+  const std::vector<LatexColumn> columns =
       Mapped<LatexColumn>(ColumnsUnderHeading(table),
                           [&](const TableColumn& column) { return LatexColumnOf(table, column); });
-  std::vector<std::size_t> left;
   std::vector<LatexColumn> shown = columns;
+  std::vector<std::size_t> left;
   for (const std::size_t place : OrderOfLeaving(table)) {
     if (SettingFor(shown)) break;
     left.push_back(place);
@@ -367,8 +475,8 @@ std::string ToLatex(const Table& table) {
     }
   }
   const Setting setting = SettingFor(shown).value_or(*std::prev(std::end(kSettings)));
-  std::vector<std::string> head;
-  for (const LatexColumn& one : shown) head.push_back(EscapeLatex(one.column.header));
+  const std::string head = LatexRow(Mapped<std::string>(
+      shown, [](const LatexColumn& one) { return EscapeLatex(one.column.header); }));
 
   std::string out = fmt::format("% needs \\usepackage{{array,booktabs,longtable{}}}\n",
                                 setting.landscape ? ",lscape" : "");
@@ -386,11 +494,10 @@ std::string ToLatex(const Table& table) {
         "\\caption{{{}}}\\label{{{}}} \\\\\n\\toprule\n{}\\midrule\n\\endfirsthead\n"
         "\\toprule\n{}\\midrule\n\\endhead\n\\bottomrule\n\\endfoot\n",
         setting.size, setting.gap_pt, Preamble(shown, setting), BreakableLatex(caption),
-        Label(table, number++), LatexRow(head), LatexRow(head));
+        Label(table, number++), head, head);
     for (const Record& row : group.rows) {
-      std::vector<std::string> cells;
-      for (const LatexColumn& one : shown) cells.push_back(LatexCell(row, one));
-      out += LatexRow(cells);
+      out += LatexRow(Mapped<std::string>(
+          shown, [&row](const LatexColumn& one) { return LatexCell(row, one); }));
     }
     out += "\\end{longtable}}\n";
   }
@@ -446,37 +553,25 @@ void AppendRow(const Table& table, const std::vector<TextColumn>& columns, const
   }
 }
 
-std::string RowsAsText(const Table& table, const std::vector<TextColumn>& columns,
-                       const std::vector<Record>& rows, bool colour) {
-  std::string heading;
-  std::string rule;
-  for (const TextColumn& shown : columns) {
-    const std::string gap = &shown == columns.data() ? "" : kGap;
-    heading += gap + Pad(EscapeTerminal(shown.column.header), shown.width, shown.column.format);
-    rule += gap + std::string(shown.width, '-');
-  }
-  std::string out;
-  AppendTrimmed(&out, heading);
-  AppendTrimmed(&out, rule);
-  for (const Record& row : rows) AppendRow(table, columns, row, colour, &out);
-  return out;
-}
-
 }  // namespace
 
 std::string ToText(const Table& table, bool colour) {
+  std::string names, rule;
   std::vector<TextColumn> columns;  // equal widths in all groups, for comparison
   for (const TableColumn& column : ColumnsUnderHeading(table)) {
-    columns.emplace_back(column, table.rows);
+    const std::string gap = columns.empty() ? "" : kGap;
+    const std::size_t width = columns.emplace_back(column, table.rows).width;
+    names += gap + Pad(EscapeTerminal(column.header), width, column.format);
+    rule += gap + std::string(width, '-');
   }
   std::string out = table.title.empty() ? "" : EscapeTerminal(table.title) + "\n\n";
-  bool is_first = true;
-  for (const RowGroup& group : Groups(table)) {
-    if (!is_first) out += '\n';
-    is_first = false;
-    if (!group.heading.empty()) out += EscapeTerminal(group.heading) + "\n\n";
-    out += RowsAsText(table, columns, group.rows, colour);
-  }
+  out += TextOfGroups(table, EscapeTerminal, [&](const std::vector<Record>& rows) {
+    std::string text;
+    AppendTrimmed(&text, names);
+    AppendTrimmed(&text, rule);
+    for (const Record& row : rows) AppendRow(table, columns, row, colour, &text);
+    return text;
+  });
   if (!table.notes.empty()) out += '\n';
   for (const std::string& note : table.notes) out += EscapeTerminal(note) + '\n';
   return out;

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <map>
 #include <ranges>
+#include <stdexcept>
 #include <utility>
 
 #include "harness/base/text.h"
@@ -23,55 +24,38 @@ TableColumn Of(const Measure& measure, string_view key) {
   return {std::string(key), std::string(shown) + brackets, format, {}};
 }
 
-using Abbreviations = std::vector<std::pair<std::string, std::string>>;
-
-/// Column of a narrow table: another heading, and shorter words for values.
-struct ShortColumn {
-  string_view key, header;
-  Abbreviations abbreviations = {};
-};
-
-Abbreviations AbbreviatedLevels() {
-  Abbreviations pairs;
-  for (const LevelTraits& level : Levels()) pairs.emplace_back(level.name, level.abbreviation);
-  return pairs;
-}
-
-/// Other columns of narrow tables have their key as heading.
-const std::vector<ShortColumn>& ShortColumns() {
-  static const Abbreviations kParts = {{"truncation", "trunc"}, {"round-off", "round"}};
-  static const std::vector<ShortColumn> kColumns = {
-      {"formulation", "form."},
-      {"enforcement", "enf.", AbbreviatedLevels()},
-      {"coordinates", "coord", {{"absolute", "abs"}}},
-      {"solver", "fact.", {{"rank-revealing", "r-rev"}}},
-      {"horizon", "T/s"},
-      {"outcome",
-       "outcome",
-       {{"finished", "ok"},
-        {"step-too-small", "small step"},
-        {"inconsistent-start", "bad start"},
-        {"inconsistent-motion", "bad motion"},
-        {"newton-failure", "newton"},
-        {"integrator-error", "integrator"}}},
-      {"drift_position_max", "drift [m]"},
-      {"energy_error_max", "dE [J]"},
-      {"growth_exponent", "t^p"},
-      {"rhs_ns_median", "rhs [ns]"},
-      {"wall_s_median", "wall [s]"},
-      {"error_final", "error [m]"},
-      {"error_dominated_by", "by", kParts},
-      {"drift_dominated_by", "by", kParts},
-      {"model_error", "model error [m]"},
-      {"rhs_evaluations", "rhs"},
-      {"model_rhs_ratio", "of full"},
-      {"wall_s", "wall [s]"},
-      {"model_wall_ratio", "of full"},
-      {"model_verdict", "verdict"},
-      {"reference_valid_until", "valid until [s]"},
-      {"reference_error", "to [m]"},
-      {"cpu_s", "CPU [s]"},
-      {"message", "why no further"}};
+/// Columns of narrow tables with another heading, and shorter words for values. Others have their
+/// key as heading.
+const std::vector<TableColumn>& ShortColumns() {
+  static const std::vector<TableColumn> kColumns = [] {
+    std::vector<TableColumn> columns = Columns(
+        "formulation=form., enforcement=enf., coordinates=coord, solver=fact., horizon=T/s, "
+        "outcome, drift_position_max=drift [m], energy_error_max=dE [J], growth_exponent=t^p, "
+        "rhs_ns_median=rhs [ns], wall_s_median=wall [s], error_final=error [m], "
+        "error_dominated_by=by, drift_dominated_by=by, model_error=model error [m], "
+        "rhs_evaluations=rhs, model_rhs_ratio=of full, wall_s=wall [s], model_wall_ratio=of full, "
+        "model_verdict=verdict, reference_valid_until=valid until [s], reference_error=to [m], "
+        "cpu_s=CPU [s], message=why no further");
+    const auto abbreviate = [&columns](string_view key, auto pairs) {
+      std::ranges::find(columns, key, &TableColumn::key)->abbreviations = std::move(pairs);
+    };
+    using Abbreviations = decltype(TableColumn::abbreviations);
+    Abbreviations levels;
+    for (const LevelTraits& level : Levels()) levels.emplace_back(level.name, level.abbreviation);
+    const Abbreviations parts = {{"truncation", "trunc"}, {"round-off", "round"}};
+    abbreviate("enforcement", levels);
+    abbreviate("coordinates", Abbreviations{{"absolute", "abs"}});
+    abbreviate("solver", Abbreviations{{"rank-revealing", "r-rev"}});
+    abbreviate("error_dominated_by", parts);
+    abbreviate("drift_dominated_by", parts);
+    abbreviate("outcome", Abbreviations{{"finished", "ok"},
+                                        {"step-too-small", "small step"},
+                                        {"inconsistent-start", "bad start"},
+                                        {"inconsistent-motion", "bad motion"},
+                                        {"newton-failure", "newton"},
+                                        {"integrator-error", "integrator"}});
+    return columns;
+  }();
   return kColumns;
 }
 
@@ -81,11 +65,13 @@ TableColumn CompactColumn(string_view word) {
   constexpr int kAnswer = 2;
   const int importance = word.ends_with('+') ? kAnswer : word.ends_with('-') ? -1 : 0;
   if (importance != 0) word.remove_suffix(1);
-  const auto known = std::ranges::find(ShortColumns(), word, &ShortColumn::key);
-  const bool is_known = known != ShortColumns().end();
-  return {std::string(word), std::string(is_known ? known->header : word),
-          FindMeasure(word)->heading.format, is_known ? known->abbreviations : Abbreviations(),
-          importance};
+  const auto known = std::ranges::find(ShortColumns(), word, &TableColumn::key);
+  TableColumn column = known != ShortColumns().end()
+                           ? *known
+                           : TableColumn{.key = std::string(word), .header = std::string(word)};
+  column.format = FindMeasure(word)->heading.format;
+  column.importance = importance;
+  return column;
 }
 
 /// Returns columns of measures that a program has added and that have words.
@@ -104,10 +90,88 @@ constexpr string_view kCase =
 constexpr string_view kCompactCase =
     "mechanism formulation enforcement coordinates solver rtol horizon outcome";
 
+using enum Format;
+
+// Returns true for keys of per-loop and per-body values, which are no parameters.
+bool IsFamily(const std::string& key) {
+  return key.starts_with("series.") || key.starts_with("drift.loop.");
+}
+
+// Returns true if tables contain this exact key, not only its family. A fixed step is a key only of
+// cases that have one, like a parameter: no table always has its column.
+bool HasColumn(const std::string& key) {
+  if (key == "step") return false;
+  const Measure* measure = FindMeasure(key);
+  return measure != nullptr && measure->key == key && !measure->heading.words.empty();
+}
+
+// Returns the format of a value without a column of its own, by its type.
+Format FormatOf(const std::string& key, std::span<const Record> rows) {
+  for (const Record& row : rows) {
+    const Value* value = row.Find(key);
+    if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
+    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
+    if (std::holds_alternative<double>(*value)) return kShortest;
+    return kText;
+  }
+  return kText;
+}
+
+void InsertBeforeOutcome(std::vector<TableColumn>* columns, TableColumn column) {
+  columns->insert(std::ranges::find(*columns, "outcome", &TableColumn::key), std::move(column));
+}
+
 }  // namespace
 
-const std::vector<KindOfTable>& KindsOfTables() {
-  static const std::vector<KindOfTable> kKinds = {
+std::vector<TableColumn> Columns(std::string_view rows) {
+  constexpr std::string_view kFormats[] = {"",         "integer", "shortest", "scientific",
+                                           "exponent", "fixed",   "seconds"};
+  std::vector<TableColumn> columns;
+  while (!rows.empty()) {
+    std::string_view row = rows.substr(0, rows.find(", "));
+    rows.remove_prefix(std::min(row.size() + 2, rows.size()));
+    const auto next = [&row](char end) {
+      const std::string part(row.substr(0, row.find(end)));
+      row.remove_prefix(std::min(part.size() + 1, row.size()));
+      return part;
+    };
+    const std::string heading = next(':'), format = next(':');
+    const std::size_t equals = heading.find('=');
+    TableColumn& column = columns.emplace_back();
+    column.key = heading.substr(0, equals);
+    column.header = heading.substr(equals == heading.npos ? 0 : equals + 1);
+    const auto* known = std::ranges::find(kFormats, format);
+    if (known == std::end(kFormats)) throw std::logic_error("no format of columns: " + format);
+    column.format = static_cast<Format>(known - kFormats);
+    if (!row.empty()) column.importance = std::stoi(std::string(row));
+  }
+  return columns;
+}
+
+bool IsFlagged(const Record& row, const std::string& key) {
+  const Value* value = row.Find(key);
+  if (value == nullptr || std::holds_alternative<std::monostate>(*value)) return false;
+  if (key == "outcome") return !HasFailed(row) && !row.Text("warnings").empty();
+  if (key == "growth_hypothesis") return row.Text("growth_hypothesis_resolved") != "true";
+  if (std::isnan(row.Number(key))) return false;
+  if (key == "energy_growth_exponent" || key == "correction_growth_exponent") return true;
+  return (key == "growth_exponent" || key == "growth_exponent_late") &&
+         row.Text("growth_resolved") != "true";
+}
+
+bool HasFailed(const Record& row) {
+  const std::string outcome = row.Text("outcome");
+  return !outcome.empty() && outcome != "finished";
+}
+
+std::string OutcomeColour(const Record& row, const TableColumn& column) {
+  if (column.key != "outcome") return "";
+  if (HasFailed(row)) return "31";
+  return IsFlagged(row, column.key) ? "33" : "";
+}
+
+std::span<const KindOfTable> KindsOfTables() {
+  static constexpr KindOfTable kKinds[] = {
       {"drift", "accuracy", "Drift",
        "CASE warnings agreement drift_position_max drift_rotation_max drift_velocity_max "
        "drift_acceleration_max loop_closure_max correction_max worst_loop energy_error_max "
@@ -143,8 +207,9 @@ const std::vector<KindOfTable>& KindsOfTables() {
 }
 
 std::vector<TableColumn> ColumnsOfKind(string_view name, bool compact) {
-  const auto known = std::ranges::find(KindsOfTables(), name, &KindOfTable::name);
-  const KindOfTable& kind = known == KindsOfTables().end() ? KindsOfTables().front() : *known;
+  const auto kinds = KindsOfTables();
+  const auto known = std::ranges::find(kinds, name, &KindOfTable::name);
+  const KindOfTable& kind = known == kinds.end() ? kinds.front() : *known;
   std::string words(compact ? kind.compact : kind.columns);
   if (words.starts_with("CASE")) words.replace(0, 4, compact ? kCompactCase : kCase);
   std::vector<TableColumn> columns;
@@ -174,45 +239,6 @@ std::optional<TableColumn> CompactCaseColumn(string_view key) {
 
 // Columns for arbitrary record keys.
 
-namespace {
-
-using enum Format;
-
-// Returns true for keys of per-loop and per-body values, which are no parameters.
-bool IsFamily(const std::string& key) {
-  return key.starts_with("series.") || key.starts_with("drift.loop.");
-}
-
-// Returns true if tables contain this exact key, not only its family. A fixed step is a key only of
-// cases that have one, like a parameter: no table always has its column.
-bool HasColumn(const std::string& key) {
-  if (key == "step") return false;
-  const Measure* measure = FindMeasure(key);
-  return measure != nullptr && measure->key == key && !measure->heading.words.empty();
-}
-
-// Returns the format of a value without a column of its own, by its type.
-Format FormatOf(const std::string& key, std::span<const Record> rows) {
-  for (const Record& row : rows) {
-    const Value* value = row.Find(key);
-    if (value == nullptr || std::holds_alternative<std::monostate>(*value)) continue;
-    if (std::holds_alternative<std::int64_t>(*value)) return kInteger;
-    if (std::holds_alternative<double>(*value)) return kShortest;
-    return kText;
-  }
-  return kText;
-}
-
-bool IsShown(const std::vector<TableColumn>& columns, const std::string& key) {
-  return std::ranges::find(columns, key, &TableColumn::key) != columns.end();
-}
-
-void InsertBeforeOutcome(std::vector<TableColumn>* columns, TableColumn column) {
-  columns->insert(std::ranges::find(*columns, "outcome", &TableColumn::key), std::move(column));
-}
-
-}  // namespace
-
 TableColumn ColumnOf(const std::string& key, std::span<const Record> rows) {
   if (std::optional<TableColumn> known = KnownColumn(key)) return *std::move(known);
   return {.key = key, .header = key, .format = FormatOf(key, rows), .abbreviations = {}};
@@ -232,9 +258,7 @@ std::string WithUnit(const std::string& words, const std::string& key) {
 std::vector<std::string> KeysOf(std::span<const Record> rows) {
   std::vector<std::string> keys;
   for (const Record& row : rows) {
-    for (const auto& [key, value] : row.items()) {
-      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
-    }
+    for (const auto& [key, value] : row.items()) AddOnce(keys, key);
   }
   return keys;
 }
@@ -244,10 +268,15 @@ std::vector<std::string> CaseKeysOf(std::span<const Record> rows) {
   for (const Record& row : rows) {
     for (const auto& [key, value] : row.items()) {
       if (key == "case_id" || key == "outcome") break;
-      if (std::ranges::find(keys, key) == keys.end()) keys.push_back(key);
+      AddOnce(keys, key);
     }
   }
   return keys;
+}
+
+bool IsAlike(std::span<const Record> rows, const std::string& key) {
+  return std::ranges::all_of(
+      rows, [&](const Record& row) { return row.Text(key) == rows.front().Text(key); });
 }
 
 bool AtolFollowsRtol(std::span<const Record> rows) {
@@ -258,12 +287,11 @@ bool AtolFollowsRtol(std::span<const Record> rows) {
 void RequireKey(const std::string& option, const std::string& key, std::span<const Record> rows) {
   const std::vector<std::string> keys = KeysOf(rows);
   // a column of the tables may be empty in every record
-  if (std::ranges::find(keys, key) != keys.end() || HasColumn(key)) return;
-  std::vector<std::string> scalars;
-  std::ranges::copy_if(keys, std::back_inserter(scalars),
-                       [](const std::string& known) { return !IsFamily(known); });
+  if (Contains(keys, key) || HasColumn(key)) return;
   const std::string nearest = NearestSpelling(key, keys);
   const std::string cure = nearest.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", nearest);
+  std::vector<std::string> scalars = keys;
+  std::erase_if(scalars, IsFamily);
   throw ConfigError(fmt::format("{}: found \"{}\", which no record has{}; expected one of {}",
                                 option, key, cure, fmt::join(scalars, ", ")));
 }
@@ -303,11 +331,14 @@ std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
     for (std::size_t i = 0; i < rows.size(); ++i) looks[i] += rows[i].Text(key) + '\n';
   };
   const std::vector<std::string> keys = CaseKeysOf(rows);
+  const auto is_shown = [&](const std::string& key) {
+    return Contains(columns, key, &TableColumn::key);
+  };
   for (const std::string& key : keys) {
-    if (IsShown(columns, key)) show(key);
+    if (is_shown(key)) show(key);
   }
   for (const std::string& key : keys) {
-    if (IsShown(columns, key)) continue;
+    if (is_shown(key)) continue;
     std::map<std::string, std::string> values;  // of the first row with this appearance
     const bool tells = [&] {
       for (std::size_t i = 0; i < rows.size(); ++i) {

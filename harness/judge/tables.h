@@ -1,7 +1,6 @@
 // Tables: their columns and rows, formats, views of records, notes.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -18,8 +17,6 @@
 
 namespace loopbench::harness {
 
-// A table, and its formats: text, CSV, Markdown, JSON, LaTeX.
-
 // One table, five writers: terminal text, CSV, Markdown, JSON and LaTeX. Each escapes texts with
 // the function of its medium in harness/base/text.h.
 
@@ -35,6 +32,11 @@ struct TableColumn {
   std::size_t most_cells = 0;   ///< width at which a text is broken into lines; 0: never
   bool marks_warnings = false;  ///< '*' after the cells of runs with warnings
 };
+
+/// Returns columns from "key=header:format:importance, ...". Without a header, the key is the
+/// header; without a format, the column is a text. The other formats are integer, shortest,
+/// scientific, exponent, fixed and seconds.
+std::vector<TableColumn> Columns(std::string_view rows);
 
 /// Returns red for the outcome of a failed run, yellow for an outcome with warnings.
 std::string OutcomeColour(const Record& row, const TableColumn& column);
@@ -103,9 +105,6 @@ std::string Cell(const Record& row, const TableColumn& column);
 /// Formats a number for people (Format::kShortest).
 std::string NumberCell(double number);
 
-/// Returns the columns under a group's heading: without the group's key, which the heading shows.
-std::vector<TableColumn> ColumnsUnderHeading(const Table& table);
-
 /// Writes aligned text: title, heading, rule, rows, notes. Columns are as wide as their widest
 /// cell, two spaces apart, counted in cells of a terminal (harness/base/text.h). With `colour`
 /// cells have the table's colours; escape sequences have no width. FitWidth() fits tables to a
@@ -135,33 +134,20 @@ std::string ToLatex(const Table& table);
 /// @throws std::invalid_argument for any other name.
 std::string Render(const Table& table, const std::string& format);
 
-// Column as text: digits are aligned, with or without a mark after them.
-
 inline constexpr std::size_t kColumnGap = 2;  ///< [cells]
 
-struct TextColumn {
-  TextColumn(const TableColumn& shown, const std::vector<Record>& rows)
-      : column(shown), marked(std::ranges::any_of(rows, [&](const Record& row) {
-          return shown.format != Format::kText && IsFlagged(row, shown.key);
-        })) {
-    width = CellsOf(EscapeTerminal(column.header));
-    for (const Record& row : rows) {
-      for (const std::string& line : LinesOf(row)) width = std::max(width, CellsOf(line));
-    }
-  }
+/// Returns the width of a column of text [cells].
+std::size_t TextWidth(const TableColumn& column, const std::vector<Record>& rows);
 
-  /// Returns at least one line.
-  std::vector<std::string> LinesOf(const Record& row) const {
-    const std::string cell =
-        EscapeTerminal(Cell(row, column)) + (marked && !IsFlagged(row, column.key) ? " " : "");
-    if (column.most_cells == 0) return {cell};
-    return BrokenInto(cell, column.most_cells);
-  }
+/// Fits the table into `width` cells (0: unchanged). Breaks texts into lines of at least 24 cells;
+/// if that is not enough, drops columns, which the first note names. Constant columns go first,
+/// then the least important (TableColumn::importance), the rightmost of equals. Columns up to the
+/// outcome, which identify a row, go after measured values. The first column stays.
+Table FitWidth(Table table, std::size_t width);
 
-  TableColumn column;
-  bool marked;
-  std::size_t width = 0;  ///< [cells]
-};
+/// Returns the table as text for standard output, with the width and colour of its screen
+/// (harness/base/text.h); for a file or a pipe the text of ToText().
+std::string ToScreen(const Table& table);
 
 // Columns of tables of records, and keys that distinguish records.
 
@@ -176,7 +162,7 @@ struct KindOfTable {
 };
 
 /// Kinds in order of preference: by default the first with records in the store.
-const std::vector<KindOfTable>& KindsOfTables();
+std::span<const KindOfTable> KindsOfTables();
 
 /// Returns the columns of a kind (docs/reference/records.md), of drift for any other word. Compact
 /// columns have short words that differ in their first letters.
@@ -200,6 +186,9 @@ std::string WithUnit(const std::string& words, const std::string& key);
 
 /// Returns the keys that identify cases: those before "case_id" or "outcome", each once.
 std::vector<std::string> CaseKeysOf(std::span<const Record> rows);
+
+/// Returns true if all rows have the same text under the key.
+bool IsAlike(std::span<const Record> rows, const std::string& key);
 
 /// Returns true if no row has an absolute tolerance of its own.
 bool AtolFollowsRtol(std::span<const Record> rows);
@@ -226,44 +215,14 @@ std::vector<TableColumn> WithParameters(std::vector<TableColumn> columns,
 std::vector<TableColumn> TellingApart(std::vector<TableColumn> columns,
                                       std::span<const Record> rows);
 
-// Fits tables to the width of the terminal.
-
-/// Returns column indices among ColumnsUnderHeading() in drop order for narrow terminals. Constant
-/// columns go first, then the least important (TableColumn::importance), the rightmost of equals.
-/// Columns up to the outcome, which identify a row, go after measured values. The first column
-/// stays.
-std::vector<std::size_t> OrderOfLeaving(const Table& table);
-
-/// Returns "dE [J]; t^p; the same in all rows: T/s 10": the dropped columns, by their indices, with
-/// the values that all rows share.
-std::string DroppedColumnsNote(const Table& table, const std::vector<std::size_t>& places);
-
-/// Fits the table into `width` cells (0: unchanged). Breaks texts into lines of at least 24 cells;
-/// if that is not enough, drops columns. The first note names them.
-Table FitWidth(Table table, std::size_t width);
-
-/// Returns the table as text for standard output, with the width and colour of its screen
-/// (harness/base/text.h); for a file or a pipe the text of ToText().
-std::string ToScreen(const Table& table);
-
 // Tables of records: factorial effects, runs in several scalars, any columns.
 
-// Factorial effects on drift: ratios between runs that differ in only one factor.
-
-/// Options of the comparison. Tolerance and horizon affect drift most, so both are held fixed.
-struct FactorialOptions {
-  double rtol = 1e-8;
-  double horizon = 10.0;  ///< [s]
-  /// Problems that differ only in geometry: square (the closure is a linear invariant of the
-  /// relative coordinates) and general. Other problems have no factor geometry, but all other
-  /// factors.
-  std::vector<std::pair<std::string, std::string>> square_and_general = {
-      {"square-four-bar", "four-bar"}, {"square-seven-bar", "general-seven-bar"}};
-};
-
-/// Returns one row per change of one factor (formulation, coordinates, enforcement level, geometry)
-/// and setting of the factor with most interaction. `within` is the geometry, for the factor
-/// geometry itself the coordinates; "all" is every pair together.
+/// Returns factorial effects on drift at one tolerance and horizon [s], which affect drift most:
+/// one row per change of one factor (formulation, coordinates, enforcement level, geometry) and
+/// setting of the factor with most interaction. `within` is the geometry, for the factor geometry
+/// itself the coordinates; "all" is every pair together. The geometries of a problem are square
+/// (the closure is a linear invariant of the relative coordinates) and general. Problems without
+/// counterpart have no factor geometry, but all other factors.
 ///
 /// Pairs are records equal, except for the factor, in mechanism, formulation, enforcement,
 /// coordinates, solver, integrator and the parameters of a sweep. If also the case_id is equal, the
@@ -274,11 +233,10 @@ struct FactorialOptions {
 /// not finite have no ratio: `left_out` counts them, and they keep their row.
 ///
 /// @throws ConfigError if records equal in all of these are different cases.
-Table FactorialTable(std::span<const Record> records, const FactorialOptions& options = {});
+Table FactorialTable(std::span<const Record> records, double rtol = 1e-8, double horizon = 10.0);
 
-// Records of runs in several scalars (kind "precision"): ladders, their order, notes.
-
-/// Keys, in addition to parameters, whose values are equal on all rungs of a ladder.
+/// Keys, in addition to parameters, whose values are equal on all rungs of a ladder: runs in
+/// several scalars and tolerances (kind "precision").
 inline constexpr const char* kLadderKeys[] = {"mechanism",   "formulation", "enforcement",
                                               "coordinates", "solver",      "horizon",
                                               "experiment",  "config_hash"};
@@ -293,11 +251,7 @@ bool IsReferenceRung(const Record& record);
 /// narrowest. The reference comes last.
 void SortSweepLevels(std::vector<Record>* records);
 
-/// Returns the meaning of error, drift and dominant error, one line each.
-std::vector<std::string> PrecisionNotes();
-
-// Selection and order of the rows and columns of a table.
-
+/// Selection and order of the rows and columns of a table.
 struct TableView {
   /// "drift", "timing", "factorial", "all" (records of every kind), or "" for the first of drift,
   /// timing and all that has records in the store.
@@ -326,8 +280,6 @@ std::vector<Record> RowsOf(std::span<const Record> records, const TableView& vie
 /// number, the worst A/A spread, load and governor (thresholds: harness/base/record.h). No notes
 /// if all were quiet.
 std::vector<std::string> NoiseWarnings(std::span<const Record> rows);
-
-// Reasons for warnings in the column "ok?" of a table: sentences that name rows.
 
 /// Returns the case keys in which rows differ. Absolute tolerances go with relative ones.
 std::vector<std::string> DistinguishingKeys(std::span<const Record> rows);

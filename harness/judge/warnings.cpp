@@ -1,5 +1,9 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -10,6 +14,7 @@
 #include <string_view>
 #include <utility>
 
+#include "harness/base/text.h"
 #include "harness/config/experiment.h"
 #include "harness/config/formulations.h"
 #include "harness/config/published_series.h"
@@ -38,9 +43,13 @@ double ToleranceOf(const Record& record) {
   return largest;
 }
 
+bool IsFinishedRun(const Record& record) {
+  return record.Text("kind") == "accuracy" && record.Text("outcome") == "finished";
+}
+
 bool HasFinalPoses(const Record& record) {
-  return record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
-         !record.Text("problem_id").empty() && !std::isnan(record.Number("rtol")) &&
+  return IsFinishedRun(record) && !record.Text("problem_id").empty() &&
+         !std::isnan(record.Number("rtol")) &&
          std::ranges::any_of(record.items(),
                              [](const auto& item) { return item.first.starts_with(kPrefix); });
 }
@@ -57,6 +66,13 @@ double UnitOf(double link_length, std::size_t size, std::size_t i) {
 bool IsSoft(const Record& record) {
   const FormulationRow* row = FindFormulation(record.Text("formulation"));
   return row != nullptr && row->is_soft;
+}
+
+/// Returns the runs for which `chooses` is true.
+template <class Choose>
+std::vector<std::size_t> Only(std::vector<std::size_t> runs, const Choose& chooses) {
+  std::erase_if(runs, std::not_fn(chooses));
+  return runs;
 }
 
 bool EndAlike(const Record& a, const Record& b, double rtol) {
@@ -161,9 +177,8 @@ const Record* DecidedBy(std::span<const Record> records, const std::vector<std::
   }
   const Record* decided = nullptr;
   for (const std::string& integrator : integrators) {
-    std::vector<std::size_t> own = runs;
-    std::erase_if(own, [&](std::size_t run) {
-      return !IsPeer(records[run]) && records[run].Text("integrator") != integrator;
+    const std::vector<std::size_t> own = Only(runs, [&](std::size_t run) {
+      return IsPeer(records[run]) || records[run].Text("integrator") == integrator;
     });
     if (!Decides(records, ClustersOf(records, own, rtol))) continue;
     const Record* witness = &records[own.front()];
@@ -188,13 +203,13 @@ PoseDifference LargestDifference(std::span<const Record> runs) {
 
 PoseDifference DifferenceOf(const Record& a, const Record& b) {
   Bounds bounds;
-  bounds.Take(a);
-  bounds.Take(b);
+  for (const Record* run : {&a, &b}) bounds.Take(*run);
   return bounds.Widest();
 }
 
 std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
-                                         const std::vector<bool>& testifies) {
+                                         std::vector<bool> testifies) {
+  if (testifies.empty()) testifies.assign(records.size(), true);
   // by problem and horizon, then by tolerance, the finest first
   std::map<std::pair<std::string, double>, std::map<double, std::vector<std::size_t>>> problems;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -206,10 +221,8 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
   for (const auto& [problem, tolerances] : problems) {
     const Record* decided = nullptr;
     for (const auto& [rtol, all] : tolerances) {
-      std::vector<std::size_t> runs = all;
-      std::erase_if(runs, [&](std::size_t run) { return IsSoft(records[run]); });
-      std::vector<std::size_t> witnesses = runs;
-      std::erase_if(witnesses, [&](std::size_t run) { return !testifies[run]; });
+      const auto runs = Only(all, [&](std::size_t run) { return !IsSoft(records[run]); });
+      auto witnesses = Only(runs, [&](std::size_t run) { return testifies[run]; });
       if (witnesses.empty()) witnesses = runs;
       const Clusters clusters = ClustersOf(records, runs, rtol);
       if (decided == nullptr) decided = DecidedBy(records, witnesses, rtol);
@@ -218,14 +231,14 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
       for (std::size_t c = 0; c < clusters.size(); ++c) {
         for (const std::size_t run : clusters[c]) {
           if (all.size() > 1) agreements[run].cluster = static_cast<std::int64_t>(c) + 1;
-          agreements[run].flagged = others == nullptr || !EndAlike(records[run], *others, rtol);
         }
       }
       for (const std::size_t run : all) {
-        if (!IsSoft(records[run]) || runs.empty()) continue;
-        agreements[run].flagged = others == nullptr || !EndAlike(records[run], *others, rtol);
-        agreements[run].cluster =
-            agreements[run].flagged ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
+        if (runs.empty()) continue;
+        Agreement& agreement = agreements[run];
+        agreement.flagged = others == nullptr || !EndAlike(records[run], *others, rtol);
+        if (!IsSoft(records[run])) continue;
+        agreement.cluster = agreement.flagged ? static_cast<std::int64_t>(clusters.size()) + 1 : 1;
       }
       // a branch is kept by who ends as those do that can keep it
       const bool is_kept = std::ranges::any_of(witnesses, [&](std::size_t run) {
@@ -239,9 +252,6 @@ std::vector<Agreement> CompareFinalPoses(std::span<const Record> records,
   return agreements;
 }
 
-std::vector<Agreement> CompareFinalPoses(std::span<const Record> records) {
-  return CompareFinalPoses(records, std::vector<bool>(records.size(), true));
-}
 namespace {
 
 /// Energy balance: a hundredth of the energy that moves is no error of integration at any tolerance
@@ -280,8 +290,6 @@ bool StepControlFailing(const Record& record) {
   if (rejected > kFewRejected && rejected > kMaxRejected * record.Number("steps")) return true;
   return record.Number("step_shortest") <= kStepFloor * record.Number("step_shortest_t");
 }
-
-bool HasFinished(const Record& record) { return record.Text("outcome") == "finished"; }
 
 /// Accepted steps that Baumgarte's feedback remembers: those within 2/gain.
 double StepsRemembered(const Record& record) {
@@ -341,24 +349,6 @@ bool WasRegularizedElsewhere(const Record& record) {
          record.Number("singularity_distance_min") >= kRankRatio;
 }
 
-void Add(std::string* codes, bool on, const char* code) {
-  if (on) *codes += (codes->empty() ? "" : " ") + std::string(code);
-}
-
-/// Returns `codes` without `code`.
-std::string Without(const std::string& code, const std::string& codes) {
-  std::istringstream words(codes);
-  std::string rest;
-  for (std::string word; words >> word;) Add(&rest, word != code, word.c_str());
-  return rest;
-}
-
-/// Returns true if no warning concerns the trajectory itself: warnings on ensemble members and
-/// exponents do not.
-bool TrajectoryIsTrusted(const std::string& codes) {
-  return Without(kMembersWarning, Without(kExponentWarning, codes)).empty();
-}
-
 /// Error measure of published data besides or instead of the error of points. Speeds are left out:
 /// they have no scale that holds for all mechanisms.
 struct OtherError {
@@ -412,14 +402,7 @@ bool IsFarFromFinerRun(const Record& record) {
          !(record.Number("refinement_difference") <= most);
 }
 
-}  // namespace
-
-std::optional<DriftGrowth> GrowthAt(const Record& record) {
-  const auto level = FindLevel(record.Text("enforcement"));
-  if (!level) return std::nullopt;
-  return TraitsOf(*level).growth;
-}
-
+/// Returns the expected share of the energy balance error, from tolerance and steps.
 double ExpectedEnergyShare(const Record& record) {
   const double tolerance = ToleranceOf(record);
   if (!(tolerance > 0.0) || IsPeer(record)) return kMaxEnergyError;
@@ -430,12 +413,16 @@ double ExpectedEnergyShare(const Record& record) {
   return std::min(kMaxEnergyError, tolerances * (tolerance + kEvaluation) * per_tolerance);
 }
 
+/// Returns the largest energy balance error over the exchanged energy (`energy_scale`; in records
+/// without it the largest kinetic energy). NaN if not measured.
 double EnergyErrorShare(const Record& record) {
   if (record.Find("energy_scale") == nullptr) return record.Number("energy_error_relative");
   const double error = record.Number("energy_error_max");
   return error == 0.0 ? 0.0 : error / record.Number("energy_scale");
 }
 
+/// Returns the drift of a run over a link length, or in rad if rotations drift further. NaN if not
+/// measured.
 double DriftShare(const Record& record) {
   const double shift = record.Number("drift_position_max") / record.Number("link_length");
   const double rotation = record.Number("drift_rotation_max");
@@ -443,6 +430,13 @@ double DriftShare(const Record& record) {
   return shift <= rotation || std::isnan(rotation) ? rotation : shift;
 }
 
+/// Returns the drift expected at the record's level (docs/theory/constraints-and-drift.md).
+///
+/// A step of tolerance rtol leaves errors of about rtol in positions and speeds. At velocity level
+/// position errors add up to n rtol. At acceleration level speed errors persist: n^2 rtol times the
+/// angle per step. Baumgarte feedback damps all but the last steps; projection leaves round-off,
+/// and some tolerance in regularized directions. Fixed steps have no expected drift except with
+/// projection.
 double ExpectedDriftShare(const Record& record) {
   const double tolerance = ToleranceOf(record);
   const double goal = kProjection * record.Number("position_goal") / record.Number("link_length");
@@ -456,6 +450,7 @@ double ExpectedDriftShare(const Record& record) {
   return record.Find("position_goal") == nullptr ? promised : std::max(promised, goal);
 }
 
+/// Returns the largest global error of points over the link length; NaN without a reference.
 double TrueErrorShare(const Record& record) {
   const double link = record.Number("link_length");
   double share = record.Number("error_position_max") / link;
@@ -466,38 +461,118 @@ double TrueErrorShare(const Record& record) {
   return share;
 }
 
+/// Returns the longest step in periods of the fastest driver; NaN without a driver. Fewer than two
+/// samples per period cause aliasing.
 double PeriodsPerStep(const Record& record) {
   return record.Number("step_longest") * record.Number("drive_frequency") / (2 * std::numbers::pi);
 }
 
-std::string OwnWarnings(const Record& record) {
-  std::string codes;
-  if (record.Text("kind") != "accuracy" || !HasFinished(record)) return codes;
-  // NaN or infinite measures give a warning; missing ones give none
-  const auto has = [&](const char* key) { return record.Find(key) != nullptr; };
-  Add(&codes,
-      (has("energy_scale") || has("energy_error_relative")) &&
-          !(EnergyErrorShare(record) <= ExpectedEnergyShare(record)) && !IsAtRest(record),
-      kEnergyWarning);
-  // agreement with the reference proves that the branch was kept
-  Add(&codes, PassedSingularPosition(record) && !IsCertified(record), kSingularWarning);
-  Add(&codes, WasRegularizedElsewhere(record) && !IsCertified(record), kRegularizedWarning);
-  Add(&codes,
-      has("drift_position_max") && has("link_length") &&
-          !(DriftShare(record) <= ExpectedDriftShare(record)),
-      kDriftWarning);
-  Add(&codes, !IsNearReference(record), kErrorWarning);
-  Add(&codes, IsFarFromFinerRun(record) && !IsCertified(record), kRefinementWarning);
-  Add(&codes, PeriodsPerStep(record) > kMaxPeriods, kDriveWarning);
-  Add(&codes, StepControlFailing(record), kStepsWarning);
-  Add(&codes, record.Number("ensemble_failed") > 0, kMembersWarning);
-  // a single run was not asked for an exponent, and drift of round-off has none
-  Add(&codes,
-      record.Number("ensemble_size") > 0 && record.Text("growth_resolved") == "false" &&
-          record.Text("growth_regime") != "round-off",
-      kExponentWarning);
+/// Returns true if the record has the key; NaN or infinite measures give a warning, missing ones
+/// give none.
+bool Has(const Record& record, const char* key) { return record.Find(key) != nullptr; }
+
+const WarningRow kWarnings[] = {
+    {kEnergyWarning,
+     "error of the energy balance above 1 % of the exchanged energy, or larger than steps and "
+     "tolerance explain",
+     [](const Record& record) {
+       return (Has(record, "energy_scale") || Has(record, "energy_error_relative")) &&
+              !(EnergyErrorShare(record) <= ExpectedEnergyShare(record)) && !IsAtRest(record);
+     },
+     [](const Record& record) {
+       return fmt::format("{:.2g} %, at most {:.2g} % expected", 100 * EnergyErrorShare(record),
+                          100 * ExpectedEnergyShare(record));
+     }},
+    {kSingularWarning,
+     "crosses singular configurations, where this level does not determine the branch",
+     // agreement with the reference proves that the branch was kept
+     [](const Record& record) { return PassedSingularPosition(record) && !IsCertified(record); },
+     [](const Record& record) {
+       return fmt::format("distance {:.1g} at {:.4g} s", record.Number("singularity_distance_min"),
+                          record.Number("singularity_distance_min_t"));
+     }},
+    {kRegularizedWarning, "constraints were regularized away from singular configurations",
+     [](const Record& record) { return WasRegularizedElsewhere(record) && !IsCertified(record); },
+     [](const Record& record) {
+       return fmt::format("{} of {} evaluations, distance {:.1g}",
+                          record.Text("regularized_evaluations"), record.Text("rhs_evaluations"),
+                          record.Number("singularity_distance_min"));
+     }},
+    {kDriftWarning, "drift is larger than steps and tolerance explain at this level",
+     [](const Record& record) {
+       return Has(record, "drift_position_max") && Has(record, "link_length") &&
+              !(DriftShare(record) <= ExpectedDriftShare(record));
+     },
+     [](const Record& record) {
+       return fmt::format("{:.1e} of a link or rad, at most {:.1e} expected", DriftShare(record),
+                          ExpectedDriftShare(record));
+     }},
+    {kErrorWarning,
+     "distance from the reference above 1000 tolerances, or with fixed steps above 1 % of a link",
+     [](const Record& record) { return !IsNearReference(record); },
+     [](const Record& record) {
+       const bool only_points = record.Text("reference") != kPublished;
+       return fmt::format("{:.1e} of a link{}", TrueErrorShare(record),
+                          only_points ? "" : " or rad");
+     }},
+    {kRefinementWarning, "finer tolerances do not converge to one final state",
+     [](const Record& record) { return IsFarFromFinerRun(record) && !IsCertified(record); },
+     [](const Record& record) {
+       if (!Has(record, "refinement_difference")) {
+         return fmt::format("{} steps, state {}", record.Text("steps"), record.Text("state_hash"));
+       }
+       return fmt::format(
+           "{:.1e} of a link or rad from the run at {}", record.Number("refinement_difference"),
+           record.Number("step") > 0.0 ? "half its step" : "a tenth of its tolerance");
+     }},
+    {kDriveWarning, "steps longer than half a period of the fastest drive",
+     [](const Record& record) { return PeriodsPerStep(record) > kMaxPeriods; },
+     [](const Record& record) {
+       return fmt::format("{:.2g} periods a step", PeriodsPerStep(record));
+     }},
+    {kStepsWarning, "step control at its shortest step, or more than half of the steps rejected",
+     StepControlFailing,
+     [](const Record& record) {
+       return fmt::format("{} rejected of {}, shortest {:.1e} s", record.Text("rejected"),
+                          record.Number("steps") + record.Number("rejected"),
+                          record.Number("step_shortest"));
+     }},
+    {kMembersWarning, "members of the ensemble failed",
+     [](const Record& record) { return record.Number("ensemble_failed") > 0; },
+     [](const Record& record) {
+       return record.Text("ensemble_failed") + " of " + record.Text("ensemble_size");
+     }},
+    {kExponentWarning, "the ensemble does not resolve the requested exponent",
+     // a single run was not asked for an exponent, and drift of round-off has none
+     [](const Record& record) {
+       return record.Number("ensemble_size") > 0 && record.Text("growth_resolved") == "false" &&
+              record.Text("growth_regime") != "round-off";
+     },
+     [](const Record& record) {
+       return fmt::format("{:.2f} +- {:.2g}", record.Number("growth_exponent"),
+                          record.Number("growth_spread"));
+     }},
+};
+
+std::vector<std::string> OwnCodes(const Record& record) {
+  std::vector<std::string> codes;
+  for (const WarningRow& row : kWarnings) {
+    if (IsFinishedRun(record) && row.is_raised(record)) codes.emplace_back(row.code);
+  }
   return codes;
 }
+
+}  // namespace
+
+std::span<const WarningRow> WarningRows() { return kWarnings; }
+
+std::optional<DriftGrowth> GrowthAt(const Record& record) {
+  const auto level = FindLevel(record.Text("enforcement"));
+  if (!level) return std::nullopt;
+  return TraitsOf(*level).growth;
+}
+
+std::string OwnWarnings(const Record& record) { return Joined(OwnCodes(record), " "); }
 
 // Tests whether finer tolerances bring a method's runs nearer to one final pose. Convergence fails
 // for a wrong derivative, an ignored tolerance, or a motion without a limit.
@@ -532,8 +607,8 @@ std::vector<bool> FlaggedByTolerances(std::span<const Record> records) {
   std::map<std::string, std::vector<std::size_t>> columns;
   for (std::size_t i = 0; i < records.size(); ++i) {
     const Record& record = records[i];
-    const bool counts = record.Text("kind") == "accuracy" && record.Text("outcome") == "finished" &&
-                        !record.Text("problem_id").empty() && ToleranceOf(record) > 0.0;
+    const bool counts =
+        IsFinishedRun(record) && !record.Text("problem_id").empty() && ToleranceOf(record) > 0.0;
     if (counts) columns[ColumnOf(record)].push_back(i);
   }
   std::vector<bool> flagged(records.size(), false);
@@ -564,32 +639,39 @@ std::vector<bool> FlaggedByTolerances(std::span<const Record> records) {
 }  // namespace
 
 void SetWarnings(std::vector<Record>* records) {
-  std::vector<std::string> own;
+  std::vector<std::vector<std::string>> own;
   std::vector<bool> testifies;
   for (const Record& record : *records) {
-    own.push_back(OwnWarnings(record));
-    testifies.push_back(TrajectoryIsTrusted(own.back()));
+    own.push_back(OwnCodes(record));
+    // warnings on ensemble members and exponents do not concern the trajectory itself
+    testifies.push_back(std::ranges::all_of(own.back(), [](const std::string& code) {
+      return code == kMembersWarning || code == kExponentWarning;
+    }));
   }
   const std::vector<Agreement> agreements = CompareFinalPoses(*records, testifies);
   const std::vector<bool> unconverged = FlaggedByTolerances(*records);
   for (std::size_t i = 0; i < records->size(); ++i) {
     Record& record = (*records)[i];
-    if (record.Text("kind") != "accuracy" || !HasFinished(record)) continue;
+    if (!IsFinishedRun(record)) continue;
+    std::vector<std::string>& codes = own[i];
     // the others need not be right; a reference is
     const bool certified = IsCertified(record);
     // who ends as those do that can keep a branch has kept it
-    std::string codes = agreements[i].is_backed ? Without(kSingularWarning, own[i]) : own[i];
-    Add(&codes, agreements[i].flagged && !certified, kDisagreementWarning);
-    const bool is_known = own[i].find(kRefinementWarning) != own[i].npos;
-    Add(&codes, unconverged[i] && !certified && !is_known, kRefinementWarning);
-    record.Set("warnings", codes);
+    if (agreements[i].is_backed) std::erase(codes, kSingularWarning);
+    if (agreements[i].flagged && !certified) codes.emplace_back(kDisagreementWarning);
+    if (unconverged[i] && !certified) AddOnce(codes, kRefinementWarning);
+    record.Set("warnings", Joined(codes, " "));
     if (agreements[i].cluster > 0) record.Set("agreement", agreements[i].cluster);
   }
 }
 
+std::vector<std::string> WarningsOf(const Record& record) {
+  std::istringstream codes(record.Text("warnings"));
+  return {std::istream_iterator<std::string>(codes), {}};
+}
+
 bool HasWarning(const Record& record, const std::string& code) {
-  const std::string codes = record.Text("warnings");
-  return code.empty() ? !codes.empty() : (" " + codes + " ").find(" " + code + " ") != codes.npos;
+  return code.empty() ? !record.Text("warnings").empty() : Contains(WarningsOf(record), code);
 }
 
 }  // namespace loopbench::harness

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <ranges>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -53,13 +55,13 @@ std::string ErrorKey(std::span<const Record> records, const WorkPrecisionOptions
   for (const std::string key : kErrors) {
     if (!HasNumber(records, key, "accuracy")) continue;
     if (key == kErrors.front()) return key;
-    const bool is_none = std::ranges::find(kNoErrors, key) != kNoErrors.end();
     remarks->push_back(fmt::format(
         "no record has {} (errors against a certified reference): --error-key is {}{}",
         kErrors.front(), key,
-        is_none ? ", which is no distance from the right motion: a run may be far off and have "
-                  "little of it"
-                : ""));
+        Contains(kNoErrors, key)
+            ? ", which is no distance from the right motion: a run may be far off and have little "
+              "of it"
+            : ""));
     return key;
   }
   throw ConfigError(
@@ -98,7 +100,7 @@ std::string CostKey(std::span<const Record> records, const Timings& timings,
 }
 
 /// Returns the run with additional keys of its timing.
-Record Joined(const Record& run, const Record& timing) {
+Record WithTiming(const Record& run, const Record& timing) {
   Record joined = run;
   for (const auto& [key, value] : timing.items()) {
     if (run.Find(key) == nullptr && !key.starts_with("series.")) joined.Set(key, value);
@@ -129,7 +131,7 @@ std::string WhyNotCompared(const WorkPrecisionRow& row, const WorkPrecision& wor
 
 WorkPrecisionRow MakeRow(const Record& run, const Record& timing,
                          const WorkPrecision& work_precision) {
-  WorkPrecisionRow row{.record = Joined(run, timing), .timing = timing};
+  WorkPrecisionRow row{.record = WithTiming(run, timing), .timing = timing};
   row.error = run.Number(work_precision.error);
   row.cost = row.record.Number(work_precision.cost);
   const double certified = run.Number("reference_error");
@@ -147,8 +149,7 @@ std::string NameOfProblem(const Record& record, const std::vector<std::string>& 
   for (const std::string& key : per) {
     const Value* value = record.Find(key);
     const bool is_text = value != nullptr && std::holds_alternative<std::string>(*value);
-    name +=
-        fmt::format("{}{}{}", name.empty() ? "" : ", ", is_text ? "" : key + " ", record.Text(key));
+    name += (name.empty() ? "" : ", ") + (is_text ? "" : key + " ") + record.Text(key);
   }
   return name;
 }
@@ -166,13 +167,9 @@ void MarkFront(std::vector<WorkPrecisionRow>* rows) {
 }
 
 std::vector<std::string> FormulationsOf(const std::vector<WorkPrecisionRow>& rows) {
-  std::vector<std::string> names;
-  for (const WorkPrecisionRow& row : rows) {
-    const std::string name = row.record.Text("formulation");
-    if (std::ranges::find(names, name) == names.end()) names.push_back(name);
-  }
-  std::ranges::sort(names);
-  return names;
+  std::set<std::string> names;
+  for (const WorkPrecisionRow& row : rows) names.insert(row.record.Text("formulation"));
+  return {names.begin(), names.end()};
 }
 
 /// Returns the first suitable row, which is the cheapest: rows are in order of cost.
@@ -196,8 +193,7 @@ void FindCheapest(const std::vector<double>& classes, WorkPrecisionProblem* prob
           {.error_class = error_class, .formulation = formulation, .row = row});
       if (row >= 0) least = std::min(least, rows[static_cast<std::size_t>(row)].cost);
     }
-    for (std::size_t i = first; i < problem->cheapest.size(); ++i) {
-      Cheapest& one = problem->cheapest[i];
+    for (Cheapest& one : problem->cheapest | std::views::drop(first)) {
       if (one.row >= 0) one.ratio = rows[static_cast<std::size_t>(one.row)].cost / least;
     }
   }
@@ -305,9 +301,9 @@ std::string ValueOf(const WorkPrecisionRow& row, const Aspect& aspect) {
 
 /// Values of one setting in the compared rows of all problems.
 struct ValueShares {
-  bool is_equal = true;             ///< within each problem
-  std::vector<std::string> values;  ///< in order of first appearance
-  std::vector<int> rows;            ///< numbers of rows with each value
+  bool is_equal = true;  ///< within each problem
+  /// In order of first appearance, with the number of rows.
+  std::vector<std::pair<std::string, int>> values;
 };
 
 ValueShares FindValues(const WorkPrecision& work_precision, const Aspect& aspect) {
@@ -318,13 +314,9 @@ ValueShares FindValues(const WorkPrecision& work_precision, const Aspect& aspect
       if (!row.reason.empty()) continue;
       const std::string value = ValueOf(row, aspect);
       own.insert(value);
-      const auto place = std::ranges::find(finding.values, value);
-      const auto index = static_cast<std::size_t>(place - finding.values.begin());
-      if (place == finding.values.end()) {
-        finding.values.push_back(value);
-        finding.rows.push_back(0);
-      }
-      ++finding.rows[index];
+      auto place = std::ranges::find(finding.values, value, &std::pair<std::string, int>::first);
+      if (place == finding.values.end()) place = finding.values.insert(place, {value, 0});
+      ++place->second;
     }
     finding.is_equal = finding.is_equal && own.size() <= 1;
   }
@@ -334,26 +326,12 @@ ValueShares FindValues(const WorkPrecision& work_precision, const Aspect& aspect
 /// "integrator (ode45 40, verner 38)"; long lists are cut.
 std::string Shares(const Aspect& aspect, const ValueShares& finding) {
   constexpr std::size_t kMaxShown = 8;
-  std::string text = fmt::format("{} (", aspect.words);
-  for (std::size_t i = 0; i < std::min(finding.values.size(), kMaxShown); ++i) {
-    text += fmt::format("{}{} {}", i == 0 ? "" : ", ", finding.values[i], finding.rows[i]);
-  }
   const std::size_t more = finding.values.size() - std::min(finding.values.size(), kMaxShown);
-  return text + (more > 0 ? fmt::format(" and {} more)", more) : ")");
-}
-
-std::string Joined(const std::vector<std::string>& parts) {
-  return fmt::format("{}", fmt::join(parts, "; "));
-}
-
-/// Reasons without their numbers and how many rows have them: "singular 3, warnings: energy 2".
-std::string CountReasons(const std::vector<const WorkPrecisionRow*>& rows) {
-  std::map<std::string, int> counts;
-  for (const WorkPrecisionRow* row : rows)
-    ++counts[row->reason.substr(0, row->reason.find(" at "))];
-  std::vector<std::string> parts;
-  for (const auto& [reason, count] : counts) parts.push_back(fmt::format("{} {}", reason, count));
-  return fmt::format("{}", fmt::join(parts, ", "));
+  return fmt::format(
+      "{} ({}{})", aspect.words,
+      Joined(finding.values | std::views::take(kMaxShown), ", ",
+             [](const auto& one) { return fmt::format("{} {}", one.first, one.second); }),
+      more > 0 ? fmt::format(" and {} more", more) : "");
 }
 
 bool IsTime(const std::string& cost) {
@@ -364,11 +342,10 @@ bool IsTime(const std::string& cost) {
 /// Returns a line with the error, the certified error of references, and its influence.
 std::string ErrorLine(const WorkPrecision& work_precision) {
   double least = INFINITY, most = 0.0;
-  int known = 0, bounds = 0, beyond = 0;
+  int bounds = 0, beyond = 0;
   for (const WorkPrecisionRow* row : RowsOf(work_precision, true)) {
     const double certified = row->record.Number("reference_error");
     if (std::isfinite(certified)) {
-      ++known;
       least = std::min(least, certified);
       most = std::max(most, certified);
     }
@@ -376,7 +353,7 @@ std::string ErrorLine(const WorkPrecision& work_precision) {
     beyond += row->record.Number("reference_valid_until") < row->record.Number("horizon") ? 1 : 0;
   }
   std::string line = fmt::format("error: {}", work_precision.error);
-  if (known > 0 && work_precision.error.starts_with("error_")) {
+  if (std::isfinite(least) && work_precision.error.starts_with("error_")) {
     line += fmt::format(", against references certified to {:.1e}", least);
     if (most > least) line += fmt::format(" to {:.1e}", most);
     line += " m";
@@ -396,9 +373,7 @@ std::string CostLine(const WorkPrecision& work_precision) {
   if (work_precision.cost == "wall_s_median") {
     return "cost: wall_s_median [s], simulations timed one at a time, without observers";
   }
-  const std::string unit = UnitOf(ColumnOf(work_precision.cost, {}));
-  std::string line =
-      fmt::format("cost: {}{}", work_precision.cost, unit.empty() ? "" : " [" + unit + "]");
+  std::string line = "cost: " + WithUnit(work_precision.cost, work_precision.cost);
   const bool is_count = work_precision.cost.starts_with("rhs_e") || work_precision.cost == "steps";
   const bool any = std::ranges::any_of(
       RowsOf(work_precision, true),
@@ -430,11 +405,12 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   for (const Aspect& aspect : kAspects) {
     const ValueShares finding = FindValues(work_precision, aspect);
     if (finding.values.empty()) continue;
+    const std::string& first = finding.values.front().first;
     const bool is_single = finding.values.size() == 1;
-    if (is_single && finding.values.front().empty()) {
+    if (is_single && first.empty()) {
       unknown.push_back(aspect.words);
     } else if (is_single) {
-      equal.push_back(fmt::format("{} {}", aspect.words, finding.values.front()));
+      equal.push_back(fmt::format("{} {}", aspect.words, first));
     } else if (finding.is_equal) {
       equal.push_back(fmt::format("{} (in each problem)", aspect.words));
     } else {
@@ -444,10 +420,13 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   }
   lines.push_back(ErrorLine(work_precision));
   lines.push_back(CostLine(work_precision));
-  if (!equal.empty()) lines.push_back("equal in all compared rows: " + Joined(equal));
-  if (!unequal.empty()) lines.push_back("not equal (rows): " + Joined(unequal));
-  if (!unknown.empty()) lines.push_back("not recorded: " + Joined(unknown));
-  const auto left_out = RowsOf(work_precision, false);
+  if (!equal.empty()) lines.push_back("equal in all compared rows: " + Joined(equal, "; "));
+  if (!unequal.empty()) lines.push_back("not equal (rows): " + Joined(unequal, "; "));
+  if (!unknown.empty()) lines.push_back("not recorded: " + Joined(unknown, "; "));
+  std::vector<std::string> reasons;  // without their numbers
+  for (const WorkPrecisionRow* row : RowsOf(work_precision, false)) {
+    reasons.push_back(row->reason.substr(0, row->reason.find(" at ")));
+  }
   std::size_t all = 0;
   std::vector<Record> timings;
   for (const WorkPrecisionProblem& problem : work_precision.problems) {
@@ -456,9 +435,9 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
       if (!row.timing.items().empty()) timings.push_back(row.timing);
     }
   }
-  if (!left_out.empty()) {
-    lines.push_back(fmt::format("{} of {} rows are not compared: {}", left_out.size(), all,
-                                CountReasons(left_out)));
+  if (!reasons.empty()) {
+    lines.push_back(fmt::format("{} of {} rows are not compared: {}", reasons.size(), all,
+                                CountWords(reasons)));
   }
   if (!IsTime(work_precision.cost)) return lines;
   if (ComparesLibraryCode(work_precision)) {
@@ -470,7 +449,7 @@ std::vector<std::string> FairnessStatement(const WorkPrecision& work_precision) 
   if (!one_machine) {
     lines.push_back("warning: the costs are times of more than one machine, which do not compare");
   }
-  for (std::string& line : NoiseWarnings(timings)) lines.push_back(std::move(line));
+  std::ranges::move(NoiseWarnings(timings), std::back_inserter(lines));
   return lines;
 }
 

@@ -1,22 +1,59 @@
-// The built-in observers: drift, errors against closed forms, coordinates, nearness to singular
-// positions, steps.
+// The built-in observers: drift, energy, errors against closed forms, coordinates, nearness to
+// singular positions, steps.
 #include <algorithm>
 #include <array>
 #include <boost/math/special_functions/ellint_1.hpp>
 #include <boost/math/special_functions/jacobi_elliptic.hpp>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <numbers>
+#include <optional>
 
 #include "harness/observers/observer.h"
+#include "harness/observers/registry.h"
 #include "mechanism/loops/scaled_loops.h"
 #include "mechanism/loops/tree_dynamics.h"
-#include "mechanism/model/kinematics.h"
 
 namespace loopbench::harness {
-// The loops of a mechanism in joint coordinates, whatever coordinates are integrated.
+namespace {
 
+// Returns the kept indices of `n` samples: evenly spaced, always with the last one.
+std::vector<std::size_t> Kept(std::size_t n, int points) {
+  const std::size_t count = std::min(n, static_cast<std::size_t>(points));
+  std::vector<std::size_t> kept(count);
+  for (std::size_t i = 0; i < count; ++i) kept[i] = count == n ? i : i * (n - 1) / (count - 1);
+  return kept;
+}
+
+}  // namespace
+
+TimeSeries Thin(const TimeSeries& series, int points, std::size_t samples) {
+  TimeSeries thin;
+  for (const std::size_t k : Kept(std::min(samples, series.t.size()), points)) {
+    thin.t.push_back(series.t[k]);
+    thin.value.push_back(series.value[k]);
+  }
+  return thin;
+}
+
+namespace {
+
+/// The largest distance of the first `samples` from the line through those that Thin() keeps.
+double LargestGap(const TimeSeries& series, int points, std::size_t samples) {
+  const std::vector<std::size_t> kept = Kept(samples, points);
+  double gap = 0.0;
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    const std::size_t a = kept[i - 1], b = kept[i];
+    const double slope = (series.value[b] - series.value[a]) / (series.t[b] - series.t[a]);
+    for (std::size_t k = a + 1; k < b; ++k) {
+      const double line = series.value[a] + slope * (series.t[k] - series.t[a]);
+      gap = std::max(gap, std::abs(series.value[k] - line));
+    }
+  }
+  return gap;
+}
+
+/// The loops of a mechanism in joint coordinates, whatever coordinates are integrated.
 template <class Space>
 class JointView {
  public:
@@ -53,8 +90,6 @@ class JointView {
   std::unique_ptr<Mechanism<Space, double>> own_;
   std::unique_ptr<Kinematics<Space, double>> kinematics_;
 };
-
-namespace {
 
 /// Keeps the larger value; NaN stays.
 void Keep(double* largest, double value) {
@@ -106,137 +141,323 @@ double ShiftOf(const Kinematics<Space, double>& kinematics, int coupling, double
   return by * kinematics.mechanism().length();
 }
 
-}  // namespace
-
-/// Measured quantities besides positions.
+/// Drift at position, velocity and acceleration level.
+///
+/// Position drift is the largest violation of a constraint imposed by the coordinate set: cut
+/// joints in joint coordinates, every joint in absolute coordinates; points [m] and rotations [rad]
+/// apart. Velocity and acceleration drift are the largest V_Q - V_P and A_Q - A_P - g in the
+/// constrained directions, points only [m/s, m/s^2].
+///
+/// Loop closure compares the two sets. The tree of user joints follows the joint coordinates (in
+/// absolute coordinates: those measured between the bodies). The violation at a cut joint then is
+/// its loop's closure error, the sum of the violations around the loop. In joint coordinates it
+/// equals the position drift; in absolute coordinates violations may cancel.
 template <class Space>
-struct DriftObserver<Space>::Rest {
-  Rest(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
-      : dynamics(mechanism),
-        A(mechanism.num_bodies()),
-        view(description, mechanism, true),
-        loop_max(mechanism.joints().size(), 0.0) {
-    for (int index : view.mechanism().constraints()) {
-      loop_names.emplace_back(index, view.mechanism().joint_names()[index]);
-    }
-    coupling_max.assign(mechanism.num_coordinate_couplings(), 0.0);
+class DriftObserver final : public Observer<Space> {
+ public:
+  /// Without a description: watches position drift alone.
+  DriftObserver(const Mechanism<Space, double>& mechanism, const MechanismDescription* description)
+      : coupling_max_(mechanism.num_coordinate_couplings(), 0.0) {
+    if (description != nullptr) rest_.emplace(*description, mechanism);
   }
 
-  TreeDynamics<Space, double> dynamics;
-  std::vector<Acceleration<Space, double>> A;
-  JointView<Space> view;
-  std::vector<std::pair<int, std::string>> loop_names;
-  std::vector<double> loop_max, coupling_max;
-  double velocity = 0.0, acceleration = 0.0, closure = 0.0;
+  void Observe(const Sample<Space>& sample) override {
+    const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+    const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+    Largest now;
+    for (int index : mechanism.constraints()) now.Add(kinematics, index);
+    const std::string* worst = now.joint < 0 ? nullptr : &mechanism.joint_names()[now.joint];
+    for (int c = 0; c < mechanism.num_coordinate_couplings(); ++c) {
+      const double by = ShiftOf(kinematics, c, kinematics.CouplingMismatch(c), &now.rotation);
+      Keep(&coupling_max_[c], by);
+      if (by <= now.shift) continue;
+      now.shift = by;
+      worst = &mechanism.couplings()[c].name;
+    }
+    if (now.shift > shift_) worst_loop_ = *worst;
+    Keep(&shift_, now.shift);
+    Keep(&rotation_, now.rotation);
+    series_.Add(sample.t, now.shift);
+    if (rest_) ObserveRest(sample);
+  }
+
+  void Write(Record& record) const override {
+    if (series_.t.empty()) return;
+    record.Set("drift_position_max", shift_);
+    record.Set("drift_rotation_max", rotation_);
+    if (!rest_) return;
+    record.Set("drift_velocity_max", rest_->velocity);
+    record.Set("drift_acceleration_max", rest_->acceleration);
+    record.Set("loop_closure_max", rest_->closure);
+    record.Set("worst_loop", worst_loop_);
+    const Mechanism<Space, double>& loops = rest_->view.mechanism();
+    for (const int index : loops.constraints()) {
+      record.Set("drift.loop." + loops.joint_names()[index], rest_->loop_max[index]);
+    }
+    for (std::size_t c = 0; c < coupling_max_.size(); ++c) {
+      record.Set("drift.loop." + loops.couplings()[c].name, coupling_max_[c]);
+    }
+  }
+
+  void Trace(Traces& traces) const override { traces.drift = series_; }
+
+ private:
+  /// Measured quantities besides positions.
+  struct Rest {
+    Rest(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
+        : dynamics(mechanism),
+          A(mechanism.num_bodies()),
+          view(description, mechanism, true),
+          loop_max(mechanism.joints().size(), 0.0) {}
+
+    TreeDynamics<Space, double> dynamics;
+    std::vector<Acceleration<Space, double>> A;
+    JointView<Space> view;
+    std::vector<double> loop_max;
+    double velocity = 0.0, acceleration = 0.0, closure = 0.0;
+  };
+
+  void ObserveRest(const Sample<Space>& sample) {
+    Rest& rest = *rest_;
+    const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+    rest.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), rest.A);
+    for (int index : kinematics.mechanism().constraints()) {
+      const auto shift_of = [&](const auto& V) {
+        return kinematics.Constrained(index, V).linear.norm();
+      };
+      Keep(&rest.velocity, shift_of(kinematics.joints()[index].V_rel));
+      Keep(&rest.acceleration,
+           shift_of(RelativeAcceleration<Space, double>(kinematics, index, rest.A)));
+    }
+    for (int c = 0; c < kinematics.mechanism().num_coordinate_couplings(); ++c) {
+      double rotation = 0.0;
+      Keep(&rest.velocity, ShiftOf(kinematics, c, kinematics.CouplingSpeed(c), &rotation));
+      const double acceleration =
+          CouplingAcceleration<Space, double>(kinematics, c, &sample.formulation.udot(), rest.A);
+      Keep(&rest.acceleration, ShiftOf(kinematics, c, acceleration, &rotation));
+      Keep(&rest.closure, coupling_max_[c]);
+    }
+    const Kinematics<Space, double>& closure = rest.view.At(kinematics);
+    for (const int index : rest.view.mechanism().constraints()) {
+      Largest loop;
+      loop.Add(closure, index);
+      Keep(&rest.loop_max[index], loop.shift);
+      Keep(&rest.closure, loop.shift);
+    }
+  }
+
+  double shift_ = 0.0, rotation_ = 0.0;
+  std::string worst_loop_;
+  std::vector<double> coupling_max_;
+  TimeSeries series_;
+  std::optional<Rest> rest_;  ///< nothing for position drift alone
 };
 
+/// Energy balance: the largest deviation of
+///   kinetic + potential - work supplied + work dissipated
+/// from its first value [J], and its series. Without power, the deviation of the total energy. The
+/// relative error compares it with the largest kinetic energy. The energy that moves is the largest
+/// of kinetic energy, span of the potential, and work supplied or dissipated, since slow motions
+/// have little kinetic energy. It is at least the rounding error of the potential, so that rest is
+/// no error. The sensitivity is the largest change of energy, to first order, by errors of 1 m and
+/// 1 rad, or of 1 m/s and 1 rad/s, of all bodies. It is the largest sum of applied wrenches, or of
+/// momenta.
 template <class Space>
-DriftObserver<Space>::DriftObserver() = default;
+class EnergyObserver final : public Observer<Space> {
+ public:
+  explicit EnergyObserver(const Watched<Space>& run)
+      : points_(run.points), has_power_(run.mechanism.has_power()) {}
 
-template <class Space>
-DriftObserver<Space>::DriftObserver(const MechanismDescription& description,
-                                    const Mechanism<Space, double>& mechanism)
-    : rest_(std::make_unique<Rest>(description, mechanism)) {}
-
-template <class Space>
-DriftObserver<Space>::~DriftObserver() = default;
-
-template <class Space>
-void DriftObserver<Space>::Observe(const Sample<Space>& sample) {
-  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
-  Largest now;
-  for (int index : kinematics.mechanism().constraints()) now.Add(kinematics, index);
-  const std::string* worst =
-      now.joint < 0 ? nullptr : &kinematics.mechanism().joint_names()[now.joint];
-  for (int c = 0; c < kinematics.mechanism().num_coordinate_couplings(); ++c) {
-    const double by = ShiftOf(kinematics, c, kinematics.CouplingMismatch(c), &now.rotation);
-    if (rest_ != nullptr) Keep(&rest_->coupling_max[c], by);
-    if (by <= now.shift) continue;
-    now.shift = by;
-    worst = &kinematics.mechanism().couplings()[c].name;
-  }
-  if (now.shift > shift_) worst_loop_ = *worst;
-  Keep(&shift_, now.shift);
-  Keep(&rotation_, now.rotation);
-  series_.t.push_back(sample.t);
-  series_.value.push_back(now.shift);
-  if (rest_ != nullptr) ObserveRest(sample);
-}
-
-template <class Space>
-void DriftObserver<Space>::ObserveRest(const Sample<Space>& sample) {
-  Rest& rest = *rest_;
-  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
-  rest.dynamics.BodyAccelerations(kinematics, sample.formulation.udot(), rest.A);
-  for (int index : kinematics.mechanism().constraints()) {
-    const auto shift_of = [&](const auto& V) {
-      return kinematics.Constrained(index, V).linear.norm();
-    };
-    Keep(&rest.velocity, shift_of(kinematics.joints()[index].V_rel));
-    Keep(&rest.acceleration,
-         shift_of(RelativeAcceleration<Space, double>(kinematics, index, rest.A)));
-  }
-  for (int c = 0; c < kinematics.mechanism().num_coordinate_couplings(); ++c) {
-    double rotation = 0.0;
-    Keep(&rest.velocity, ShiftOf(kinematics, c, kinematics.CouplingSpeed(c), &rotation));
-    const double acceleration =
-        CouplingAcceleration<Space, double>(kinematics, c, &sample.formulation.udot(), rest.A);
-    Keep(&rest.acceleration, ShiftOf(kinematics, c, acceleration, &rotation));
-    Keep(&rest.closure, rest.coupling_max[c]);
-  }
-  const Kinematics<Space, double>& closure = rest.view.At(kinematics);
-  for (const auto& [index, name] : rest.loop_names) {
-    Largest loop;
-    loop.Add(closure, index);
-    Keep(&rest.loop_max[index], loop.shift);
-    Keep(&rest.closure, loop.shift);
-  }
-}
-
-template <class Space>
-void DriftObserver<Space>::Write(Record& record) const {
-  if (series_.t.empty()) return;
-  record.Set("drift_position_max", shift_);
-  record.Set("drift_rotation_max", rotation_);
-  if (rest_ == nullptr) return;
-  record.Set("drift_velocity_max", rest_->velocity);
-  record.Set("drift_acceleration_max", rest_->acceleration);
-  record.Set("loop_closure_max", rest_->closure);
-  record.Set("worst_loop", worst_loop_);
-  for (const auto& [index, name] : rest_->loop_names) {
-    record.Set("drift.loop." + name, rest_->loop_max[index]);
-  }
-  for (std::size_t c = 0; c < rest_->coupling_max.size(); ++c) {
-    record.Set("drift.loop." + rest_->view.mechanism().couplings()[c].name, rest_->coupling_max[c]);
-  }
-}
-
-template class DriftObserver<Planar>;
-template class DriftObserver<Spatial>;
-
-template <class Space>
-ExactObserver<Space>::ExactObserver(const ObservedQuantities& problem,
-                                    const Mechanism<Space, double>& mechanism)
-    : problem_(problem) {
-  const auto find = [&](const std::string& name) {
-    const auto it = std::ranges::find(mechanism.body_names(), name);
-    return static_cast<int>(it - mechanism.body_names().begin());
-  };
-  for (const AngleCombination& combination : problem.branch_invariants) {
-    combinations_.emplace_back();
-    for (const auto& [name, factor] : combination) {
-      combinations_.back().emplace_back(find(name), factor);
+  void Observe(const Sample<Space>& sample) override {
+    if (!sample.knows_work) return;  // and no balance
+    supplied_ = sample.supplied;
+    dissipated_ = sample.dissipated;
+    const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+    const auto parts = ComputeEnergy(kinematics);
+    const double energy = parts.total() - supplied_ + dissipated_;
+    kinetic_ = std::max(kinetic_, parts.kinetic);
+    work_ = std::max({work_, std::abs(supplied_), std::abs(dissipated_)});
+    if (series_.t.empty()) {
+      first_ = energy;
+      potential_low_ = potential_high_ = parts.potential;
     }
+    potential_low_ = std::min(potential_low_, parts.potential);
+    potential_high_ = std::max(potential_high_, parts.potential);
+    const Mechanism<Space, double>& mechanism = kinematics.mechanism();
+    wrenches_.resize(static_cast<std::size_t>(mechanism.num_bodies()));
+    AppliedForces<Space, double>(kinematics, wrenches_);
+    double forces = 0.0, momenta = 0.0;
+    for (int body = 1; body < mechanism.num_bodies(); ++body) {
+      const auto& inertia = mechanism.bodies()[body];
+      const auto& V = kinematics.motions()[body];
+      forces += wrenches_[static_cast<std::size_t>(body)].norm();
+      momenta += inertia.mass * V.linear.norm() +
+                 (kinematics.RotationalInertia(inertia, body) * V.angular).norm();
+    }
+    sensitivity_ = std::max({sensitivity_, forces, momenta});
+    Keep(&largest_, std::abs(energy - first_));
+    series_.Add(sample.t, energy - first_);
   }
-  if (problem.closed_form) pendulum_body_ = find(problem.closed_form->body);
-  last_angle_.assign(mechanism.num_bodies(), 0.0);
-}
 
-namespace {
+  void Write(Record& record) const override {
+    if (series_.t.empty()) return;
+    record.Set("energy_error_max", largest_);
+    if (kinetic_ > 0.0) record.Set("energy_error_relative", largest_ / kinetic_);
+    // an error of a hundredth of the scale is then a thousand round-offs of the potential
+    constexpr double kLeast = 1e5 * std::numeric_limits<double>::epsilon();
+    record.Set("energy_scale",
+               std::max({kinetic_, work_, potential_high_ - potential_low_,
+                         kLeast * std::max(std::abs(potential_low_), std::abs(potential_high_))}));
+    record.Set("energy_sensitivity", sensitivity_);
+    if (has_power_) {
+      record.Set("energy_supplied", supplied_);
+      record.Set("energy_dissipated", dissipated_);
+    }
+    const TimeSeries thin = Thin(series_, points_);
+    record.Set("series.energy_t", thin.t);
+    record.Set("series.energy_error", thin.value);
+  }
 
-// For planar problems, in space the angle about z.
+  void Trace(Traces& traces) const override {
+    traces.energy = series_;
+    traces.kinetic = kinetic_;
+  }
+
+ private:
+  int points_;
+  bool has_power_;
+  double first_ = 0.0, largest_ = 0.0, kinetic_ = 0.0;
+  double supplied_ = 0.0, dissipated_ = 0.0, work_ = 0.0;
+  double potential_low_ = 0.0, potential_high_ = 0.0, sensitivity_ = 0.0;
+  std::vector<Wrench<Space, double>> wrenches_;
+  TimeSeries series_;
+};
+
+/// Smallest rank, reciprocal condition and weight at accepted steps with their times; numbers of
+/// regularized steps and evaluations and of mode changes. `rank_min` is the rank of the loops, in
+/// joint coordinates for either set. `rank_constraints_min` is the rank of all constraints of the
+/// set, larger by its additional speeds.
 template <class Space>
-double AngleOf(const Pose<Space, double>& X) {
+class ConditionObserver final : public Observer<Space> {
+ public:
+  void Observe(const Sample<Space>& sample) override {
+    const Diagnostics diagnostics = sample.formulation.diagnostics();
+    rank_min_ = started_ ? std::min(rank_min_, diagnostics.rank) : diagnostics.rank;
+    const Mechanism<Space, double>& mechanism = sample.formulation.kinematics().mechanism();
+    beyond_joint_speeds_ = mechanism.num_u() - mechanism.num_joint_speeds();
+    if (!started_ || diagnostics.rcond < rcond_min_) {
+      rcond_min_ = diagnostics.rcond;
+      rcond_t_ = sample.t;
+    }
+    if (diagnostics.smallest_weight < 1.0) ++regularized_steps_;
+    regularized_evaluations_ = diagnostics.regularized_evaluations;
+    mode_changes_ = diagnostics.mode_changes;
+    started_ = true;
+  }
+
+  void ObserveSingular(const Sample<Space>& sample) override { Observe(sample); }
+
+  void Write(Record& record) const override {
+    if (!started_) return;
+    record.Set("rank_min", std::int64_t{rank_min_});
+    record.Set("rank_constraints_min", std::int64_t{rank_min_ + beyond_joint_speeds_});
+    record.Set("rcond_min", rcond_min_);
+    record.Set("rcond_min_t", rcond_t_);
+    record.Set("regularized_steps", regularized_steps_);
+    record.Set("regularized_evaluations", regularized_evaluations_);
+    record.Set("mode_changes", mode_changes_);
+  }
+
+ private:
+  bool started_ = false;
+  int rank_min_ = 0, beyond_joint_speeds_ = 0;
+  double rcond_min_ = 1.0, rcond_t_ = 0.0;
+  std::int64_t regularized_steps_ = 0, regularized_evaluations_ = 0, mode_changes_ = 0;
+};
+
+/// Rows and speeds up to which every accepted step affords a dense decomposition (about 0.1 ms).
+constexpr int kMaxRows = 24, kMaxSpeeds = 64;
+
+/// Distance from a singular configuration: the smallest ratio of singular values of the scaled
+/// loops (mechanism/loops/scaled_loops.h), at the largest rank met. By Eckart and Young it is the
+/// relative distance of the constraints from the nearest ones of lower rank. Near a singular
+/// configuration it is about the remaining angle [rad]. At accepted steps only, for loops with few
+/// rows; redundant rows do not count.
+///
+/// A step may cross the singular configuration. The ratio has no sign and then falls and rises like
+/// an absolute value; with the sign changed on one side, its course is straighter. Such crossings
+/// are counted.
+template <class Space>
+class SingularityObserver final : public Observer<Space> {
+ public:
+  explicit SingularityObserver(const Watched<Space>& run)
+      : view_(run.description, run.mechanism, false) {}  // released rows gain rank as they drift
+
+  void Observe(const Sample<Space>& sample) override {
+    const int rows = view_.mechanism().num_equations(), speeds = view_.mechanism().num_u();
+    if (rows == 0 || rows > kMaxRows || speeds == 0 || speeds > kMaxSpeeds) return;
+    const LoopSpectrum now = SpectrumOfLoops(view_.At(sample.formulation.kinematics()));
+    const std::size_t count = static_cast<std::size_t>(now.singular_values.size());
+    if (smallest_.empty()) smallest_.assign(count, {1.0, sample.t});
+    for (std::size_t i = 0; i < count; ++i) {
+      const double ratio = now.singular_values[i] / now.largest;
+      if (!(ratio >= smallest_[i].first)) smallest_[i] = {ratio, sample.t};  // NaN too
+    }
+    if (now.rank > generic_rank_) crossings_ = 0, num_ = 0;  // another quantity from here on
+    generic_rank_ = std::max(generic_rank_, now.rank);
+    const std::vector<Released>& released = sample.formulation.kinematics().released();
+    if (released_ != released) num_ = 0;
+    released_ = released;
+    if (generic_rank_ == 0) return;
+    AddPassage(sample.t, now.singular_values[generic_rank_ - 1] / now.largest);
+  }
+
+  void Write(Record& record) const override {
+    if (generic_rank_ == 0) return;
+    const auto& [ratio, t] = smallest_[static_cast<std::size_t>(generic_rank_) - 1];
+    record.Set("singularity_distance_min", ratio);
+    record.Set("singularity_distance_min_t", t);
+    record.Set("singularity_crossings", crossings_);
+  }
+
+ private:
+  /// Counts zero crossings of a quantity of which only the absolute value is known.
+  void AddPassage(double t, double size) {
+    // at the position itself once, however long the run stays
+    if (size < kRankRatio) {
+      if (num_ == 0 || size_[num_ - 1] >= kRankRatio) ++crossings_;
+      num_ = 0;
+    } else if (num_ == 2 && t > t_[1]) {
+      const double a = (size_[1] - size_[0]) / (t_[1] - t_[0]), b = (size - size_[1]) / (t - t_[1]);
+      // slopes with the sign changed behind the first sample, or behind the second
+      const double a_turned = -(size_[1] + size_[0]) / (t_[1] - t_[0]);
+      const double b_turned = -(size + size_[1]) / (t - t_[1]);
+      const double bend = std::min(std::abs(-b - a_turned), std::abs(b_turned - a));
+      if (a <= 0.0 && b >= 0.0 && bend < std::abs(b - a)) ++crossings_;
+    }
+    if (num_ == 2) {
+      t_[0] = t_[1];
+      size_[0] = size_[1];
+      num_ = 1;
+    }
+    t_[num_] = t;
+    size_[num_++] = size;
+  }
+
+  JointView<Space> view_;
+  /// Per singular value, the largest first: smallest ratio to the largest, and its time.
+  std::vector<std::pair<double, double>> smallest_;
+  int generic_rank_ = 0;
+  std::vector<Released> released_;            ///< of the last sample
+  std::array<double, 2> t_ = {}, size_ = {};  ///< the last samples of the quantity
+  std::size_t num_ = 0;                       ///< number of them
+  std::int64_t crossings_ = 0;
+};
+
+/// Angle of a body of a planar problem, in space about z up to whole turns.
+template <class Space>
+double AngleOf(const Kinematics<Space, double>& kinematics, int body) {
+  const Pose<Space, double>& X = kinematics.poses()[body];
   if constexpr (Space::kRot == 1) {
     return X.angle;
   } else {
@@ -244,79 +465,285 @@ double AngleOf(const Pose<Space, double>& X) {
   }
 }
 
+template <class Space>
+int BodyNamed(const Mechanism<Space, double>& mechanism, const std::string& name) {
+  const auto it = std::ranges::find(mechanism.body_names(), name);
+  return static_cast<int>(it - mechanism.body_names().begin());
+}
+
+/// Distance from a problem's known solution: branch invariants, closed form (mechanism_reader.h).
+template <class Space>
+class ExactObserver final : public Observer<Space> {
+ public:
+  explicit ExactObserver(const Watched<Space>& run)
+      : problem_(run.problem), last_angle_(run.mechanism.num_bodies(), 0.0) {
+    for (const AngleCombination& combination : problem_.branch_invariants) {
+      combinations_.emplace_back();
+      for (const auto& [name, factor] : combination) {
+        combinations_.back().emplace_back(BodyNamed(run.mechanism, name), factor);
+      }
+    }
+    if (problem_.closed_form) {
+      pendulum_body_ = BodyNamed(run.mechanism, problem_.closed_form->body);
+    }
+  }
+
+  void Observe(const Sample<Space>& sample) override {
+    double worst = 0.0;
+    for (std::size_t c = 0; c < combinations_.size(); ++c) {
+      double value = 0.0;
+      for (const auto& [body, factor] : combinations_[c]) value += factor * BodyAngle(sample, body);
+      if (!started_) first_.push_back(value);
+      worst = std::max(worst, std::abs(value - first_[c]));
+    }
+    branch_error_ = std::max(branch_error_, worst);
+    if (!combinations_.empty()) branch_.Add(sample.t, worst);
+    if (pendulum_body_ >= 0) {
+      const PendulumForm& form = *problem_.closed_form;
+      const double theta = BodyAngle(sample, pendulum_body_) - form.down_angle;
+      if (!started_) {
+        theta0_ = theta;
+        omega0_ = sample.formulation.kinematics().motions()[pendulum_body_][Space::kRot - 1];
+      }
+      // the closed form takes an angle within half a turn; whole turns go along unchanged
+      const double within = std::remainder(theta0_, 2 * std::numbers::pi);
+      const double exact =
+          theta0_ - within + PendulumAngle(form.frequency_squared, within, omega0_, sample.t);
+      closed_form_error_ = std::max(closed_form_error_, std::abs(theta - exact));
+    }
+    started_ = true;
+  }
+
+  void Write(Record& record) const override {
+    if (!started_) return;
+    if (!combinations_.empty()) {
+      record.Set("branch_error_max", branch_error_);
+      const TimeSeries thin = Thin(branch_, 200);
+      record.Set("series.branch_t", thin.t);
+      record.Set("series.branch", thin.value);
+    }
+    if (pendulum_body_ >= 0) record.Set("closed_form_error_max", closed_form_error_);
+  }
+
+ private:
+  double BodyAngle(const Sample<Space>& sample, int body) {
+    const double angle = AngleOf(sample.formulation.kinematics(), body);
+    if (Space::kRot == 1) return angle;
+    // continued from step to step
+    last_angle_[body] += std::remainder(angle - last_angle_[body], 2 * std::numbers::pi);
+    return last_angle_[body];
+  }
+
+  const ObservedQuantities& problem_;
+  std::vector<std::vector<std::pair<int, double>>> combinations_;  ///< by body index
+  int pendulum_body_ = -1;
+  std::vector<double> first_, last_angle_;
+  double branch_error_ = 0.0, closed_form_error_ = 0.0;
+  double theta0_ = 0.0, omega0_ = 0.0;
+  bool started_ = false;
+  TimeSeries branch_;
+};
+
+/// Joint coordinates over time, of mechanisms with few of them, for figures: "series.angle.JOINT"
+/// [rad] and "series.displacement.JOINT" [m] over "series.t", for the whole run. These few points
+/// may not show the motion: a straight line between two of them misses a sample by more than 1 % of
+/// all angles or displacements. Then the same number of points covers its first half, quarter, ...
+/// that they do show: "series.opening.angle.JOINT" and so on over "series.opening_t".
+template <class Space>
+class CoordinateObserver final : public Observer<Space> {
+ public:
+  explicit CoordinateObserver(int points) : points_(points) {}
+
+  void Observe(const Sample<Space>& sample) override {
+    const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
+    const auto& joints = kinematics.mechanism().joints();
+    constexpr std::size_t kMaxJoints = 1000;
+    if (joints.size() > kMaxJoints) return;
+    const bool first = series_.empty();
+    std::size_t s = 0;
+    for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
+      if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
+      if (first) {
+        // motions have their rotations first; a helix is measured by its angle
+        const bool shifts = joints[j].kind->axes[0] >= Space::kRot;
+        keys_.push_back((shifts ? "displacement." : "angle.") +
+                        kinematics.mechanism().joint_names()[j]);
+        (shifts ? shifts_ : angles_).push_back(s);
+        series_.emplace_back();
+      }
+      series_[s++].Add(sample.t, kinematics.JointCoordinate(j));
+    }
+  }
+
+  void Write(Record& record) const override {
+    if (series_.empty()) return;
+    const std::size_t all = series_[0].t.size();
+    WriteOpening(all, "series.", "series.t", record);
+    std::size_t shown = all;
+    while (!Shows(angles_, shown) || !Shows(shifts_, shown)) shown /= 2;
+    if (shown < all) WriteOpening(shown, "series.opening.", "series.opening_t", record);
+  }
+
+ private:
+  /// Returns true if the points kept of the first `samples` show them, on the group's common axis.
+  bool Shows(const std::vector<std::size_t>& group, std::size_t samples) const {
+    if (samples <= static_cast<std::size_t>(points_)) return true;
+    // a hundredth of the axis is four pixels of a figure
+    constexpr double kVisible = 0.01;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const std::size_t s : group) {
+      for (std::size_t i = 0; i < samples; ++i) {
+        low = std::min(low, series_[s].value[i]);
+        high = std::max(high, series_[s].value[i]);
+      }
+    }
+    return std::ranges::all_of(group, [&](std::size_t s) {
+      return LargestGap(series_[s], points_, samples) <= kVisible * (high - low);
+    });
+  }
+
+  void WriteOpening(std::size_t samples, const std::string& prefix, const std::string& time,
+                    Record& record) const {
+    for (std::size_t s = 0; s < series_.size(); ++s) {
+      const TimeSeries thin = Thin(series_[s], points_, samples);
+      if (s == 0) record.Set(time, thin.t);
+      record.Set(prefix + keys_[s], thin.value);
+    }
+  }
+
+  int points_;
+  std::vector<std::string> keys_;             ///< "angle.crank", as their series
+  std::vector<std::size_t> angles_, shifts_;  ///< which series are
+  std::vector<TimeSeries> series_;
+};
+
+/// Corrections and cost of projections (levels without drift): the largest violation of points [m],
+/// its series, and Newton steps. Writes nothing at other levels.
+template <class Space>
+class CorrectionObserver final : public Observer<Space> {
+ public:
+  void Observe(const Sample<Space>& sample) override {
+    if (TraitsOf(sample.formulation.options().enforcement).growth != DriftGrowth::kNone) return;
+    const Correction<double>& correction = sample.formulation.level().correction();
+    largest_ = std::max(largest_, correction.shift);
+    iterations_ += correction.iterations;
+    series_.Add(sample.t, correction.shift);
+  }
+
+  void Write(Record& record) const override {
+    if (series_.t.empty()) return;
+    record.Set("correction_max", largest_);
+    record.Set("projection_iterations", iterations_);
+  }
+
+  void Trace(Traces& traces) const override {
+    traces.correction = series_;
+    traces.projection_steps = iterations_;
+  }
+
+ private:
+  double largest_ = 0.0;
+  std::int64_t iterations_ = 0;
+  TimeSeries series_;
+};
+
+/// The largest angular frequency [rad/s] of prescribed motions and of forces that are harmonic in
+/// time; 0 without any. Tables have knots, at which steps end.
+double FastestDrive(const MechanismDescription& description) {
+  double fastest = 0.0;
+  const auto look = [&](const TimeFunctionDescription& value) {
+    const auto* harmonic = std::get_if<Harmonic>(&value);
+    if (harmonic == nullptr || harmonic->amplitude == 0.0) return;
+    fastest = std::max(fastest, std::abs(harmonic->omega));
+  };
+  for (const JointDescription& joint : description.joints) {
+    for (const PrescribedMotion& motion : joint.motions) look(motion.value);
+  }
+  for (ForceDescription force : description.forces) {
+    if (const TimeFunctionDescription* value = PartsOf(force).value) look(*value);
+  }
+  return fastest;
+}
+
+/// Lengths of accepted steps, and the fastest prescribed function of time: an error estimate does
+/// not detect events between the points of a step. The shortest step excludes those clipped by a
+/// stop time or the end.
+template <class Space>
+class StepLengthObserver final : public Observer<Space> {
+ public:
+  explicit StepLengthObserver(const Watched<Space>& run)
+      : stops_(run.stops.begin(), run.stops.end()), fastest_(FastestDrive(run.description)) {}
+
+  void Observe(const Sample<Space>& sample) override {
+    if (last_ > 0.0 && !std::ranges::binary_search(stops_, t_) &&
+        (shortest_ == 0.0 || last_ < shortest_)) {
+      shortest_ = last_;
+      shortest_t_ = t_;
+    }
+    last_ = sample.t - t_;
+    t_ = sample.t;
+    longest_ = std::max(longest_, last_);
+  }
+
+  void Write(Record& record) const override {
+    if (longest_ == 0.0) return;
+    record.Set("step_longest", longest_);
+    if (shortest_ > 0.0) {
+      record.Set("step_shortest", shortest_);
+      record.Set("step_shortest_t", shortest_t_);
+    }
+    if (fastest_ > 0.0) record.Set("drive_frequency", fastest_);
+  }
+
+ private:
+  std::vector<double> stops_;    ///< [s], rising
+  double fastest_;               ///< [rad/s]
+  double t_ = 0.0, last_ = 0.0;  ///< of the last step, which the end may have clipped
+  double longest_ = 0.0, shortest_ = 0.0, shortest_t_ = 0.0;
+};
+
 }  // namespace
 
 template <class Space>
-std::vector<double> ExactObserver<Space>::BranchAt(
-    const Kinematics<Space, double>& kinematics) const {
+std::vector<double> BranchAt(const ObservedQuantities& problem,
+                             const Kinematics<Space, double>& kinematics) {
   std::vector<double> branch;
-  for (const auto& combination : combinations_) {
-    double value = 0.0;
-    for (const auto& [body, factor] : combination) {
-      value += factor * AngleOf<Space>(kinematics.poses()[body]);
+  for (const AngleCombination& combination : problem.branch_invariants) {
+    double& value = branch.emplace_back(0.0);
+    for (const auto& [name, factor] : combination) {
+      value += factor * AngleOf(kinematics, BodyNamed(kinematics.mechanism(), name));
     }
-    branch.push_back(value);
   }
   return branch;
 }
 
 template <class Space>
-double ExactObserver<Space>::BodyAngle(const Sample<Space>& sample, int body) {
-  const double angle = AngleOf<Space>(sample.formulation.kinematics().poses()[body]);
-  if constexpr (Space::kRot == 1) {
-    return angle;
-  } else {
-    // continued from step to step
-    const double turn = 2 * std::numbers::pi;
-    last_angle_[body] += std::remainder(angle - last_angle_[body], turn);
-    return last_angle_[body];
+std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>& run,
+                                                            bool is_member) {
+  std::vector<std::unique_ptr<Observer<Space>>> all;
+  all.push_back(std::make_unique<DriftObserver<Space>>(run.mechanism,
+                                                       is_member ? nullptr : &run.description));
+  all.push_back(std::make_unique<EnergyObserver<Space>>(run));
+  if (!is_member) {
+    all.push_back(std::make_unique<ConditionObserver<Space>>());
+    all.push_back(std::make_unique<SingularityObserver<Space>>(run));
   }
+  all.push_back(std::make_unique<ExactObserver<Space>>(run));
+  if (is_member) return all;
+  all.push_back(std::make_unique<CoordinateObserver<Space>>(run.points));
+  all.push_back(std::make_unique<CorrectionObserver<Space>>());
+  all.push_back(std::make_unique<StepLengthObserver<Space>>(run));
+  for (const ObserverRow& row : RegisteredObservers()) all.push_back(row.Make(run));
+  return all;
 }
 
-template <class Space>
-void ExactObserver<Space>::Observe(const Sample<Space>& sample) {
-  double worst = 0.0;
-  for (std::size_t c = 0; c < combinations_.size(); ++c) {
-    double value = 0.0;
-    for (const auto& [body, factor] : combinations_[c]) value += factor * BodyAngle(sample, body);
-    if (!started_) first_.push_back(value);
-    worst = std::max(worst, std::abs(value - first_[c]));
-  }
-  branch_error_ = std::max(branch_error_, worst);
-  if (!combinations_.empty()) {
-    branch_.t.push_back(sample.t);
-    branch_.value.push_back(worst);
-  }
-  if (pendulum_body_ >= 0) {
-    const PendulumForm& form = *problem_.closed_form;
-    const double theta = BodyAngle(sample, pendulum_body_) - form.down_angle;
-    if (!started_) {
-      theta0_ = theta;
-      omega0_ = sample.formulation.kinematics().motions()[pendulum_body_][Space::kRot - 1];
-    }
-    // the closed form takes an angle within half a turn; whole turns go along unchanged
-    const double within = std::remainder(theta0_, 2 * std::numbers::pi);
-    const double exact =
-        theta0_ - within + PendulumAngle(form.frequency_squared, within, omega0_, sample.t);
-    closed_form_error_ = std::max(closed_form_error_, std::abs(theta - exact));
-  }
-  started_ = true;
-}
-
-template <class Space>
-void ExactObserver<Space>::Write(Record& record) const {
-  if (!started_) return;
-  if (!combinations_.empty()) {
-    record.Set("branch_error_max", branch_error_);
-    const TimeSeries thin = Thin(branch_, 200);
-    record.Set("series.branch_t", thin.t);
-    record.Set("series.branch", thin.value);
-  }
-  if (pendulum_body_ >= 0) record.Set("closed_form_error_max", closed_form_error_);
-}
-
-template class ExactObserver<Planar>;
-template class ExactObserver<Spatial>;
+#define LOOPBENCH_INSTANTIATE(Space)                                       \
+  template std::vector<double> BranchAt(const ObservedQuantities&,         \
+                                        const Kinematics<Space, double>&); \
+  template std::vector<std::unique_ptr<Observer<Space>>> MakeObservers(const Watched<Space>&, bool);
+LOOPBENCH_INSTANTIATE(Planar)
+LOOPBENCH_INSTANTIATE(Spatial)
+#undef LOOPBENCH_INSTANTIATE
 
 // With k^2 = sin^2(theta0/2) + omega0^2 / (4 w^2), w^2 = frequency_squared:
 //   swinging (k < 1)   sin(theta/2) = k sn(w t + a, k),     sin(theta0/2) = k sn(a, k)
@@ -347,219 +774,5 @@ double PendulumAngle(double frequency_squared, double theta0, double omega0, dou
   const double turns = std::round(x / (4 * boost::math::ellint_1(modulus)));
   return 2 * (std::atan2(sn, cn) + 2 * std::numbers::pi * turns);
 }
-
-template <class Space>
-void CoordinateObserver<Space>::Observe(const Sample<Space>& sample) {
-  const Kinematics<Space, double>& kinematics = sample.formulation.kinematics();
-  const auto& joints = kinematics.mechanism().joints();
-  constexpr std::size_t kMaxJoints = 1000;
-  if (joints.size() > kMaxJoints) return;
-  const bool first = series_.empty();
-  std::size_t s = 0;
-  for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
-    if (joints[j].description < 0 || joints[j].kind->num_u != 1) continue;
-    if (first) {
-      // motions have their rotations first; a helix is measured by its angle
-      const bool shifts = joints[j].kind->axes[0] >= Space::kRot;
-      keys_.push_back((shifts ? "displacement." : "angle.") +
-                      kinematics.mechanism().joint_names()[j]);
-      (shifts ? shifts_ : angles_).push_back(s);
-      series_.emplace_back();
-    }
-    series_[s].t.push_back(sample.t);
-    series_[s].value.push_back(kinematics.JointCoordinate(j));
-    ++s;
-  }
-}
-
-template <class Space>
-void CoordinateObserver<Space>::WriteOpening(std::size_t samples, const std::string& prefix,
-                                             const std::string& time, Record& record) const {
-  for (std::size_t s = 0; s < series_.size(); ++s) {
-    const TimeSeries thin = Thin(series_[s], points_, samples);
-    if (s == 0) record.Set(time, thin.t);
-    record.Set(prefix + keys_[s], thin.value);
-  }
-}
-
-template <class Space>
-bool CoordinateObserver<Space>::Shows(const std::vector<std::size_t>& group,
-                                      std::size_t samples) const {
-  if (samples <= static_cast<std::size_t>(points_)) return true;
-  // a hundredth of the axis is four pixels of a figure
-  constexpr double kVisible = 0.01;
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const std::size_t s : group) {
-    for (std::size_t i = 0; i < samples; ++i) {
-      low = std::min(low, series_[s].value[i]);
-      high = std::max(high, series_[s].value[i]);
-    }
-  }
-  return std::ranges::all_of(group, [&](std::size_t s) {
-    return LargestGap(series_[s], points_, samples) <= kVisible * (high - low);
-  });
-}
-
-template <class Space>
-void CoordinateObserver<Space>::Write(Record& record) const {
-  if (series_.empty()) return;
-  const std::size_t all = series_[0].t.size();
-  WriteOpening(all, "series.", "series.t", record);
-  std::size_t shown = all;
-  while (!Shows(angles_, shown) || !Shows(shifts_, shown)) shown /= 2;
-  if (shown < all) WriteOpening(shown, "series.opening.", "series.opening_t", record);
-}
-
-template class CoordinateObserver<Planar>;
-template class CoordinateObserver<Spatial>;
-
-namespace {
-
-/// Rows and speeds up to which every accepted step affords a dense decomposition (about 0.1 ms).
-constexpr int kMaxRows = 24, kMaxSpeeds = 64;
-
-/// Counts the zeros that a quantity passed of which only the size is seen, sample by sample.
-class Passages {
- public:
-  void Add(double t, double size) {
-    // at the position itself once, however long the run stays
-    if (size < kRankRatio) {
-      if (num_ == 0 || size_[num_ - 1] >= kRankRatio) ++count_;
-      num_ = 0;
-    } else if (num_ == 2 && t > t_[1]) {
-      const double a = (size_[1] - size_[0]) / (t_[1] - t_[0]), b = (size - size_[1]) / (t - t_[1]);
-      // slopes with the sign changed behind the first sample, or behind the second
-      const double a_turned = -(size_[1] + size_[0]) / (t_[1] - t_[0]);
-      const double b_turned = -(size + size_[1]) / (t - t_[1]);
-      const double bend = std::min(std::abs(-b - a_turned), std::abs(b_turned - a));
-      if (a <= 0.0 && b >= 0.0 && bend < std::abs(b - a)) ++count_;
-    }
-    if (num_ == 2) {
-      t_[0] = t_[1];
-      size_[0] = size_[1];
-      num_ = 1;
-    }
-    t_[num_] = t;
-    size_[num_++] = size;
-  }
-  /// The next value is of another quantity.
-  void Forget() { num_ = 0; }
-  std::int64_t count() const { return count_; }
-
- private:
-  std::array<double, 2> t_ = {}, size_ = {};
-  std::size_t num_ = 0;
-  std::int64_t count_ = 0;
-};
-
-}  // namespace
-
-template <class Space>
-struct SingularityObserver<Space>::Work {
-  Work(const MechanismDescription& description, const Mechanism<Space, double>& mechanism)
-      : view(description, mechanism, false) {}  // released rows gain rank as they drift
-
-  JointView<Space> view;
-  /// per singular value, the largest first: smallest ratio to the largest, and its time
-  std::vector<double> smallest, when;
-  int generic_rank = 0;
-  std::vector<Released> released;  ///< of the last sample
-  Passages passages;
-};
-
-template <class Space>
-SingularityObserver<Space>::SingularityObserver(const MechanismDescription& description,
-                                                const Mechanism<Space, double>& mechanism)
-    : work_(std::make_unique<Work>(description, mechanism)) {}
-
-template <class Space>
-SingularityObserver<Space>::~SingularityObserver() = default;
-
-template <class Space>
-void SingularityObserver<Space>::Observe(const Sample<Space>& sample) {
-  Work& work = *work_;
-  const int rows = work.view.mechanism().num_equations(), speeds = work.view.mechanism().num_u();
-  if (rows == 0 || rows > kMaxRows || speeds == 0 || speeds > kMaxSpeeds) return;
-  const LoopSpectrum now = SpectrumOfLoops(work.view.At(sample.formulation.kinematics()));
-  const std::size_t count = static_cast<std::size_t>(now.singular_values.size());
-  if (work.smallest.empty()) {
-    work.smallest.assign(count, 1.0);
-    work.when.assign(count, sample.t);
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const double ratio = now.singular_values[i] / now.largest;
-    if (ratio >= work.smallest[i]) continue;
-    work.smallest[i] = ratio;
-    work.when[i] = sample.t;
-  }
-  if (now.rank > work.generic_rank) work.passages = {};  // another quantity from here on
-  work.generic_rank = std::max(work.generic_rank, now.rank);
-  const std::vector<Released>& released = sample.formulation.kinematics().released();
-  if (work.released != released) {
-    work.passages.Forget();
-    work.released = released;
-  }
-  if (work.generic_rank == 0) return;
-  const auto last = static_cast<Eigen::Index>(work.generic_rank) - 1;
-  work.passages.Add(sample.t, now.singular_values[last] / now.largest);
-}
-
-template <class Space>
-void SingularityObserver<Space>::Write(Record& record) const {
-  if (work_->generic_rank == 0) return;
-  const std::size_t last = static_cast<std::size_t>(work_->generic_rank) - 1;
-  record.Set("singularity_distance_min", work_->smallest[last]);
-  record.Set("singularity_distance_min_t", work_->when[last]);
-  record.Set("singularity_crossings", work_->passages.count());
-}
-
-template class SingularityObserver<Planar>;
-template class SingularityObserver<Spatial>;
-
-double FastestDrive(const MechanismDescription& description) {
-  double fastest = 0.0;
-  const auto look = [&](const TimeFunctionDescription& value) {
-    const auto* harmonic = std::get_if<Harmonic>(&value);
-    if (harmonic == nullptr || harmonic->amplitude == 0.0) return;
-    fastest = std::max(fastest, std::abs(harmonic->omega));
-  };
-  for (const JointDescription& joint : description.joints) {
-    for (const PrescribedMotion& motion : joint.motions) look(motion.value);
-  }
-  for (ForceDescription force : description.forces) {
-    if (const TimeFunctionDescription* value = PartsOf(force).value) look(*value);
-  }
-  return fastest;
-}
-
-template <class Space>
-StepLengthObserver<Space>::StepLengthObserver(const Watched<Space>& run)
-    : stops_(run.stops.begin(), run.stops.end()), fastest_(FastestDrive(run.description)) {}
-
-template <class Space>
-void StepLengthObserver<Space>::Observe(const Sample<Space>& sample) {
-  if (last_ > 0.0 && !std::ranges::binary_search(stops_, t_) &&
-      (shortest_ == 0.0 || last_ < shortest_)) {
-    shortest_ = last_;
-    shortest_t_ = t_;
-  }
-  last_ = sample.t - t_;
-  t_ = sample.t;
-  longest_ = std::max(longest_, last_);
-}
-
-template <class Space>
-void StepLengthObserver<Space>::Write(Record& record) const {
-  if (longest_ == 0.0) return;
-  record.Set("step_longest", longest_);
-  if (shortest_ > 0.0) {
-    record.Set("step_shortest", shortest_);
-    record.Set("step_shortest_t", shortest_t_);
-  }
-  if (fastest_ > 0.0) record.Set("drive_frequency", fastest_);
-}
-
-template class StepLengthObserver<Planar>;
-template class StepLengthObserver<Spatial>;
 
 }  // namespace loopbench::harness

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <set>
+#include <span>
 #include <stdexcept>
 
 #include "harness/base/record.h"
@@ -17,18 +19,10 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-bool BelongsTo(const BodyImage& image, int part) {
+/// Returns true if a body or joint moves in a part (-1: in any).
+bool BelongsTo(const auto& image, int part) {
   return image.part >= 0 && (part < 0 || image.part == part);
 }
-
-}  // namespace
-
-bool IsLength(const MechanismDescription& user, std::size_t joint) {
-  const auto words = ValueWords(user.joints[joint].type, user.space, false);
-  return !words.empty() && words.front().is_length();
-}
-
-namespace {
 
 /// The angle of the rotation from one orientation to the other [rad], to the last digit for small
 /// ones: |R_a - R_b| = 2 sqrt(2) sin(angle / 2).
@@ -37,6 +31,11 @@ double AngleBetween(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
 }
 
 }  // namespace
+
+bool IsLength(const MechanismDescription& user, std::size_t joint) {
+  const auto words = ValueWords(user.joints[joint].type, user.space, false);
+  return !words.empty() && words.front().is_length();
+}
 
 std::vector<MeasuredPoint> PointsOf(const MechanismDescription& user) {
   std::vector<MeasuredPoint> points;
@@ -113,15 +112,12 @@ Distance DistanceOf(const Measured& measured, int part, const Snapshot& a, const
     shifts.emplace_back(shift, velocity);
   }
   for (std::size_t j = 0; j < a.joints.size(); ++j) {
-    const JointImage& image = measured.compiled.joints[j];
-    if (image.part < 0 || (part >= 0 && image.part != part) ||
-        std::isnan(a.joints[j] - b.joints[j]))
-      continue;
-    double& largest = IsLength(measured.user, j) ? distance.displacement : distance.angle;
     const double apart = a.joints[j] - b.joints[j];
-    largest = std::max(
-        largest,
-        std::abs(IsLength(measured.user, j) ? apart : std::remainder(apart, 2 * std::numbers::pi)));
+    if (!BelongsTo(measured.compiled.joints[j], part) || std::isnan(apart)) continue;
+    const bool is_length = IsLength(measured.user, j);
+    double& largest = is_length ? distance.displacement : distance.angle;
+    largest = std::max(largest,
+                       std::abs(is_length ? apart : std::remainder(apart, 2 * std::numbers::pi)));
   }
   double along = 0.0, speed = 0.0;
   for (const auto& [shift, velocity] : shifts) {
@@ -140,17 +136,14 @@ Distance DistanceOf(const Measured& measured, int part, const Snapshot& a, const
 
 Distance Larger(const Distance& a, const Distance& b) {
   const auto larger = [](double x, double y) { return std::isnan(x) || y > x ? y : x; };
-  return {.position = larger(a.position, b.position),
-          .rotation = larger(a.rotation, b.rotation),
-          .velocity = larger(a.velocity, b.velocity),
-          .angular_velocity = larger(a.angular_velocity, b.angular_velocity),
-          .angle = larger(a.angle, b.angle),
-          .displacement = larger(a.displacement, b.displacement),
-          .energy = larger(a.energy, b.energy),
-          .late = larger(std::abs(a.late), std::abs(b.late)),
-          .shape = larger(a.shape, b.shape),
-          .speed = larger(a.speed, b.speed)};
+  Distance both;
+  for (const auto& [name, part] : kDistances) both.*part = larger(a.*part, b.*part);
+  both.late = larger(std::abs(a.late), std::abs(b.late));
+  both.shape = larger(a.shape, b.shape);
+  both.speed = larger(a.speed, b.speed);
+  return both;
 }
+
 namespace {
 
 /// Version of the file and of its content, raised when either changes.
@@ -182,23 +175,30 @@ BodyState StateFrom(const double* numbers) {
   return state;
 }
 
-/// The bounds as series, by name.
-template <class Use>
-void ForEachBound(Use use) {
-  use("position", &Distance::position);
-  use("rotation", &Distance::rotation);
-  use("velocity", &Distance::velocity);
-  use("angular_velocity", &Distance::angular_velocity);
-  use("angle", &Distance::angle);
-  use("displacement", &Distance::displacement);
-  use("energy", &Distance::energy);
-}
-
 std::string BodyKey(const MechanismDescription& user, std::size_t i) {
   return "series.body." + user.bodies[i].name;
 }
+
 std::string JointKey(const MechanismDescription& user, std::size_t j) {
   return "series.joint." + user.joints[j].name;
+}
+
+/// Returns the record that `read` finds in the text of a file. Throws std::runtime_error, whose
+/// text ends with `cure`, for damaged and foreign files.
+Record RecordIn(const std::function<std::string()>& read, const std::filesystem::path& file,
+                const std::string& id, const char* cure) {
+  std::string fault;
+  try {
+    std::string text = read();
+    while (text.ends_with('\n')) text.pop_back();
+    const Record record = FromJsonLine(text);
+    const std::string found = record.Text("reference");
+    if (!found.empty() && found == id) return record;
+    fault = fmt::format("found reference \"{}\", expected \"{}\"", found, id);
+  } catch (const std::runtime_error& error) {
+    fault = error.what();
+  }
+  throw std::runtime_error(fmt::format("{}: {}{}", file.string(), fault, cure));
 }
 
 }  // namespace
@@ -238,23 +238,18 @@ void WriteReference(const std::filesystem::path& path, const std::string& id,
   record.Set("cpu_s", reference.cpu_s);
   record.Set("rhs_evaluations", reference.rhs_evaluations);
   record.Set("series.t", reference.times);
-  ForEachBound([&](const char* name, double Distance::*bound) {
-    std::vector<double> values;
-    for (const Distance& at : reference.bounds) values.push_back(at.*bound);
-    record.Set(std::string("series.bound.") + name, std::move(values));
-  });
-  std::vector<double> energy;
-  for (const Snapshot& at : reference.snapshots) energy.push_back(at.energy);
-  record.Set("series.energy", std::move(energy));
+  for (const auto& [name, bound] : kDistances) {
+    record.Set(std::string("series.bound.") + name, Mapped<double>(reference.bounds, bound));
+  }
+  record.Set("series.energy", Mapped<double>(reference.snapshots, &Snapshot::energy));
   for (std::size_t i = 1; i < user.bodies.size(); ++i) {
     std::vector<double> numbers;
     for (const Snapshot& at : reference.snapshots) Push(at.bodies[i], &numbers);
     record.Set(BodyKey(user, i), std::move(numbers));
   }
   for (std::size_t j = 0; j < user.joints.size(); ++j) {
-    std::vector<double> numbers;
-    for (const Snapshot& at : reference.snapshots) numbers.push_back(at.joints[j]);
-    record.Set(JointKey(user, j), std::move(numbers));
+    record.Set(JointKey(user, j), Mapped<double>(reference.snapshots,
+                                                 [j](const Snapshot& at) { return at.joints[j]; }));
   }
   WriteFileAtomically(path, ToJsonLine(record) + "\n");
 }
@@ -262,21 +257,8 @@ void WriteReference(const std::filesystem::path& path, const std::string& id,
 std::optional<Reference> ReadReference(const std::filesystem::path& path, const std::string& id,
                                        const MechanismDescription& user) {
   if (!std::filesystem::exists(path)) return std::nullopt;
-  const auto refuse = [&](const std::string& why) {
-    throw std::runtime_error(
-        fmt::format("{}: {} (remove it: it is computed again)", path.string(), why));
-  };
-  Record record;
-  try {
-    std::string text = ReadFile(path);
-    while (text.ends_with('\n')) text.pop_back();
-    record = FromJsonLine(text);
-  } catch (const std::runtime_error& error) {
-    refuse(error.what());
-  }
-  if (record.Text("reference") != id) {
-    refuse(fmt::format("found reference \"{}\", expected \"{}\"", record.Text("reference"), id));
-  }
+  constexpr const char* kCure = " (remove it: it is computed again)";
+  const Record record = RecordIn([&] { return ReadFile(path); }, path, id, kCure);
   Reference reference;
   reference.outcome = record.Text("outcome");
   reference.message = record.Text("message");
@@ -292,8 +274,9 @@ std::optional<Reference> ReadReference(const std::filesystem::path& path, const 
                           std::size_t stride) -> const std::vector<double>& {
     const std::vector<double>& numbers = record.Numbers(key);
     if (numbers.size() != count * stride || count > reference.times.size()) {
-      refuse(fmt::format("found {} numbers in \"{}\", expected {}", numbers.size(), key,
-                         count * stride));
+      throw std::runtime_error(fmt::format("{}: found {} numbers in \"{}\", expected {}{}",
+                                           path.string(), numbers.size(), key, count * stride,
+                                           kCure));
     }
     return numbers;
   };
@@ -301,10 +284,10 @@ std::optional<Reference> ReadReference(const std::filesystem::path& path, const 
                        .joints = std::vector<double>(user.joints.size())};
   reference.snapshots.assign(count, empty);
   reference.bounds.resize(count);
-  ForEachBound([&](const char* name, double Distance::*bound) {
+  for (const auto& [name, bound] : kDistances) {
     const std::vector<double>& values = column(std::string("series.bound.") + name, 1);
     for (std::size_t k = 0; k < count; ++k) reference.bounds[k].*bound = values[k];
-  });
+  }
   for (std::size_t k = 0; k < count; ++k) reference.snapshots[k].energy = energy[k];
   for (std::size_t i = 1; i < user.bodies.size(); ++i) {
     const std::vector<double>& numbers = column(BodyKey(user, i), kStride);
@@ -324,26 +307,9 @@ namespace fs = std::filesystem;
 
 struct Known {
   fs::path file;
-  std::string text;
-  Record record;
+  std::string text = ReadFile(file);
+  Record record = RecordIn([this] { return text; }, file, file.stem().string(), "");
 };
-
-Known ReadOne(const fs::path& file) {
-  Known known{file, ReadFile(file), {}};
-  std::string line = known.text;
-  while (line.ends_with('\n')) line.pop_back();
-  try {
-    known.record = FromJsonLine(line);
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("{}: {}", file.string(), error.what()));
-  }
-  const std::string id = known.record.Text("reference");
-  if (id.empty() || id != file.stem().string()) {
-    throw std::runtime_error(fmt::format("{}: found reference \"{}\", expected \"{}\"",
-                                         file.string(), id, file.stem().string()));
-  }
-  return known;
-}
 
 /// Returns the record as a line, without keys that may differ between computations.
 std::string Lasting(const Record& record) {
@@ -389,7 +355,7 @@ MergedReferences MergeReferences(const std::vector<fs::path>& store_files) {
       if (entry.path().extension() == ".json") files.insert(entry.path());
     }
     for (const fs::path& file : files) {
-      Known fresh = ReadOne(file);
+      Known fresh{file};
       const auto [at, is_new] = all.try_emplace(file.filename().string(), fresh);
       if (is_new || Lasting(at->second.record) == Lasting(fresh.record)) continue;
       if (IsFiner(fresh.record, at->second.record)) std::swap(at->second, fresh);
@@ -408,6 +374,246 @@ void WriteReferences(const MergedReferences& references, const fs::path& store_f
     file.Write(text);
     file.Finish();
   }
+}
+
+namespace {
+
+class ErrorMeter final : public Meter {
+ public:
+  ErrorMeter(const Measured& measured, int part, const Reference& reference)
+      : measured_(measured),
+        part_(part),
+        reference_(reference),
+        times_(reference.times.begin(),
+               reference.times.begin() + static_cast<std::ptrdiff_t>(reference.NumTrusted())) {}
+
+  const std::vector<double>& times() const override { return times_; }
+
+  void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override {
+    if (k >= times_.size()) return;
+    if (at_.empty()) first_energy_ = own.energy;
+    Distance distance = DistanceOf(measured_, part_, own, reference_.snapshots[k]);
+    distance.energy = std::abs(own.energy - first_energy_ - reference_.snapshots[k].energy +
+                               reference_.snapshots.front().energy);
+    // a run of one subsystem has only its own energy
+    if (measured_.compiled.parts.size() > 1 || k == 0 || at_.empty()) {
+      distance.energy = k == 0 ? 0.0 : std::nan("");
+    }
+    at_.push_back(k);
+    distances_.push_back(distance);
+    interpolation_ = std::max(interpolation_, DistanceOf(measured_, part_, own, lower).position);
+  }
+
+  void Write(Record& record) const override {
+    if (at_.empty()) return;
+    Distance largest;
+    double squares = 0.0;
+    std::vector<double> t, error;
+    for (std::size_t i = 0; i < at_.size(); ++i) {
+      largest = Larger(largest, distances_[i]);
+      squares += distances_[i].position * distances_[i].position;
+      t.push_back(times_[at_[i]]);
+      error.push_back(distances_[i].position);
+    }
+    // time shift is undefined if nearly everything is at rest
+    constexpr double kMoves = 0.01;
+    double late = 0.0, shape = 0.0;
+    for (const Distance& distance : distances_) {
+      const bool moves = distance.speed > kMoves * largest.speed;
+      if (moves) late = std::max(late, std::abs(distance.late));
+      // a shift of zero is permitted, so the path error is at most the distance
+      shape =
+          std::max(shape, moves ? std::min(distance.shape, distance.position) : distance.position);
+    }
+    if (times_[at_.back()] == reference_.times.back()) {
+      record.Set("error_position_end", error.back());
+    }
+    record.Set("error_position_max", largest.position);
+    record.Set("error_position_rms", std::sqrt(squares / static_cast<double>(at_.size())));
+    for (const auto& [name, part] : std::span(kDistances).subspan(1)) {
+      if (part == &Distance::energy && measured_.compiled.parts.size() != 1) continue;
+      record.Set(fmt::format("error_{}_max", name), largest.*part);
+    }
+    record.Set("error_phase_max", late);
+    record.Set("error_path_max", shape);
+    record.Set("error_interpolation_max", interpolation_);
+    record.Set("error_points", static_cast<std::int64_t>(at_.size()));
+    record.Set("series.error_t", std::move(t));
+    record.Set("series.error", std::move(error));
+  }
+
+ private:
+  Measured measured_;
+  int part_;
+  const Reference& reference_;
+  std::vector<double> times_;
+  std::vector<std::size_t> at_;  ///< which of them were added
+  std::vector<Distance> distances_;
+  double first_energy_ = 0.0, interpolation_ = 0.0;
+};
+
+constexpr const char* kPosition = "position";
+
+/// The middle of the keys that a quantity's error and accuracy have: error_*_max.
+std::string MeasureOf(const MechanismDescription& user, const PublishedQuantity& quantity) {
+  const bool speed = quantity.is_speed;
+  if (quantity.kind == PublishedKind::kPoint) return speed ? "velocity" : kPosition;
+  if (quantity.kind == PublishedKind::kAngle) return speed ? "angular_velocity" : "rotation";
+  const std::string measure = IsLength(user, quantity.index) ? "displacement" : "angle";
+  return speed ? measure + "_rate" : measure;
+}
+
+bool IsAngle(const MechanismDescription& user, const PublishedQuantity& quantity) {
+  if (quantity.is_speed || quantity.kind == PublishedKind::kPoint) return false;
+  return quantity.kind == PublishedKind::kAngle || !IsLength(user, quantity.index);
+}
+
+/// Returns the maximum of each measure over the quantities, without NaN. The error of a point is
+/// the root of the squares over its axes.
+template <class ValueOf>
+std::map<std::string, double> LargestOf(const MechanismDescription& user,
+                                        const PublishedSeries& series, ValueOf value_of) {
+  std::map<std::string, double> largest;
+  // body, point and speed: the axes of one
+  std::map<std::pair<std::string, std::pair<std::string, bool>>, double> squares;
+  for (const PublishedQuantity& quantity : series.quantities) {
+    double value = value_of(quantity);
+    if (std::isnan(value)) continue;
+    if (quantity.kind == PublishedKind::kPoint) {
+      double& sum = squares[{quantity.body, {quantity.point, quantity.is_speed}}];
+      sum += value * value;
+      value = std::sqrt(sum);
+    }
+    double& known = largest.try_emplace(MeasureOf(user, quantity), 0.0).first->second;
+    known = std::max(known, value);
+  }
+  return largest;
+}
+
+class SeriesMeter final : public Meter {
+ public:
+  SeriesMeter(const Measured& measured, int part, const PublishedSeries& series, double horizon)
+      : measured_(measured),
+        part_(part),
+        series_(series),
+        horizon_(horizon),
+        times_(series.times.begin(),
+               series.times.begin() + static_cast<std::ptrdiff_t>(series.NumWithin(horizon))) {}
+
+  const std::vector<double>& times() const override { return times_; }
+
+  void Add(std::size_t k, const Snapshot& own, const Snapshot& lower) override {
+    if (k >= times_.size()) return;
+    const auto errors = LargestOf(measured_.user, series_, [&](const PublishedQuantity& quantity) {
+      const double difference = Difference(quantity, k, own);
+      if (difference > over_accuracy_ * quantity.accuracy) {
+        over_accuracy_ = difference / quantity.accuracy;
+      }
+      return difference;
+    });
+    if (errors.empty()) return;  // all of it belongs to other parts
+    ++points_;
+    interpolation_ = std::max(interpolation_, DistanceOf(measured_, part_, own, lower).position);
+    for (const auto& [measure, error] : errors) {
+      double& known = largest_.try_emplace(measure, 0.0).first->second;
+      known = std::max(known, error);
+      if (measure != kPosition) continue;
+      at_.push_back(times_[k]);
+      positions_.push_back(error);
+    }
+  }
+
+  void Write(Record& record) const override {
+    if (points_ == 0) return;
+    for (const auto& [measure, error] : largest_) record.Set("error_" + measure + "_max", error);
+    record.Set("error_over_uncertainty", over_accuracy_);
+    record.Set("error_interpolation_max", interpolation_);
+    record.Set("error_points", points_);
+    if (positions_.empty()) return;
+    double squares = 0.0;
+    for (const double error : positions_) squares += error * error;
+    record.Set("error_position_rms", std::sqrt(squares / static_cast<double>(positions_.size())));
+    if (at_.back() == horizon_) record.Set("error_position_end", positions_.back());
+    record.Set("series.error_t", at_);
+    record.Set("series.error", positions_);
+  }
+
+ private:
+  /// NaN where the part does not have it.
+  double Difference(const PublishedQuantity& quantity, std::size_t k, const Snapshot& own) const {
+    const double published = quantity.values[k];
+    if (quantity.kind == PublishedKind::kJoint) {
+      if (measured_.compiled.joints[quantity.index].part != part_) return std::nan("");
+      const double value =
+          quantity.is_speed ? own.rates[quantity.index] : own.joints[quantity.index];
+      const double apart = value - published;
+      return std::abs(
+          IsAngle(measured_.user, quantity) ? std::remainder(apart, 2 * std::numbers::pi) : apart);
+    }
+    if (measured_.compiled.bodies[quantity.index].part != part_) return std::nan("");
+    const BodyState& body = own.bodies[quantity.index];
+    if (quantity.kind == PublishedKind::kAngle) {
+      if (quantity.is_speed) return std::abs(body.angular_velocity.z() - published);
+      const double angle = std::atan2(body.pose.R(1, 0), body.pose.R(0, 0));
+      return std::abs(std::remainder(angle - published, 2 * std::numbers::pi));
+    }
+    const Eigen::Vector3d arm = body.pose.R * quantity.at;
+    const Eigen::Vector3d vector =
+        quantity.is_speed ? Eigen::Vector3d(body.velocity + body.angular_velocity.cross(arm))
+                          : Eigen::Vector3d(body.pose.p + arm);
+    return std::abs(vector[quantity.along] - published);
+  }
+
+  Measured measured_;
+  int part_;
+  const PublishedSeries& series_;
+  double horizon_;
+  std::vector<double> times_;
+  std::map<std::string, double> largest_;  ///< by key of the record
+  std::vector<double> at_, positions_;     ///< times and errors of points there
+  double over_accuracy_ = 0.0, interpolation_ = 0.0;
+  std::int64_t points_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Meter> MakeMeter(const Measured& measured, int part, const Reference& reference) {
+  return std::make_unique<ErrorMeter>(measured, part, reference);
+}
+
+std::unique_ptr<Meter> MakeMeter(const Measured& measured, int part, const PublishedSeries& series,
+                                 double horizon) {
+  return std::make_unique<SeriesMeter>(measured, part, series, horizon);
+}
+
+void WriteCertificate(const Reference& reference, Record& record) {
+  record.Set("reference",
+             reference.snapshots.empty()
+                 ? fmt::format("none: {}",
+                               reference.message.empty() ? reference.outcome : reference.message)
+                 : reference.scalar);
+  if (reference.snapshots.empty()) return;
+  record.Set("reference_runs", reference.witnesses);
+  record.Set("reference_error", reference.Certified().position);
+  record.Set("reference_valid_until", reference.trust_horizon);
+}
+
+void WriteCertificate(const MechanismDescription& user, const PublishedSeries& series,
+                      double horizon, Record& record) {
+  const std::size_t count = series.NumWithin(horizon);
+  if (count == 0) {
+    record.Set("reference", fmt::format("none: \"{}\" begins at {} s, behind the horizon",
+                                        series.name, series.times.front()));
+    return;
+  }
+  record.Set("reference", std::string(kPublished));
+  record.Set("reference_runs", fmt::format("{}: {}", series.name, series.source));
+  const auto accuracies =
+      LargestOf(user, series, [](const PublishedQuantity& quantity) { return quantity.accuracy; });
+  for (const auto& [measure, accuracy] : accuracies) {
+    record.Set(measure == kPosition ? "reference_error" : "reference_error_" + measure, accuracy);
+  }
+  record.Set("reference_valid_until", series.times[count - 1]);
 }
 
 }  // namespace loopbench::harness

@@ -62,8 +62,9 @@ class AtRestSearch {
     if (!statics.why.empty()) return statics;
     OutputOptions output;
     output.quantities = {OutputPart::kReactions};
-    statics.columns = TrajectoryColumns(held_, output);
-    MakeRowWriter(held_, output)->Write(sample_, &statics.values);
+    const auto row = MakeRowWriter(held_, output);
+    statics.columns = row->columns();
+    row->Write(sample_, &statics.values);
     for (std::size_t j = 0; j < held_.joints.size(); ++j) {
       const auto words = ValueWords(held_.joints[j].type, held_.space, false);
       const std::size_t given = description.joints[j].motions.size();

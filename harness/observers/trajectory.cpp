@@ -28,31 +28,38 @@ constexpr std::size_t kBuffer = 1 << 20;
 constexpr const char* kPart = ".part";
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Returns the next cell of a line from `*at` and moves `*at` after its comma; past the line at the
-/// end. Returns nothing for an unclosed quotation mark, or one followed by other text.
-std::optional<std::string_view> NextCell(std::string_view line, std::size_t* at,
-                                         std::string* room) {
-  if (*at >= line.size() || line[*at] != '"') {
-    const std::size_t end = std::min(line.find(',', *at), line.size());
-    const std::string_view cell = line.substr(*at, end - *at);
-    *at = end + 1;
-    return cell;
-  }
-  room->clear();
-  for (std::size_t i = *at + 1; i < line.size(); ++i) {
-    if (line[i] == '"') {
-      const bool is_doubled = i + 1 < line.size() && line[i + 1] == '"';
-      if (!is_doubled) {
-        if (i + 1 < line.size() && line[i + 1] != ',') return std::nullopt;
-        *at = i + 2;
-        return *room;
-      }
-      ++i;
+/// The cells of a line.
+class Cells {
+ public:
+  explicit Cells(std::string_view line) : line_(line) {}
+
+  bool AtEnd() const { return at_ > line_.size(); }
+  /// Returns the next cell; nothing for an unclosed quotation mark, or one followed by other text.
+  std::optional<std::string_view> Next() {
+    if (at_ >= line_.size() || line_[at_] != '"') {
+      const std::size_t end = std::min(line_.find(',', at_), line_.size());
+      const std::string_view cell = line_.substr(at_, end - at_);
+      at_ = end + 1;
+      return cell;
     }
-    *room += line[i];
+    room_.clear();
+    for (std::size_t i = at_ + 1; i < line_.size(); ++i) {
+      if (line_[i] == '"' && !line_.substr(i + 1).starts_with('"')) {
+        if (i + 1 < line_.size() && line_[i + 1] != ',') return std::nullopt;
+        at_ = i + 2;
+        return room_;
+      }
+      if (line_[i] == '"') ++i;  // a doubled one
+      room_ += line_[i];
+    }
+    return std::nullopt;
   }
-  return std::nullopt;
-}
+
+ private:
+  std::string_view line_;
+  std::size_t at_ = 0;
+  std::string room_;
+};
 
 std::string_view Trimmed(std::string_view cell) {
   while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
@@ -86,10 +93,9 @@ TrajectoryReader::TrajectoryReader(const std::filesystem::path& path) : path_(pa
   if (!NextLine())
     Refuse("no line of labels", "labels such as \"t [s]\" and \"joint:A:angle [rad]\"");
   std::set<std::string> seen;
-  std::string room;
   bool has_time = false;
-  for (std::size_t at = 0; at <= line_.size();) {
-    const auto cell = NextCell(line_, &at, &room);
+  for (Cells cells(line_); !cells.AtEnd();) {
+    const auto cell = cells.Next();
     if (!cell) Refuse("a quotation mark without its end", "labels, quoted by RFC 4180");
     const std::string label(Trimmed(*cell));
     if (!seen.insert(label).second)
@@ -122,9 +128,8 @@ bool TrajectoryReader::Next(std::vector<double>* row) {
     return false;
   }
   row->clear();
-  std::string room;
-  for (std::size_t at = 0; at <= line_.size();) {
-    const auto cell = NextCell(line_, &at, &room);
+  for (Cells cells(line_); !cells.AtEnd();) {
+    const auto cell = cells.Next();
     const auto value = cell ? NumberIn(*cell) : std::nullopt;
     if (!value) {
       Refuse(fmt::format("\"{}\" in column {}", Excerpt(cell.value_or("\"")), row->size() + 1),
@@ -148,9 +153,9 @@ void TrajectoryReader::RequireNumbers(const std::vector<double>& row,
                                       std::span<const std::size_t> columns) const {
   for (const std::size_t i : columns) {
     if (std::isfinite(row[i])) continue;
-    std::string room, cell;
-    std::size_t at = 0;
-    for (std::size_t k = 0; k <= i; ++k) cell = NextCell(line_, &at, &room).value_or("");
+    Cells cells(line_);
+    std::string cell;
+    for (std::size_t k = 0; k <= i; ++k) cell = cells.Next().value_or("");
     const std::string found = Trimmed(cell).empty() ? "an empty cell" : fmt::format("{}", row[i]);
     const std::string label = Excerpt(columns_[i].Label());
     Refuse(fmt::format("{} in \"{}\" at t = {}", found, label, row[time_]), "a finite number");
@@ -164,21 +169,21 @@ void TrajectoryReader::Refuse(const std::string& found, const std::string& expec
 
 Trajectory ReadTrajectory(const std::filesystem::path& path) {
   TrajectoryReader reader(path);
-  Trajectory trajectory{reader.columns(), reader.notes(), {}, reader.time()};
+  Trajectory trajectory{reader.columns(), {}, reader.time()};
   for (std::vector<double> row; reader.Next(&row);) {
     trajectory.values.insert(trajectory.values.end(), row.begin(), row.end());
   }
   return trajectory;
 }
 
-std::optional<std::size_t> Trajectory::Find(std::string_view kind, std::string_view name,
-                                            std::string_view component, bool is_label) const {
-  const std::string wanted = is_label ? std::string(name) : LabelName(name);
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    const TrajectoryColumn& column = columns[i];
-    if (column.kind == kind && column.name == wanted && column.component == component) return i;
-  }
-  return std::nullopt;
+std::optional<std::size_t> FindColumn(const std::vector<TrajectoryColumn>& columns,
+                                      std::string_view kind, std::string_view name,
+                                      std::string_view component) {
+  const auto at = std::ranges::find_if(columns, [&](const TrajectoryColumn& column) {
+    return column.kind == kind && column.name == name && column.component == component;
+  });
+  if (at == columns.end()) return std::nullopt;
+  return static_cast<std::size_t>(at - columns.begin());
 }
 
 Frame PoseColumns::At(const double* row) const {
@@ -198,20 +203,15 @@ Frame PoseColumns::At(const double* row) const {
 std::optional<PoseColumns> FindPose(const std::vector<TrajectoryColumn>& columns,
                                     std::string_view body) {
   const std::string name = LabelName(body);
-  const auto all = [&](const std::vector<const char*>& components) {
-    std::vector<std::size_t> found;
-    for (const char* component : components) {
-      for (std::size_t i = 0; i < columns.size(); ++i) {
-        const TrajectoryColumn& column = columns[i];
-        if (column.kind != "body" || column.name != name || column.component != component) continue;
-        found.push_back(i);
-      }
+  for (const bool planar : {true, false}) {
+    const std::vector<const char*> parts = planar
+                                               ? std::vector{"x", "y", "angle"}
+                                               : std::vector{"x", "y", "z", "qw", "qx", "qy", "qz"};
+    PoseColumns pose{{}, planar};
+    for (const char* part : parts) {
+      if (const auto at = FindColumn(columns, "body", name, part)) pose.columns.push_back(*at);
     }
-    return found.size() == components.size() ? found : std::vector<std::size_t>();
-  };
-  if (auto found = all({"x", "y", "angle"}); !found.empty()) return PoseColumns{found, true};
-  if (auto found = all({"x", "y", "z", "qw", "qx", "qy", "qz"}); !found.empty()) {
-    return PoseColumns{found, false};
+    if (pose.columns.size() == parts.size()) return pose;
   }
   return std::nullopt;
 }
@@ -432,13 +432,8 @@ void Recorder<Space>::Take(double t, const System<Space, double>& system, bool h
   }
   lower_.reset();
   rows_->Write(moment_, &row_);
-  if (!file_) Open();
+  if (!file_) file_.emplace(task_.path, rows_->columns(), Notes());
   file_->Write(row_);
-}
-
-template <class Space>
-void Recorder<Space>::Open() {
-  file_.emplace(task_.path, TrajectoryColumns(user_, task_.output), Notes());
 }
 
 template <class Space>
@@ -464,7 +459,7 @@ std::vector<std::string> Recorder<Space>::Notes() const {
 
 template <class Space>
 void Recorder<Space>::Finish(Record& record) {
-  if (!file_) Open();
+  if (!file_) file_.emplace(task_.path, rows_->columns(), Notes());
   const std::int64_t rows = file_->rows();
   // columns without a value in equally many rows share a line
   std::vector<std::string> notes;

@@ -26,16 +26,11 @@
 
 namespace loopbench::harness {
 
-// The motion of the user's bodies and joints, and the reactions in them.
-
-// Poses and motions of the user's bodies, however the mechanism was compiled.
-
 /// Motion in the user's ground axes, at the body's origin; accelerations are of material points.
 struct BodyMotion {
   Frame pose;
-  double angle = 0.0;                                  ///< of planar problems, with full turns
-                                                       ///< [rad]
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
+  double angle = 0.0;  ///< of planar problems, with full turns [rad]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();              ///< [m/s]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Vector3d acceleration = Eigen::Vector3d::Zero();          ///< [m/s^2]
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< [rad/s^2]
@@ -62,12 +57,6 @@ void EnterPart(const Compiled& compiled, int part, const Kinematics<Space, doubl
                std::span<const Acceleration<Space, double>> accelerations,
                std::vector<BodyMotion>* bodies);
 
-// The user's original mechanism, with nothing compiled away, at given body motions.
-//
-// Joint values, forces and energies of a trajectory are computed here from body motions alone. The
-// same functions serve Loopbench runs, however they were compiled and integrated, and body motions
-// from other programs.
-
 /// Largest constraint violation of one joint.
 struct JointMismatch {
   double shift = 0.0;             ///< [m]
@@ -76,6 +65,9 @@ struct JointMismatch {
   double angular_velocity = 0.0;  ///< [rad/s]
 };
 
+/// The user's original mechanism, with nothing compiled away, at given body motions. Joint values,
+/// forces and energies of a trajectory are computed from body motions alone: of Loopbench runs,
+/// however they were compiled and integrated, and of other programs.
 template <class Space>
 class UserMechanism {
  public:
@@ -106,58 +98,6 @@ class UserMechanism {
   std::vector<Eigen::Vector3d> com_;
   VectorX<double> q_, u_;
 };
-
-// Joint reactions: forces and moments that hold the user's bodies together.
-//
-// Each body needs the wrench w = M A + c - f_applied, which follows from all body accelerations.
-// The joints must supply it. The wrench of a joint is D lambda on its second body, at its point Mo,
-// and the opposite on the first:
-//
-//   sum over joints of S(r) D lambda = w        body by body                                (*)
-//
-// This needs no multipliers of a formulation. O-DCA, the Lagrange equations and reduction solve the
-// same equations in fewer unknowns, and agree to the accuracy of their accelerations. It holds for
-// all joints of the user: also between merged bodies, and out of the plane of a problem simplified
-// to planar.
-//
-// Couplings add a column each, their efforts over the coefficients; they are not part of a joint's
-// reaction. All joints are then one part. Bodies with one joint left are solved in turn from the
-// leaves inwards. The remaining loops are solved part by part: by sparse QR for many unknowns, by
-// dense QR with pivoting for few or dependent ones. Rigid bodies do not determine how redundant
-// constraints share a load. A reaction component is known if no solution of (*) with w = 0 changes
-// it, else NaN. Positions with a relative violation e leave directions free in which (*) holds to
-// less than 10 e.
-
-template <class Space>
-class Reactions {
- public:
-  /// `user` must outlive it.
-  explicit Reactions(const UserMechanism<Space>& user);
-  ~Reactions();
-
-  /// Solves at the present state of the mechanism. `A`: accelerations of the centres of mass by
-  /// body; `applied`: all other forces there.
-  void Solve(std::span<const Acceleration<Space, double>> A,
-             std::span<const Wrench<Space, double>> applied);
-
-  /// Returns the wrench on the joint's second body at the joint's point: [moment; force] along the
-  /// columns of `axes`, in ground axes. Excludes drives; NaN if not unique.
-  Wrench<Space, double> Of(int joint, const Rotation<Space, double>& axes) const;
-
-  /// Returns the effort of a prescribed motion along its coordinate: its power is effort times
-  /// speed [N m or N]. NaN if not unique.
-  double DriveOf(int joint, int coordinate) const;
-
-  /// Returns the effort of a coupling along the coordinate of one of its joints, as above.
-  double CouplingOf(int coupling, int part) const;
-
- private:
-  struct Work;
-  std::unique_ptr<Work> work_;
-};
-
-// Trajectories as files of a run: columns, reader, writer, their places in a store, and the
-// recorder of a run.
 
 // Columns of a trajectory: names, units and order.
 //
@@ -190,16 +130,6 @@ std::string LabelName(std::string_view name);
 /// Parses a label; returns nothing if it is invalid.
 std::optional<TrajectoryColumn> ParseLabel(std::string_view label);
 
-/// Returns all columns of a mechanism, "t [s]" first.
-std::vector<TrajectoryColumn> TrajectoryColumns(const MechanismDescription& user,
-                                                const OutputOptions& output);
-
-/// Return the columns of a joint (coordinates, then speeds) or a body (pose, then speeds).
-std::vector<TrajectoryColumn> JointColumns(const MechanismDescription& user, std::size_t joint);
-std::vector<TrajectoryColumn> BodyColumns(const MechanismDescription& user, std::size_t body);
-
-// One row of a trajectory: all quantities of the user's mechanism at one time.
-
 /// State of a mechanism at one time of a run.
 struct RunSample {
   double t = 0.0;
@@ -212,8 +142,10 @@ struct RunSample {
 class RowWriter {
  public:
   virtual ~RowWriter() = default;
-  /// Writes the quantities of TrajectoryColumns(), in their order. Spatial angles and signs of
-  /// quaternions are continuous: closest to the last row, or to a followed coordinate.
+  /// All columns of the mechanism and the output's parts, "t [s]" first.
+  virtual const std::vector<TrajectoryColumn>& columns() const = 0;
+  /// Writes the values of the columns. Spatial angles and signs of quaternions are continuous:
+  /// closest to the last row, or to a followed coordinate.
   virtual void Write(const RunSample& moment, std::vector<double>* row) = 0;
   /// Returns labels of reactions and drives that were not unique so far, with the number of rows.
   virtual std::vector<std::pair<std::string, std::int64_t>> Open() const = 0;
@@ -223,15 +155,10 @@ class RowWriter {
 std::unique_ptr<RowWriter> MakeRowWriter(const MechanismDescription& user,
                                          const OutputOptions& output);
 
-// A trajectory file: columns of numbers over time.
-//
-// The file is CSV: lines that begin with "#" are notes, followed by a line of labels (above)
-// and a line per time. An unknown number is nan or an empty cell. The writer of a run uses all
-// requested columns. The reader also accepts files of other programs with any subset of these
-// labels, in any order.
-
-/// Reads a file of any length row by row. Throws std::runtime_error with file, line, found and
-/// expected text.
+/// Reads a trajectory file of any length row by row: CSV, in which lines that begin with "#" are
+/// notes, followed by a line of labels (above) and a line per time. An unknown number is nan or an
+/// empty cell. Files of other programs may have any subset of the labels, in any order. Throws
+/// std::runtime_error with file, line, found and expected text.
 class TrajectoryReader {
  public:
   /// Reads the labels, which must be unique and contain "t [s]". An unknown label becomes a column
@@ -267,7 +194,6 @@ class TrajectoryReader {
 /// All rows of a file.
 struct Trajectory {
   std::vector<TrajectoryColumn> columns;
-  std::vector<std::string> notes;
   std::vector<double> values;  ///< row after row
   std::size_t time = 0;        ///< column of t
 
@@ -275,12 +201,15 @@ struct Trajectory {
   double At(std::size_t row, std::size_t column) const {
     return values[row * columns.size() + column];
   }
-  /// Returns the column of `name` as written in the mechanism. With `is_label`, the name of a point
-  /// is LabelName(body) + ":" + LabelName(point).
-  std::optional<std::size_t> Find(std::string_view kind, std::string_view name,
-                                  std::string_view component, bool is_label = false) const;
+  double Time(std::size_t row) const { return At(row, time); }
 };
 Trajectory ReadTrajectory(const std::filesystem::path& path);
+
+/// Returns the column with this name as written in labels: LabelName(), for points and couplings
+/// two with a colon between them.
+std::optional<std::size_t> FindColumn(const std::vector<TrajectoryColumn>& columns,
+                                      std::string_view kind, std::string_view name,
+                                      std::string_view component);
 
 /// Columns that hold the pose of a body.
 struct PoseColumns {
@@ -298,13 +227,11 @@ std::optional<PoseColumns> FindPose(const std::vector<TrajectoryColumn>& columns
 std::filesystem::path TrajectoryPath(const std::filesystem::path& store_file,
                                      const std::string& id);
 
-// Writes a trajectory row by row, with fixed memory.
-//
-// Rows go to PATH.part, which is renamed to PATH when complete: PATH is never a partial file. The
-// destructor deletes an unfinished part. A killed process leaves its part for RemoveParts().
-
 enum class TrajectoryFormat { kCsv, kJsonLines };
 
+/// Writes a trajectory row by row, with fixed memory. Rows go to PATH.part, which is renamed to
+/// PATH when complete: PATH is never a partial file. The destructor deletes an unfinished part. A
+/// killed process leaves its part for RemoveParts().
 class TrajectoryWriter {
  public:
   /// Creates missing folders. In CSV, `notes` become lines with "#". This class throws
@@ -339,8 +266,6 @@ class TrajectoryWriter {
 void RemoveParts(const std::filesystem::path& store_file);
 void RemovePart(const std::filesystem::path& path);
 
-// Trajectories of a store: the files that its records refer to.
-
 /// Returns the trajectory file of a record, next to the store's `file`; empty if the record has
 /// none. Names outside the folder of trajectories are ignored.
 std::filesystem::path TrajectoryOf(const Record& record, const std::filesystem::path& store_file);
@@ -361,8 +286,6 @@ std::vector<std::string> CopyTrajectories(const std::vector<Record>& records,
                                           const std::vector<std::filesystem::path>& stores,
                                           const std::filesystem::path& target);
 
-// Recorder of a run: converts integrator states into trajectory rows of the user's mechanism.
-
 /// Output file and options of a trajectory.
 struct TrajectoryTask {
   const OutputOptions& output;
@@ -370,7 +293,8 @@ struct TrajectoryTask {
   std::string title;  ///< title of the case
 };
 
-/// Recorder for a mechanism that runs as one part; never used inside a right-hand side.
+/// Converts integrator states into trajectory rows of the user's mechanism, which runs as one part;
+/// never used inside a right-hand side.
 template <class Space>
 class Recorder {
  public:
@@ -392,7 +316,6 @@ class Recorder {
   void Finish(Record& record);
 
  private:
-  void Open();
   std::vector<std::string> Notes() const;
 
   const MechanismDescription& user_;
@@ -409,11 +332,6 @@ class Recorder {
   std::optional<TrajectoryWriter> file_;  ///< opened with the first row
   std::vector<double> row_;
 };
-
-// Checks of trajectories against the equations and against each other.
-
-// Checks a trajectory of any program against a mechanism: constraint violation, energy, and
-// consistency of speeds with positions.
 
 /// Largest value of a quantity and its time.
 struct LargestAt {
@@ -445,28 +363,25 @@ struct TrajectoryCheck {
   std::string source;           ///< "body poses" or "joint coordinates"
   bool has_speeds = false;
   std::vector<JointCheck> joints;  ///< joints of the mechanism, then couplings
-  LargestAt shift, rotation;       ///< largest of all joints
   LargestAt energy;                ///< change of kinetic + potential - supplied + dissipated [J]
   double kinetic = 0.0;            ///< largest [J]
   std::string no_energy;           ///< reason why the energy is unknown; or empty
   /// Kinetic and potential energy of the file minus energies of the mechanism [J]; unknown without
   /// speeds.
   std::array<ColumnCheck, 2> energies;
-  std::vector<std::string>
-      unchecked;  ///< labels of forces, reactions and work that are not checked
+  std::vector<std::string> unchecked;  ///< labels of forces, reactions and work
   /// Mean speed over two steps by the parabola through three speeds (Simpson's rule), minus the
   /// difference of positions. They differ by (h^4 / 90) times the fourth derivative of the speed.
   std::vector<ColumnCheck> speeds;
   std::vector<std::string> unknown;  ///< labels that do not exist in the mechanism
 };
 
-/// Checks row by row, with fixed memory. Throws as TrajectoryReader, and
-/// std::runtime_error for missing columns, no rows or a row with a non-finite number in a motion
-/// column.
+/// Checks a trajectory of any program against a mechanism, row by row, with fixed memory:
+/// constraint violation, energy, and consistency of speeds with positions. Throws as
+/// TrajectoryReader, and std::runtime_error for missing columns, no rows or a row with a non-finite
+/// number in a motion column.
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user);
-
-// Comparison of two trajectories of one mechanism.
 
 /// A column of both trajectories.
 struct SharedColumn {
@@ -489,14 +404,13 @@ double FirstTimeFor(const Trajectory& ours, double t);
 std::vector<double> Differences(const Trajectory& ours, const Trajectory& theirs,
                                 const SharedColumn& column);
 
-// Forces at rest: efforts of drives that hold a mechanism at its start, and joint reactions.
-//
-// All speeds and accelerations are zero, at t = 0: gravity, springs and constant forces act,
-// dampers and drag do not. Prescribed coordinates are held at their values. As many other
-// coordinates are held as degrees of freedom remain: of "fixed" joints first, then in the order of
-// the file, without those that held ones determine. Efforts and reactions follow from the
-// equilibrium of each body (Reactions).
-
+/// Forces at rest: efforts of drives that hold a mechanism at its start, and joint reactions.
+///
+/// All speeds and accelerations are zero, at t = 0: gravity, springs and constant forces act,
+/// dampers and drag do not. Prescribed coordinates are held at their values. As many other
+/// coordinates are held as degrees of freedom remain: of "fixed" joints first, then in the order of
+/// the file, without those that held ones determine. Efforts and reactions follow from the
+/// equilibrium of each body.
 struct Statics {
   std::string why;  ///< why there are no forces: something moves that nothing can hold; else empty
   /// Drives (columns "drive"), reactions ("reaction") and efforts of couplings ("coupling"), in

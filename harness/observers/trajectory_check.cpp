@@ -4,10 +4,14 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "harness/observers/trajectory.h"
 
@@ -34,12 +38,27 @@ std::vector<std::size_t> PlacesOf(std::span<const TrajectoryColumn> wanted,
   return places;
 }
 
+/// Columns of a mechanism by kind and name of their part.
+class PartColumns {
+ public:
+  explicit PartColumns(const std::vector<TrajectoryColumn>& all) {
+    for (const TrajectoryColumn& column : all) parts_[{column.kind, column.name}].push_back(column);
+  }
+  /// Returns the columns of a part, in their order.
+  std::span<const TrajectoryColumn> Of(const std::string& kind, const std::string& name) const {
+    const auto found = parts_.find({kind, LabelName(name)});
+    if (found == parts_.end()) return {};
+    return found->second;
+  }
+
+ private:
+  std::map<std::pair<std::string, std::string>, std::vector<TrajectoryColumn>> parts_;
+};
+
 std::string Listed(const std::vector<std::string>& labels) {
   constexpr std::size_t kMost = 6;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(kMost, labels.size()); ++i) {
-    text += fmt::format("{}\"{}\"", i == 0 ? "" : ", ", labels[i]);
-  }
+  std::string text = Joined(labels | std::views::take(kMost), ", ",
+                            [](const std::string& label) { return '"' + label + '"'; });
   if (labels.size() > kMost) text += fmt::format(" and {} more", labels.size() - kMost);
   return text;
 }
@@ -47,8 +66,9 @@ std::string Listed(const std::vector<std::string>& labels) {
 /// Mechanism in a position given by joint coordinates.
 template <class Space>
 struct MotionByJoints {
-  MotionByJoints(const MechanismDescription& user, const std::vector<TrajectoryColumn>& all,
-                 std::vector<std::string>* missing, std::vector<std::string>* no_speed)
+  MotionByJoints(const MechanismDescription& user, const PartColumns& known,
+                 const std::vector<TrajectoryColumn>& all, std::vector<std::string>* missing,
+                 std::vector<std::string>* no_speed)
       : compiled(Compile(user, CompileOptions::None())),
         mechanism(Unreleased(user), Coordinates::kJoint),
         kinematics(mechanism),
@@ -61,30 +81,24 @@ struct MotionByJoints {
         missing->push_back("a joint of body " + mechanism.body_names()[step.child]);
         continue;
       }
-      const auto columns = JointColumns(user, static_cast<std::size_t>(joint.description));
-      // prescribed coordinates follow their function; file values are ignored
-      std::vector<TrajectoryColumn> q_of, u_of;
-      for (int i = 0; i < joint.kind->num_q; ++i) {
-        if (mechanism.DriveOf(joint, i) < 0) q_of.push_back(columns[i]);
-      }
-      for (int i = 0; i < joint.kind->num_u; ++i) {
-        if (mechanism.DriveOf(joint, i) < 0) u_of.push_back(columns[joint.kind->num_q + i]);
-      }
-      for (const std::size_t at : PlacesOf(q_of, all, missing)) of_q.push_back(at);
-      for (const std::size_t at : PlacesOf(u_of, all, no_speed)) of_u.push_back(at);
+      const auto columns = known.Of("joint", user.joints[joint.description].name);
+      const auto enter = [&](int first, int count, int offset, Places* places, auto* absent) {
+        for (int i = 0; i < count; ++i) {
+          // prescribed coordinates follow their function; file values are ignored
+          if (mechanism.DriveOf(joint, i) >= 0) continue;
+          places->emplace_back(offset++, PlacesOf({&columns[first + i], 1}, all, absent).front());
+        }
+      };
+      enter(0, joint.kind->num_q, joint.q_offset, &of_q, missing);
+      enter(joint.kind->num_q, joint.kind->num_u, joint.u_offset, &of_u, no_speed);
     }
   }
 
   void Set(double t, const std::vector<double>& row, bool has_speeds,
            std::vector<BodyMotion>* bodies) {
-    std::size_t next_q = 0, next_u = 0;
-    for (const TreeStep& step : mechanism.tree()) {
-      const Joint<Space, double>& joint = mechanism.joints()[step.joint];
-      for (int i = 0; i < joint.num_q(); ++i) q[joint.q_offset + i] = row[of_q[next_q++]];
-      for (int i = 0; i < joint.num_u(); ++i) {
-        const std::size_t at = of_u[next_u++];
-        if (has_speeds) u[joint.u_offset + i] = row[at];
-      }
+    for (const auto& [i, column] : of_q) q[i] = row[column];
+    for (const auto& [i, column] : of_u) {
+      if (has_speeds) u[i] = row[column];
     }
     kinematics.SetTime(t);
     kinematics.UpdatePosition(q);
@@ -96,7 +110,8 @@ struct MotionByJoints {
   Mechanism<Space, double> mechanism;
   Kinematics<Space, double> kinematics;
   VectorX<double> q, u;
-  std::vector<std::size_t> of_q, of_u;  ///< columns, in the order of the tree
+  using Places = std::vector<std::pair<Eigen::Index, std::size_t>>;
+  Places of_q, of_u;  ///< their columns
 };
 
 /// Poses of all bodies, row by row. They come from body columns, or from the coordinates of joints
@@ -105,13 +120,12 @@ template <class Space>
 class MotionReader {
  public:
   /// Throws std::runtime_error with the missing columns.
-  MotionReader(const MechanismDescription& user, const std::vector<TrajectoryColumn>& columns,
-               const std::string& file)
+  MotionReader(const MechanismDescription& user, const PartColumns& known,
+               const std::vector<TrajectoryColumn>& columns, const std::string& file)
       : bodies_(user.bodies.size()), of_body_(user.bodies.size()) {
     std::vector<std::string> no_pose, no_speed, no_joint;
     for (std::size_t b = 1; b < user.bodies.size(); ++b) {
-      const std::vector<TrajectoryColumn> wanted = BodyColumns(user, b);
-      const std::span all(wanted);
+      const std::span<const TrajectoryColumn> all = known.Of("body", user.bodies[b].name);
       of_body_[b] = PlacesOf(all.first(kPose), columns, &no_pose);
       const auto speeds = PlacesOf(all.subspan(kPose), columns, &no_speed);
       of_body_[b].insert(of_body_[b].end(), speeds.begin(), speeds.end());
@@ -119,7 +133,7 @@ class MotionReader {
     has_speeds_ = no_speed.empty();
     if (no_pose.empty()) return;
     no_speed.clear();
-    joints_.emplace(user, columns, &no_joint, &no_speed);
+    joints_.emplace(user, known, columns, &no_joint, &no_speed);
     has_speeds_ = no_speed.empty();
     if (no_joint.empty()) return;
     throw std::runtime_error(
@@ -180,52 +194,22 @@ std::vector<Pair> PairsOf(const std::vector<TrajectoryColumn>& columns) {
   std::vector<Pair> pairs;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::string speed = SpeedOf(columns[i]);
-    const auto at = std::ranges::find_if(columns, [&](const TrajectoryColumn& other) {
-      return !speed.empty() && other.kind == columns[i].kind && other.name == columns[i].name &&
-             other.component == speed;
-    });
-    if (at == columns.end()) continue;
-    pairs.push_back({i,
-                     static_cast<std::size_t>(at - columns.begin()),
-                     columns[i].unit == "rad",
-                     {at->Label(), {}}});
+    if (speed.empty()) continue;
+    const auto at = FindColumn(columns, columns[i].kind, columns[i].name, speed);
+    if (at) pairs.push_back({i, *at, columns[i].unit == "rad", {columns[*at].Label(), {}}});
   }
   return pairs;
 }
-
-/// The last three rows.
-class Window {
- public:
-  void Add(double t, const std::vector<double>& row, std::vector<Pair>& pairs) {
-    std::rotate(rows_.begin(), rows_.begin() + 1, rows_.end());
-    std::rotate(t_.begin(), t_.begin() + 1, t_.end());
-    rows_[2] = row;
-    t_[2] = t;
-    if (rows_[0].empty()) return;
-    const double h0 = t_[1] - t_[0], h1 = t_[2] - t_[1], h = h0 + h1;
-    for (Pair& pair : pairs) {
-      const auto v = [&](std::size_t i) { return rows_[i][pair.speed]; };
-      const double way =
-          h / 6 * ((2 - h1 / h0) * v(0) + h * h / (h0 * h1) * v(1) + (2 - h0 / h1) * v(2));
-      double miss = rows_[2][pair.position] - rows_[0][pair.position] - way;
-      if (pair.turns) miss = std::remainder(miss, 2 * std::numbers::pi);
-      pair.check.apart.Add(std::abs(miss) / h, t_[1]);
-    }
-  }
-
- private:
-  std::array<std::vector<double>, 3> rows_;
-  std::array<double, 3> t_{};
-};
 
 template <class Space>
 class Checker {
  public:
   Checker(TrajectoryReader& reader, const MechanismDescription& user, const std::string& file)
       : reader_(reader),
-        file_(file),
         user_(user),
-        motion_(user, reader.columns(), file),
+        known_(MakeRowWriter(user, OutputOptions())->columns()),
+        by_part_(known_),
+        motion_(user, by_part_, reader.columns(), file),
         mechanism_(user),
         pairs_(PairsOf(reader.columns())) {
     check_.has_speeds = motion_.has_speeds();
@@ -235,13 +219,18 @@ class Checker {
     energies_ = {place_of("kinetic"), place_of("potential")};
     supplied_ = place_of("supplied");
     dissipated_ = place_of("dissipated");
-    const bool balances = check_.has_speeds && mechanism_.mechanism().has_power() &&
-                          supplied_ != kNowhere && dissipated_ != kNowhere;
-    OutputOptions all;
-    const auto known = TrajectoryColumns(user, all);
+    const bool has_power = mechanism_.mechanism().has_power();
+    if (!check_.has_speeds) {
+      check_.no_energy = "there are no speeds";
+    } else if (has_power && (supplied_ == kNowhere || dissipated_ == kNowhere)) {
+      check_.no_energy =
+          "forces or motions have power, and there is no \"energy:supplied [J]\" and "
+          "\"energy:dissipated [J]\"";
+    }
+    const bool balances = has_power && check_.no_energy.empty();
     for (std::size_t i = 0; i < reader.columns().size(); ++i) {
       const TrajectoryColumn& column = reader.columns()[i];
-      if (std::ranges::find(known, column) == known.end()) {
+      if (!Contains(known_, column)) {
         check_.unknown.push_back(column.kind.empty() ? column.component : column.Label());
       } else if (column.kind == "joint" || column.kind == "body" || column.kind == "point" ||
                  (check_.has_speeds && Contains(energies_, i))) {
@@ -258,19 +247,11 @@ class Checker {
     turns_.resize(user.couplings.size());
     for (std::size_t j = 0; j < user.joints.size(); ++j) {
       given_.emplace_back();
-      for (const TrajectoryColumn& column : JointColumns(user, j)) {
+      for (const auto& column : by_part_.Of("joint", user.joints[j].name)) {
         given_.back().push_back(PlaceOf(column, reader.columns()));
       }
     }
     followed_.resize(user.joints.size());
-    if (!check_.has_speeds) {
-      check_.no_energy = "there are no speeds";
-    } else if (mechanism_.mechanism().has_power() &&
-               (supplied_ == kNowhere || dissipated_ == kNowhere)) {
-      check_.no_energy =
-          "forces or motions have power, and there is no \"energy:supplied [J]\" and "
-          "\"energy:dissipated [J]\"";
-    }
   }
 
   TrajectoryCheck Run() {
@@ -280,10 +261,6 @@ class Checker {
     }
     for (Pair& pair : pairs_) {
       if (pair.check.apart.is_known) check_.speeds.push_back(std::move(pair.check));
-    }
-    for (const JointCheck& joint : check_.joints) {
-      if (joint.shift.is_known) check_.shift.Add(joint.shift.value, joint.shift.t);
-      if (joint.rotation.is_known) check_.rotation.Add(joint.rotation.value, joint.rotation.t);
     }
     return std::move(check_);
   }
@@ -315,7 +292,7 @@ class Checker {
       check_.kinetic = std::max(check_.kinetic, energy.kinetic);
       if (!std::isfinite(balance)) check_.no_energy = fmt::format("it is {} J at {} s", balance, t);
     }
-    window_.Add(t, row, pairs_);
+    AddSpeeds(t, row);
   }
 
   void AddJoint(std::size_t j, double t, const std::vector<double>& row) {
@@ -349,6 +326,24 @@ class Checker {
     }
   }
 
+  /// Holds speeds against positions, over the last three rows.
+  void AddSpeeds(double t, const std::vector<double>& row) {
+    std::rotate(rows_.begin(), rows_.begin() + 1, rows_.end());
+    std::rotate(t_.begin(), t_.begin() + 1, t_.end());
+    rows_[2] = row;
+    t_[2] = t;
+    if (rows_[0].empty()) return;
+    const double h0 = t_[1] - t_[0], h1 = t_[2] - t_[1], h = h0 + h1;
+    for (Pair& pair : pairs_) {
+      const auto v = [&](std::size_t i) { return rows_[i][pair.speed]; };
+      const double way =
+          h / 6 * ((2 - h1 / h0) * v(0) + h * h / (h0 * h1) * v(1) + (2 - h0 / h1) * v(2));
+      double miss = rows_[2][pair.position] - rows_[0][pair.position] - way;
+      if (pair.turns) miss = std::remainder(miss, 2 * std::numbers::pi);
+      pair.check.apart.Add(std::abs(miss) / h, t_[1]);
+    }
+  }
+
   /// In the unit of its first joint. Whole turns of angles in the first row do not count.
   void AddCoupling(std::size_t c, double t) {
     const Kinematics<Space, double>& kinematics = mechanism_.kinematics();
@@ -367,8 +362,9 @@ class Checker {
   }
 
   TrajectoryReader& reader_;
-  std::string file_;
   const MechanismDescription& user_;
+  std::vector<TrajectoryColumn> known_;  ///< of the mechanism
+  PartColumns by_part_;
   MotionReader<Space> motion_;
   UserMechanism<Space> mechanism_;
   std::vector<Pair> pairs_;
@@ -379,7 +375,8 @@ class Checker {
   std::size_t supplied_ = kNowhere, dissipated_ = kNowhere;
   std::array<std::size_t, 2> energies_{};  ///< columns of kinetic and potential energy
   double first_energy_ = 0.0;
-  Window window_;
+  std::array<std::vector<double>, 3> rows_;  ///< the last ones, and their times
+  std::array<double, 3> t_{};
   TrajectoryCheck check_;
 };
 
@@ -388,10 +385,8 @@ class Checker {
 TrajectoryCheck CheckTrajectory(const std::filesystem::path& path,
                                 const MechanismDescription& user) {
   TrajectoryReader reader(path);
-  if (user.space == SpaceKind::kPlanar) {
-    return Checker<Planar>(reader, user, path.string()).Run();
-  }
-  return Checker<Spatial>(reader, user, path.string()).Run();
+  return user.space == SpaceKind::kPlanar ? Checker<Planar>(reader, user, path.string()).Run()
+                                          : Checker<Spatial>(reader, user, path.string()).Run();
 }
 
 std::vector<SharedColumn> SharedColumns(const Trajectory& ours, const Trajectory& theirs) {
@@ -408,12 +403,10 @@ namespace {
 
 /// Returns the first row not before a time.
 std::size_t RowFrom(const Trajectory& ours, double t) {
-  std::size_t low = 0, high = ours.rows();
-  while (low < high) {
-    const std::size_t middle = (low + high) / 2;
-    (ours.At(middle, ours.time) < t ? low : high) = middle + (ours.At(middle, ours.time) < t);
-  }
-  return low;
+  const auto rows = std::views::iota(std::size_t{0}, ours.rows());
+  return static_cast<std::size_t>(
+      std::ranges::lower_bound(rows, t, {}, [&](std::size_t row) { return ours.Time(row); }) -
+      rows.begin());
 }
 
 /// Returns the first row of the cubic before row `low`.
@@ -425,7 +418,7 @@ std::size_t FirstOfCubic(const Trajectory& ours, std::size_t low) {
 }  // namespace
 
 double FirstTimeFor(const Trajectory& ours, double t) {
-  return ours.At(FirstOfCubic(ours, RowFrom(ours, t)), ours.time);
+  return ours.Time(FirstOfCubic(ours, RowFrom(ours, t)));
 }
 
 double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_between) {
@@ -435,20 +428,19 @@ double ValueAt(const Trajectory& ours, std::size_t column, double t, bool* is_be
   constexpr double kSame = 1e-12;
   for (const std::size_t row : {low, low - 1}) {
     const bool is_there = row < rows;
-    if (is_there && std::abs(ours.At(row, ours.time) - t) <= kSame * std::max(1.0, std::abs(t))) {
+    if (is_there && std::abs(ours.Time(row) - t) <= kSame * std::max(1.0, std::abs(t))) {
       return ours.At(row, column);
     }
   }
   if (low == 0 || low == rows) return std::numeric_limits<double>::quiet_NaN();
   if (is_between != nullptr) *is_between = true;
-  const std::size_t count = std::min<std::size_t>(4, rows);
-  const std::size_t first = FirstOfCubic(ours, low);
+  const std::size_t first = FirstOfCubic(ours, low), end = first + std::min<std::size_t>(4, rows);
   double value = 0.0;
-  for (std::size_t i = first; i < first + count; ++i) {
+  for (std::size_t i = first; i < end; ++i) {
     double weight = 1.0;
-    for (std::size_t k = first; k < first + count; ++k) {
+    for (std::size_t k = first; k < end; ++k) {
       if (k == i) continue;
-      const double own = ours.At(i, ours.time), other = ours.At(k, ours.time);
+      const double own = ours.Time(i), other = ours.Time(k);
       weight *= (t - other) / (own - other);
     }
     value += weight * ours.At(i, column);
@@ -460,7 +452,7 @@ std::vector<double> Differences(const Trajectory& ours, const Trajectory& theirs
                                 const SharedColumn& column) {
   std::vector<double> differences;
   for (std::size_t row = 0; row < theirs.rows(); ++row) {
-    const double value = ValueAt(ours, column.in_ours, theirs.At(row, theirs.time));
+    const double value = ValueAt(ours, column.in_ours, theirs.Time(row));
     const double apart = theirs.At(row, column.in_theirs) - value;
     const bool turns = column.unit == "rad";
     differences.push_back(turns ? std::remainder(apart, 2 * std::numbers::pi) : apart);

@@ -1,6 +1,7 @@
 #include "harness/precision/integrator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -22,116 +23,18 @@ struct Ratio {
 
 // J. Dormand, P. Prince, A family of embedded Runge-Kutta formulae, 1980. The last row of A is the
 // solution of order 5; E is that less the one of order 4.
-constexpr Ratio kC[7] = {{0, 1}, {1, 5}, {3, 10}, {4, 5}, {8, 9}, {1, 1}, {1, 1}};
-constexpr Ratio kA[7][6] = {{},
-                            {{1, 5}},
-                            {{3, 40}, {9, 40}},
-                            {{44, 45}, {-56, 15}, {32, 9}},
-                            {{19372, 6561}, {-25360, 2187}, {64448, 6561}, {-212, 729}},
-                            {{9017, 3168}, {-355, 33}, {46732, 5247}, {49, 176}, {-5103, 18656}},
-                            {{35, 384}, {0, 1}, {500, 1113}, {125, 192}, {-2187, 6784}, {11, 84}}};
-constexpr Ratio kE[7] = {{71, 57600},      {0, 1},    {-71, 16695}, {71, 1920},
-                         {-17253, 339200}, {22, 525}, {-1, 40}};
-
-}  // namespace
-
-template <class S>
-OneStep<S>::OneStep(const Problem<S>& system, OneStepMethod method, int columns)
-    : system_(system), method_(method), columns_(columns) {
-  const std::size_t n = static_cast<std::size_t>(system.size);
-  for (std::vector<S>* vector : {&y_new_, &error_, &stage_, &before_}) vector->assign(n, S(0));
-  if (method == OneStepMethod::kDormandPrince) {
-    for (std::vector<S>& k : k_) k.assign(n, S(0));
-    f_new_.assign(n, S(0));
-  } else {
-    k_[0].assign(n, S(0));
-    for (std::vector<S>& column : table_) column.assign(n, S(0));
-  }
-}
-
-template <class S>
-Outcome OneStep<S>::Evaluate(S t, const std::vector<S>& y, std::vector<S>& f) {
-  using std::isfinite;
-  ++evaluations_;
-  const Outcome outcome = system_.derivative(t, y, f);
-  if (outcome != Outcome::kFinished) return outcome;
-  const bool finite = std::ranges::all_of(f, [](const S& v) { return isfinite(v); });
-  return finite ? Outcome::kFinished : Outcome::kNonFinite;
-}
-
-template <class S>
-Outcome OneStep<S>::Attempt(S t, const std::vector<S>& y, const std::vector<S>& f, S h) {
-  return method_ == OneStepMethod::kGragg ? Gragg(t, y, f, h) : DormandPrince(t, y, f, h);
-}
-
-template <class S>
-Outcome OneStep<S>::DormandPrince(S t, const std::vector<S>& y, const std::vector<S>& f, S h) {
-  k_[0] = f;
-  for (int s = 1; s < kStages; ++s) {
-    stage_ = y;
-    for (int j = 0; j < s; ++j) {
-      const S a = h * kA[s][j].template In<S>();
-      for (std::size_t i = 0; i < y.size(); ++i) stage_[i] += a * k_[j][i];
-    }
-    const Outcome outcome = Evaluate(t + h * kC[s].template In<S>(), stage_, k_[s]);
-    if (outcome != Outcome::kFinished) return outcome;
-  }
-  y_new_ = stage_;
-  f_new_ = k_[kStages - 1];
-  for (std::size_t i = 0; i < y.size(); ++i) {
-    S sum = S(0);
-    for (int s = 0; s < kStages; ++s) sum += kE[s].template In<S>() * k_[s][i];
-    error_[i] = h * sum;
-  }
-  return Outcome::kFinished;
-}
-
-template <class S>
-Outcome OneStep<S>::Midpoint(S t, const std::vector<S>& y, const std::vector<S>& f, S h, int n,
-                             std::vector<S>& result) {
-  const S step = h / S(n);
-  before_ = y;
-  result = y;
-  for (std::size_t i = 0; i < y.size(); ++i) result[i] += step * f[i];
-  for (int m = 1; m < n; ++m) {
-    const Outcome outcome = Evaluate(t + S(m) * step, result, k_[0]);
-    if (outcome != Outcome::kFinished) return outcome;
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      const S next = before_[i] + S(2) * step * k_[0][i];
-      before_[i] = result[i];
-      result[i] = next;
-    }
-  }
-  return Outcome::kFinished;
-}
-
-/// An even number of substeps has an error in even powers of h: every column gains two orders,
-///   T_j,k+1 = T_jk + (T_jk - T_j-1,k) / ((n_j / n_j-k-1)^2 - 1),  n_j = 2 (j + 1).
-template <class S>
-Outcome OneStep<S>::Gragg(S t, const std::vector<S>& y, const std::vector<S>& f, S h) {
-  for (int j = 0; j < columns_; ++j) {
-    const Outcome outcome = Midpoint(t, y, f, h, 2 * (j + 1), y_new_);
-    if (outcome != Outcome::kFinished) return outcome;
-    for (int k = 0; k < j; ++k) {
-      const S ratio = S(j + 1) / S(j - k), weight = S(1) / (ratio * ratio - S(1));
-      for (std::size_t i = 0; i < y.size(); ++i) {
-        const S newer = y_new_[i];
-        y_new_[i] += (newer - table_[k][i]) * weight;
-        table_[k][i] = newer;
-      }
-    }
-    table_[j] = y_new_;
-  }
-  for (std::size_t i = 0; i < y.size(); ++i) error_[i] = y_new_[i] - table_[columns_ - 2][i];
-  return Outcome::kFinished;
-}
-
-template class OneStep<float>;
-template class OneStep<double>;
-template class OneStep<long double>;
-template class OneStep<Float128>;
-
-namespace {
+constexpr int kStages = 7;
+constexpr Ratio kC[kStages] = {{0, 1}, {1, 5}, {3, 10}, {4, 5}, {8, 9}, {1, 1}, {1, 1}};
+constexpr Ratio kA[kStages][kStages - 1] = {
+    {},
+    {{1, 5}},
+    {{3, 40}, {9, 40}},
+    {{44, 45}, {-56, 15}, {32, 9}},
+    {{19372, 6561}, {-25360, 2187}, {64448, 6561}, {-212, 729}},
+    {{9017, 3168}, {-355, 33}, {46732, 5247}, {49, 176}, {-5103, 18656}},
+    {{35, 384}, {0, 1}, {500, 1113}, {125, 192}, {-2187, 6784}, {11, 84}}};
+constexpr Ratio kE[kStages] = {{71, 57600},      {0, 1},    {-71, 16695}, {71, 1920},
+                               {-17253, 339200}, {22, 525}, {-1, 40}};
 
 // harness/config/options.cpp: the values of profile ode45.
 constexpr double kSafety = 0.8, kGrowth = 5.0, kReduction = 0.1, kRepeatedFailure = 0.5;
@@ -146,25 +49,102 @@ class Run {
         longest_(options.longest_step > S(0) ? options.longest_step
                                              : (t_end - options.begin) / S(10)),
         y_(y),
-        step_(system, options.method, options.columns),
         t_(options.begin) {
+    const std::size_t n = static_cast<std::size_t>(system.size);
+    for (std::vector<S>* vector : {&y_new_, &error_, &stage_, &before_}) vector->assign(n, S(0));
+    for (std::vector<S>& k : k_) k.assign(n, S(0));
     f_.assign(y.size(), S(0));
   }
 
   OneStepResult Execute() {
     system_.accept(t_, y_);
-    result_.outcome = step_.Evaluate(t_, y_, f_);
+    result_.outcome = Evaluate(t_, y_, f_);
     if (result_.outcome == Outcome::kFinished) {
       h_ = options_.first_step > S(0) ? options_.first_step : FirstStep();
     }
     while (result_.outcome == Outcome::kFinished && t_ < t_end_) result_.outcome = Advance();
     result_.t_reached = static_cast<double>(t_);
-    result_.rhs_evaluations = step_.evaluations();
     result_.next_step = static_cast<double>(h_);
     return result_;
   }
 
  private:
+  /// f(t, y), counted, and whether it is finite.
+  Outcome Evaluate(S t, const std::vector<S>& y, std::vector<S>& f) {
+    using std::isfinite;
+    ++result_.rhs_evaluations;
+    const Outcome outcome = system_.derivative(t, y, f);
+    if (outcome != Outcome::kFinished) return outcome;
+    const bool finite = std::ranges::all_of(f, [](const S& v) { return isfinite(v); });
+    return finite ? Outcome::kFinished : Outcome::kNonFinite;
+  }
+
+  bool IsGragg() const { return options_.method == OneStepMethod::kGragg; }
+
+  /// The error estimate grows with the step as h^EstimateOrder().
+  int EstimateOrder() const { return IsGragg() ? 2 * options_.columns - 1 : 5; }
+
+  // y_new_ and error_ of a step of length h.
+
+  Outcome DormandPrince(S h) {
+    k_[0] = f_;
+    for (int s = 1; s < kStages; ++s) {
+      stage_ = y_;
+      for (int j = 0; j < s; ++j) {
+        const S a = h * kA[s][j].template In<S>();
+        for (std::size_t i = 0; i < y_.size(); ++i) stage_[i] += a * k_[j][i];
+      }
+      const Outcome outcome = Evaluate(t_ + h * kC[s].template In<S>(), stage_, k_[s]);
+      if (outcome != Outcome::kFinished) return outcome;
+    }
+    y_new_ = stage_;
+    for (std::size_t i = 0; i < y_.size(); ++i) {
+      S sum = S(0);
+      for (int s = 0; s < kStages; ++s) sum += kE[s].template In<S>() * k_[s][i];
+      error_[i] = h * sum;
+    }
+    return Outcome::kFinished;
+  }
+
+  /// The modified midpoint rule with n substeps, to y_new_.
+  Outcome Midpoint(S h, int n) {
+    const S step = h / S(n);
+    before_ = y_;
+    y_new_ = y_;
+    for (std::size_t i = 0; i < y_.size(); ++i) y_new_[i] += step * f_[i];
+    for (int m = 1; m < n; ++m) {
+      const Outcome outcome = Evaluate(t_ + S(m) * step, y_new_, k_[0]);
+      if (outcome != Outcome::kFinished) return outcome;
+      for (std::size_t i = 0; i < y_.size(); ++i) {
+        const S next = before_[i] + S(2) * step * k_[0][i];
+        before_[i] = y_new_[i];
+        y_new_[i] = next;
+      }
+    }
+    return Outcome::kFinished;
+  }
+
+  /// An even number of substeps has an error in even powers of h: every column gains two orders,
+  ///   T_j,k+1 = T_jk + (T_jk - T_j-1,k) / ((n_j / n_j-k-1)^2 - 1),  n_j = 2 (j + 1).
+  Outcome Gragg(S h) {
+    for (int j = 0; j < options_.columns; ++j) {
+      const Outcome outcome = Midpoint(h, 2 * (j + 1));
+      if (outcome != Outcome::kFinished) return outcome;
+      for (int k = 0; k < j; ++k) {
+        const S ratio = S(j + 1) / S(j - k), weight = S(1) / (ratio * ratio - S(1));
+        for (std::size_t i = 0; i < y_.size(); ++i) {
+          const S newer = y_new_[i];
+          y_new_[i] += (newer - table_[k][i]) * weight;
+          table_[k][i] = newer;
+        }
+      }
+      table_[j] = y_new_;
+    }
+    const std::vector<S>& before_last = table_[options_.columns - 2];
+    for (std::size_t i = 0; i < y_.size(); ++i) error_[i] = y_new_[i] - before_last[i];
+    return Outcome::kFinished;
+  }
+
   /// MATLAB's: the fastest component changes by 0.8 rtol^(1/order) of its magnitude, at least 1.
   S FirstStep() {
     using std::abs;
@@ -174,7 +154,7 @@ class Run {
     for (std::size_t i = 0; i < y_.size(); ++i) {
       rate = std::max(rate, S(abs(f_[i]) / std::max(S(abs(y_[i])), S(1))));
     }
-    rate /= S(kSafety) * pow(options_.tolerance, S(1) / S(step_.estimate_order()));
+    rate /= S(kSafety) * pow(options_.tolerance, S(1) / S(EstimateOrder()));
     return longest_ * rate > S(1) ? S(1) / rate : longest_;
   }
 
@@ -184,7 +164,7 @@ class Run {
     S worst = S(0);
     for (std::size_t i = 0; i < y_.size(); ++i) {
       const S allowed = options_.tolerance * std::max(S(abs(y_[i])), S(1));
-      worst = std::max(worst, S(abs(step_.error()[i]) / allowed));
+      worst = std::max(worst, S(abs(error_[i]) / allowed));
     }
     return worst;
   }
@@ -193,7 +173,7 @@ class Run {
   S Factor(S scaled_error, S largest) const {
     using std::pow;
     if (scaled_error == S(0)) return largest;
-    const S ideal = S(kSafety) * pow(scaled_error, S(-1) / S(step_.estimate_order()));
+    const S ideal = S(kSafety) * pow(scaled_error, S(-1) / S(EstimateOrder()));
     return std::clamp(ideal, S(kReduction), largest);
   }
 
@@ -203,7 +183,7 @@ class Run {
     for (int failures = 0;;) {
       const bool last = !(t_ + h_ < t_end_ - close_);
       const S h = last ? t_end_ - t_ : h_;
-      const Outcome outcome = step_.Attempt(t_, y_, f_, h);
+      const Outcome outcome = IsGragg() ? Gragg(h) : DormandPrince(h);
       const bool is_known = outcome == Outcome::kFinished;
       if (!is_known && !options_.steps_around_failures) return outcome;
       if (options_.fixed_step > S(0)) return Accept(last ? t_end_ : t_ + h, h);
@@ -227,7 +207,7 @@ class Run {
   Outcome Accept(S t, S h) {
     using std::abs;
     t_ = t;
-    y_ = step_.y_new();
+    y_ = y_new_;
     ++result_.steps;
     const bool rewritten = system_.accept(t_, y_);
     if (t_ < t_end_) {
@@ -238,8 +218,8 @@ class Run {
       return Outcome::kFinished;
     }
     result_.restarts += rewritten ? 1 : 0;
-    if (rewritten || step_.f_new().empty()) return step_.Evaluate(t_, y_, f_);
-    f_ = step_.f_new();
+    if (rewritten || IsGragg() || f_.empty()) return Evaluate(t_, y_, f_);
+    f_ = k_[kStages - 1];  // the last stage of Dormand-Prince is at the end of the step
     return Outcome::kFinished;
   }
 
@@ -251,7 +231,9 @@ class Run {
   const S close_ = S(100) * std::numeric_limits<S>::epsilon() * t_end_;
   std::vector<S>& y_;
   std::vector<S> f_;
-  OneStep<S> step_;
+  std::vector<S> y_new_, error_, stage_, before_;
+  std::array<std::vector<S>, kStages> k_;
+  std::array<std::vector<S>, kMaxColumns> table_;  ///< the last row of the extrapolation
   OneStepResult result_;
   S t_, h_ = S(0);
   CpuLimit time_{options_.time_limit_s};

@@ -1,7 +1,6 @@
-// Integrators in any scalar: single steps of each method, and their step-size control.
+// One-step methods in any scalar, with their step-size control.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -13,11 +12,10 @@ namespace loopbench::harness {
 
 // One-step methods with the step-size control of profile `ode45`, in any scalar.
 //
-// ARKODE computes in double alone. To measure rounding, the same method must run in narrower and
-// wider scalars: the Dormand-Prince pair, MATLAB's norm (max_i |e_i| / max(rtol |y_i|, atol)),
-// first step, longest step and I controller, as harness/config/options.h has them for ARKODE.
-// In double the two take the same steps except for rounding (tests/precision/). Times, tolerances
-// and coefficients have the scalar type of the state.
+// The Dormand-Prince pair, MATLAB's norm (max_i |e_i| / max(rtol |y_i|, atol)), first step, longest
+// step and I controller, as harness/config/options.h has them for ARKODE. In double the two take
+// the same steps except for rounding. Times, tolerances and coefficients have the scalar of the
+// state.
 //
 // A reference far below the reach of order 5 comes from Gragg's method: the modified midpoint rule
 // with 2, 4, .., 20 substeps, extrapolated to order 20 by Aitken and Neville (Hairer, Norsett,
@@ -71,45 +69,5 @@ struct OneStepResult {
 template <class S>
 OneStepResult IntegrateSystem(const Problem<S>& system, S t_end, std::vector<S>& y,
                               const OneStepOptions<S>& options);
-
-/// Room for steps from (t, y, f(t, y)) to t + h.
-template <class S>
-class OneStep {
- public:
-  /// `columns` of Gragg's extrapolation, kMaxColumns at most.
-  OneStep(const Problem<S>& system, OneStepMethod method, int columns);
-
-  /// The error estimate grows with the step as h^estimate_order().
-  int estimate_order() const { return method_ == OneStepMethod::kGragg ? 2 * columns_ - 1 : 5; }
-
-  /// y_new() and error() of a step; f is the derivative at (t, y). kNonFinite when a derivative is
-  /// not finite.
-  Outcome Attempt(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
-
-  const std::vector<S>& y_new() const { return y_new_; }
-  const std::vector<S>& error() const { return error_; }
-  /// Returns f at y_new() if the method has it (the last stage of Dormand-Prince), else empty.
-  const std::vector<S>& f_new() const { return f_new_; }
-
-  /// f(t, y), counted, and whether it is finite.
-  Outcome Evaluate(S t, const std::vector<S>& y, std::vector<S>& f);
-  std::int64_t evaluations() const { return evaluations_; }
-
- private:
-  static constexpr int kStages = 7;
-  Outcome DormandPrince(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
-  Outcome Gragg(S t, const std::vector<S>& y, const std::vector<S>& f, S h);
-  /// The modified midpoint rule with n substeps.
-  Outcome Midpoint(S t, const std::vector<S>& y, const std::vector<S>& f, S h, int n,
-                   std::vector<S>& result);
-
-  const Problem<S>& system_;
-  OneStepMethod method_;
-  int columns_;
-  std::vector<S> y_new_, error_, f_new_, stage_, before_;
-  std::array<std::vector<S>, kStages> k_;
-  std::array<std::vector<S>, kMaxColumns> table_;  ///< the last row of the extrapolation
-  std::int64_t evaluations_ = 0;
-};
 
 }  // namespace loopbench::harness

@@ -7,7 +7,6 @@
 
 #include "harness/base/text.h"
 #include "harness/precision/exact.h"
-#include "harness/precision/integrator.h"
 #include "lagrange/lagrange.h"
 #include "mechanism/formulation/system.h"
 #include "odca/odca.h"
@@ -27,6 +26,22 @@ std::unique_ptr<System<Planar, S>> Make(const Method& method,
   if (method.formulation == "reduction")
     return MakeSystem<reduction::Reduction>(mechanism, options);
   throw std::invalid_argument("no ladder of formulation " + method.formulation);
+}
+
+/// Calls `use` with the type of a scalar.
+template <class Use>
+auto WithScalar(Scalar scalar, const Use& use) {
+  switch (scalar) {
+    case Scalar::kFloat:
+      return use.template operator()<float>();
+    case Scalar::kDouble:
+      return use.template operator()<double>();
+    case Scalar::kLongDouble:
+      return use.template operator()<long double>();
+    case Scalar::kFloat128:
+      break;
+  }
+  return use.template operator()<Float128>();
 }
 
 /// A run and its final state.
@@ -66,38 +81,17 @@ Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, OneStepMethod m
         drift = std::max(drift, exact.Drift(t_at, at));
         return rewritten;
       }};
-  const OneStepResult result = IntegrateSystem<S>(system, S(task.horizon), y,
-                                                  {.method = method,
-                                                   .tolerance = S(tolerance),
-                                                   .step_limit = task.limits.steps,
-                                                   .time_limit_s = task.limits.cpu_s});
-  rung.outcome = result.outcome;
-  rung.t_reached = result.t_reached;
-  rung.steps = result.steps;
-  rung.rejected = result.rejected;
-  rung.rhs_evaluations = result.rhs_evaluations;
-  rung.restarts = result.restarts;
+  static_cast<OneStepResult&>(rung) = IntegrateSystem<S>(system, S(task.horizon), y,
+                                                         {.method = method,
+                                                          .tolerance = S(tolerance),
+                                                          .step_limit = task.limits.steps,
+                                                          .time_limit_s = task.limits.cpu_s});
   rung.drift = static_cast<double>(drift);
   rung.error = std::numeric_limits<double>::quiet_NaN();
   ended.centres = exact.Centres(t_at, at);
   rung.wall_s = time.wall_s();
   rung.cpu_s = time.cpu_s();
   return ended;
-}
-
-Ended Climb(const LadderTask& task, Exact& exact, Scalar scalar, double tolerance) {
-  constexpr OneStepMethod kMethod = OneStepMethod::kDormandPrince;
-  switch (scalar) {
-    case Scalar::kFloat:
-      return Climb<float>(task, exact, scalar, kMethod, tolerance);
-    case Scalar::kDouble:
-      return Climb<double>(task, exact, scalar, kMethod, tolerance);
-    case Scalar::kLongDouble:
-      return Climb<long double>(task, exact, scalar, kMethod, tolerance);
-    case Scalar::kFloat128:
-      break;
-  }
-  return Climb<Float128>(task, exact, scalar, kMethod, tolerance);
 }
 
 double Distance(const Ended& a, const Ended& b) {
@@ -113,17 +107,8 @@ double Distance(const Ended& a, const Ended& b) {
 }
 
 double Epsilon(Scalar scalar) {
-  switch (scalar) {
-    case Scalar::kFloat:
-      return std::numeric_limits<float>::epsilon();
-    case Scalar::kDouble:
-      return std::numeric_limits<double>::epsilon();
-    case Scalar::kLongDouble:
-      return static_cast<double>(std::numeric_limits<long double>::epsilon());
-    case Scalar::kFloat128:
-      break;
-  }
-  return static_cast<double>(std::numeric_limits<Float128>::epsilon());
+  return WithScalar(
+      scalar, []<class S>() { return static_cast<double>(std::numeric_limits<S>::epsilon()); });
 }
 
 /// Returns the run that judges `own`: at the same tolerance the widest that finished, or for the
@@ -182,7 +167,9 @@ Ladder RunLadder(const LadderTask& task) {
   ladder.reference.error = Distance(reference, reference_at(1e4 * task.precision.reference));
   for (const Scalar scalar : task.precision.scalars) {
     for (const double tolerance : task.precision.tolerances) {
-      Ended ended = Climb(task, exact, scalar, tolerance);
+      Ended ended = WithScalar(scalar, [&]<class S>() {
+        return Climb<S>(task, exact, scalar, OneStepMethod::kDormandPrince, tolerance);
+      });
       ended.rung.error = Distance(ended, reference);
       ladder.rungs.push_back(ended.rung);
     }

@@ -1,10 +1,8 @@
 // The precision study: one mechanism and formulation in float, double, long double and float128,
 // with one integrator (integrator.h), against a reference in float128.
 //
-// Error and drift of a run have two parts: round-off and truncation. Truncation is the remainder in
-// the widest scalar at the same tolerance: the method's error, and near singular configurations the
-// error of regularization (mechanism/loops/loop_solver.h). A change in the widest scalar was thus
-// round-off.
+// Error and drift of a run have two parts: round-off and truncation. Truncation remains in the
+// widest scalar at the same tolerance: the method's error, and the error of regularization.
 //
 // All methods of a mechanism share one reference, because the exact motion is the same: multipliers
 // in joint coordinates, positions projected after each step, without regularization.
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "harness/config/experiment.h"
+#include "harness/precision/integrator.h"
 #include "mechanism/description/outcome.h"
 
 namespace loopbench::harness {
@@ -34,12 +33,9 @@ struct LadderTask {
 };
 
 /// One run in one scalar.
-struct SweepLevel {
+struct SweepLevel : OneStepResult {
   Scalar scalar = Scalar::kDouble;
   double tolerance = 0.0;
-  Outcome outcome = Outcome::kFinished;
-  double t_reached = 0.0;  ///< [s]
-  std::int64_t steps = 0, rejected = 0, rhs_evaluations = 0, restarts = 0;
   double wall_s = 0.0, cpu_s = 0.0;
   double drift = 0.0;  ///< largest violation of points at accepted steps [m]
   double error = 0.0;  ///< largest distance of a centre of mass from the reference at the end [m];

@@ -6,7 +6,7 @@
 #include <functional>
 #include <limits>
 
-#include "harness/precision/witness.h"
+#include "harness/precision/exact.h"
 
 namespace loopbench::harness {
 namespace {
@@ -115,18 +115,12 @@ std::vector<Way> WaysOf(const Measured& measured, const ReferenceOptions& option
     return {By<Spatial, long double>(PutBack::kAtSteps, measured, cpu_s),
             By<Spatial, long double>(PutBack::kAtStages, measured, cpu_s)};
   }
-  std::vector<Way> ways;
-  if (options.scalar == "float128") {
-    ways.push_back(By<Planar, Float128>(PutBack::kAtSteps, measured, cpu_s));
-  } else {
-    ways.push_back(By<Planar, long double>(PutBack::kAtSteps, measured, cpu_s));
-  }
-  if (options.scalar == "long-double") {
-    ways.push_back(By<Planar, long double>(PutBack::kAtStages, measured, cpu_s));
-  } else {
-    ways.push_back(By<Planar, Float128>(PutBack::kAtStages, measured, cpu_s));
-  }
-  return ways;
+  const auto planar = [&](bool is_wide, PutBack put_back) {
+    return is_wide ? By<Planar, Float128>(put_back, measured, cpu_s)
+                   : By<Planar, long double>(put_back, measured, cpu_s);
+  };
+  return {planar(options.scalar == "float128", PutBack::kAtSteps),
+          planar(options.scalar != "long-double", PutBack::kAtStages)};
 }
 
 /// The last time before bounds exceed kCertifiedShare.

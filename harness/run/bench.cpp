@@ -5,6 +5,7 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -14,9 +15,7 @@
 #include <optional>
 #include <sstream>
 
-#include "harness/base/record.h"
 #include "harness/base/text.h"
-#include "harness/config/benchmarks.h"
 #include "harness/run/timing.h"
 
 namespace {
@@ -139,20 +138,6 @@ struct Fixture {
   std::unique_ptr<BenchmarkSubject> subject;
 };
 
-Fixture& Prepare(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
-                 BenchmarkKind kind, const Method& method) {
-  static Fixture last;
-  const std::string name = BenchmarkName(kind, member, method);
-  if (last.name == name) return last;
-  last = {};
-  const MechanismDescription description = member.Make();
-  const BenchmarkState& state = states.Get(member, description, method.coordinates);
-  last.subject = MakeSubject(description, method, state, set.integrator, set.step);
-  last.hash = state.hash;
-  last.name = name;
-  return last;
-}
-
 /// Sets a counter, unless it is not a number.
 void Count(benchmark::State& state, const char* name, double value) {
   if (std::isfinite(value)) state.counters[name] = value;
@@ -201,18 +186,26 @@ void Measure(benchmark::State& state, BenchmarkSubject& subject, BenchmarkKind k
 
 void Register(const BenchmarkSet& set, States& states, const BenchmarkMember& member,
               BenchmarkKind kind, const Method& method) {
-  const auto run = [&set, &states, &member, kind, method](benchmark::State& state) {
+  const std::string name = BenchmarkName(kind, member, method);
+  const auto run = [&set, &states, &member, kind, method, name](benchmark::State& state) {
+    static Fixture last;
     try {
-      Fixture& prepared = Prepare(set, states, member, kind, method);
-      state.SetLabel(prepared.hash);
-      Measure(state, *prepared.subject, kind, method);
+      if (last.name != name) {
+        last = {};
+        const MechanismDescription description = member.Make();
+        const BenchmarkState& at = states.Get(member, description, method.coordinates);
+        last.subject = MakeSubject(description, method, at, set.integrator, set.step);
+        last.hash = at.hash;
+        last.name = name;
+      }
+      state.SetLabel(last.hash);
+      Measure(state, *last.subject, kind, method);
     } catch (const std::exception& error) {
       state.SkipWithError(EscapeTerminal(error.what()).c_str());
     }
   };
   // the library prints names as they are, and up to a zero byte
-  const std::string shown = EscapeTerminal(BenchmarkName(kind, member, method));
-  benchmark::RegisterBenchmark(shown.c_str(), run);
+  benchmark::RegisterBenchmark(EscapeTerminal(name).c_str(), run);
 }
 
 int SaveStates(const BenchmarkSet& set) {
@@ -259,9 +252,11 @@ bool TakeFlag(std::vector<char*>& arguments, const std::string& name) {
 }
 
 /// Returns the library's value of a string option, from the arguments or the environment.
-std::string LibraryOption(const std::vector<char*>& arguments, const std::string& name,
-                          const char* variable) {
-  std::string value = std::getenv(variable) == nullptr ? "" : std::getenv(variable);
+std::string LibraryOption(const std::vector<char*>& arguments, const std::string& name) {
+  std::string variable;
+  for (const char c : name) variable += static_cast<char>(std::toupper(c));
+  const char* set = std::getenv(variable.c_str());
+  std::string value = set == nullptr ? "" : set;
   for (const std::string word : arguments) {
     if (word.rfind("--" + name + "=", 0) == 0) value = word.substr(name.size() + 3);
   }
@@ -269,9 +264,8 @@ std::string LibraryOption(const std::vector<char*>& arguments, const std::string
 }
 
 /// The library takes "nan" and "inf" for times, and then does not end.
-void RequireSeconds(const std::vector<char*>& arguments, const std::string& name,
-                    const char* variable) {
-  const std::string text = LibraryOption(arguments, name, variable);
+void RequireSeconds(const std::vector<char*>& arguments, const std::string& name) {
+  const std::string text = LibraryOption(arguments, name);
   if (text.empty()) return;
   constexpr double kLongest = 1e6;
   double seconds = 0.0;
@@ -291,16 +285,14 @@ int Measured(int argc, char** argv) {
   const std::string file = TakeOption(arguments, "--families")
                                .value_or(LOOPBENCH_SOURCE_DIR "/configs/benchmarks/default.json");
   const bool save = TakeFlag(arguments, "--save-states");
-  const std::string out_format =
-      LibraryOption(arguments, "benchmark_out_format", "BENCHMARK_OUT_FORMAT");
-  const std::string out = LibraryOption(arguments, "benchmark_out", "BENCHMARK_OUT");
+  const std::string out_format = LibraryOption(arguments, "benchmark_out_format");
+  const std::string out = LibraryOption(arguments, "benchmark_out");
   // the library would leave with 1
   if (!out.empty() && !std::ofstream(out, std::ios::app)) FailOn("write", out);
   const bool json_to_file = !out.empty() && (out_format.empty() || out_format == "json");
-  const bool json_to_terminal =
-      LibraryOption(arguments, "benchmark_format", "BENCHMARK_FORMAT") == "json";
-  RequireSeconds(arguments, "benchmark_min_time", "BENCHMARK_MIN_TIME");
-  RequireSeconds(arguments, "benchmark_min_warmup_time", "BENCHMARK_MIN_WARMUP_TIME");
+  const bool json_to_terminal = LibraryOption(arguments, "benchmark_format") == "json";
+  RequireSeconds(arguments, "benchmark_min_time");
+  RequireSeconds(arguments, "benchmark_min_warmup_time");
   int count = static_cast<int>(arguments.size());
   arguments.push_back(nullptr);
   benchmark::Initialize(&count, arguments.data());

@@ -1,19 +1,32 @@
 #include <algorithm>
 
-#include "harness/base/record.h"
 #include "harness/base/text.h"
-#include "harness/config/experiment.h"
-#include "harness/config/options.h"
 #include "harness/run/run.h"
 
 namespace loopbench::harness {
-
 namespace {
 
 const BodyImage& ImageOf(const MechanismDescription& description, const Compiled& compiled,
                          const std::string& name) {
   const auto body = std::ranges::find(description.bodies, name, &BodyDescription::name);
   return compiled.bodies[static_cast<std::size_t>(body - description.bodies.begin())];
+}
+
+/// Returns the content common to all runs besides their keys.
+Record CommonContent(const Experiment& experiment) {
+  Record content = RecordOf(experiment.limits);
+  content.Set("preprocess", ToString(experiment.compile));
+  return content;
+}
+
+Record ProblemContent(const Experiment& experiment, const Case& entry) {
+  Record content = CommonContent(experiment);
+  content.Set("document", experiment.problems[entry.problem].mechanism.canonical);
+  const Profile* profile = FindProfile(entry.integrator);
+  if (profile != nullptr && profile->is_own && !IsPeer(entry.method)) {
+    content.Set("butcher_table", ToString(profile->table));
+  }
+  return content;
 }
 
 }  // namespace
@@ -63,26 +76,6 @@ std::string ToString(const CompileOptions& options) {
   add(options.redundancy, "redundancy");
   return text.empty() ? "none" : text;
 }
-namespace {
-
-/// Returns the content common to all runs besides their keys.
-Record CommonContent(const Experiment& experiment) {
-  Record content = RecordOf(experiment.limits);
-  content.Set("preprocess", ToString(experiment.compile));
-  return content;
-}
-
-Record ProblemContent(const Experiment& experiment, const Case& entry) {
-  Record content = CommonContent(experiment);
-  content.Set("document", experiment.problems[entry.problem].mechanism.canonical);
-  const Profile* profile = FindProfile(entry.integrator);
-  if (profile != nullptr && profile->is_own && !IsPeer(entry.method)) {
-    content.Set("butcher_table", ToString(profile->table));
-  }
-  return content;
-}
-
-}  // namespace
 
 void SetCaseId(Record* keys, const std::string& content) {
   constexpr std::size_t kDigits = 8;

@@ -10,12 +10,9 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
-#include <vector>
 
 #include "harness/base/numeric_option.h"
-#include "harness/base/record.h"
 #include "harness/base/text.h"
-#include "harness/config/benchmarks.h"
 #include "harness/run/timing.h"
 
 namespace loopbench::harness {

@@ -5,18 +5,14 @@
 #include <cmath>
 #include <numbers>
 #include <random>
-#include <string>
 #include <string_view>
 #include <utility>
 
-#include "harness/base/record.h"
 #include "harness/base/text.h"
 #include "harness/run/run.h"
 #include "mechanism/description/outcome.h"
-#include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
-
 namespace {
 
 /// Returns the sum of a key over the parts that have it; NaN if one of `all` lacks it; nothing if
@@ -63,26 +59,17 @@ const Run* Deciding(std::span<const Run> parts, const Measure& measure, std::str
 
 /// Returns the value of a key for the whole; nothing if undefined.
 Value MergeKey(std::span<const Run> parts, const Measure& measure, std::string_view key) {
-  const bool started = std::ranges::all_of(
-      parts, [](const Run& part) { return !std::isnan(part.record.Number("rank_min")); });
-  switch (measure.merging.how) {
-    case Merge::kLost:
-      return {};
-    case Merge::kSum:
-      return Sum(parts, key, false);
-    case Merge::kSumOfAll:
-      return started ? Sum(parts, key, true) : Value();
-    case Merge::kHashOfAll: {
-      std::string all;
-      for (const Run& part : parts) all += part.record.Text(key);
-      return started ? Value(Fnv1a(all)) : Value();
-    }
-    case Merge::kLargest:
-    case Merge::kSmallest:
-    case Merge::kWith:
-    case Merge::kOfEnding:
-    case Merge::kOfEachPart:
-      break;
+  const Merge how = measure.merging.how;
+  if (how == Merge::kLost) return {};
+  if (how == Merge::kSum) return Sum(parts, key, false);
+  if (how == Merge::kSumOfAll || how == Merge::kHashOfAll) {
+    const bool started = std::ranges::all_of(
+        parts, [](const Run& part) { return !std::isnan(part.record.Number("rank_min")); });
+    if (!started) return {};
+    if (how == Merge::kSumOfAll) return Sum(parts, key, true);
+    std::string all;
+    for (const Run& part : parts) all += part.record.Text(key);
+    return Fnv1a(all);
   }
   const Run* part = Deciding(parts, measure, key);
   return part == nullptr || part->record.Find(key) == nullptr ? Value() : *part->record.Find(key);
@@ -107,27 +94,6 @@ DriftSeries MergeDrift(std::span<const Run> parts) {
   }
   return merged;
 }
-
-}  // namespace
-
-Run MergeParts(std::span<const Run> parts) {
-  if (parts.size() == 1) return parts.front();
-  Run whole;
-  for (const Run& part : parts) {
-    for (const auto& [key, value] : part.record.items()) {
-      const Measure* measure = FindMeasure(key);
-      if (measure == nullptr || whole.record.Find(key) != nullptr) continue;
-      Value merged = MergeKey(parts, *measure, key);
-      if (!std::holds_alternative<std::monostate>(merged)) {
-        whole.record.Append(key, std::move(merged));
-      }
-    }
-  }
-  whole.drift = MergeDrift(parts);
-  whole.min_violation = std::ranges::max_element(parts, {}, &Run::min_violation)->min_violation;
-  return whole;
-}
-namespace {
 
 // Errors of a member's run whose largest is kept.
 constexpr std::array kErrors = {"branch_error_max", "closed_form_error_max", "energy_error_max",
@@ -217,6 +183,24 @@ std::string StartText(const MechanismDescription& description) {
 }
 
 }  // namespace
+
+Run MergeParts(std::span<const Run> parts) {
+  if (parts.size() == 1) return parts.front();
+  Run whole;
+  for (const Run& part : parts) {
+    for (const auto& [key, value] : part.record.items()) {
+      const Measure* measure = FindMeasure(key);
+      if (measure == nullptr || whole.record.Find(key) != nullptr) continue;
+      Value merged = MergeKey(parts, *measure, key);
+      if (!std::holds_alternative<std::monostate>(merged)) {
+        whole.record.Append(key, std::move(merged));
+      }
+    }
+  }
+  whole.drift = MergeDrift(parts);
+  whole.min_violation = std::ranges::max_element(parts, {}, &Run::min_violation)->min_violation;
+  return whole;
+}
 
 MechanismDescription MemberStart(const MechanismDescription& description, const Case& entry,
                                  int member) {

@@ -1,170 +1,150 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
 
-#include "harness/integrator/arkode.h"
 #include "harness/run/run.h"
 
 namespace loopbench::harness {
 
 namespace {
 
-/// Relative poses of the bodies of a joint.
-template <class Space>
-struct RelativePose {
-  Pose<Space, double> X_PQ;     ///< axes and centres of mass
-  Linear<Space, double> point;  ///< of the joint's M, from P's centre of mass in P's axes
-};
-
-template <class Space>
-class Watching {
- public:
-  explicit Watching(const MechanismDescription& description)
-      : description_(description), mechanism_(description, Coordinates::kJoint) {}
-
-  ShortRun Run(double duration, double cpu_s) {
-    auto [system, y, failure] = StartAtLevelPosition<Space>(description_, mechanism_, "odca");
-    run_.message = failure;
-    if (system == nullptr) return run_;
-    IntegratorOptions options;
-    options.rtol = options.atol = 1e-6;
-    options.time_limit_s = cpu_s;
-    options.stop_times = mechanism_.stop_times();
-    const auto observe = [&, &system = system](double t, std::span<double> state) {
-      const bool restart = system->BeginStep(t, state);
-      if (system->FromState(t, state) == Outcome::kFinished) Look(t, system->kinematics());
-      return restart ? StepAction::kRestart : StepAction::kContinue;
-    };
-    const IntegratorResult result = Integrate(*system, 0.0, duration, y, options, observe);
-    if (result.outcome != Outcome::kFinished) {
-      run_.message = fmt::format(
-          "it ended after {:.3g} s of {:.3g} s: {}", result.t_reached, duration,
-          result.message.empty() ? ToString(result.outcome) : std::string_view(result.message));
-    }
-    return run_;
+/// Integrates a description without observers, at level projection, to `end`. `mechanism` is the
+/// description in joint coordinates. Calls look(t, kinematics) at the start and after each accepted
+/// step where `is_wanted`(t). Returns nothing if there is no start, with the reason in `failure`.
+template <class Space, class IsWanted, class Look>
+std::optional<IntegratorResult> RunBare(const MechanismDescription& description,
+                                        const Mechanism<Space, double>& mechanism,
+                                        const std::string& formulation, double end,
+                                        const IntegratorOptions& options, std::string* failure,
+                                        const IsWanted& is_wanted, const Look& look) {
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  *failure = start.message;
+  if (start.outcome != Outcome::kFinished) return std::nullopt;
+  const auto system = MakeFormulation<Space>(
+      {.formulation = formulation, .enforcement = Enforcement::kPosition}, mechanism);
+  const Outcome outcome = system->Start(0.0, start.q, start.u);
+  if (outcome != Outcome::kFinished) {
+    *failure = ToString(outcome);
+    return std::nullopt;
   }
-
- private:
-  RelativePose<Space> StandOf(const Kinematics<Space, double>& kinematics,
-                              std::size_t index) const {
-    const Joint<Space, double>& joint = mechanism_.joints()[index];
-    RelativePose<Space> stand;
-    stand.X_PQ = Compose(Inverse(kinematics.poses()[joint.from]), kinematics.poses()[joint.to]);
-    stand.point = Compose(stand.X_PQ, joint.X_QM).p;
-    return stand;
-  }
-
-  void Look(double t, const Kinematics<Space, double>& kinematics) {
-    for (std::size_t j = 0; j < description_.joints.size(); ++j) {
-      const RelativePose<Space> stand = StandOf(kinematics, j);
-      if (first_.size() == j) first_.push_back(stand);
-      Travel& travel = run_.travels[description_.joints[j].name];
-      const Pose<Space, double> turned = Compose(Inverse(first_[j].X_PQ), stand.X_PQ);
-      travel.turn = std::max(travel.turn, RotationVector(turned).norm());
-      travel.shift = std::max(travel.shift, (stand.point - first_[j].point).norm());
+  std::vector<double> y(static_cast<std::size_t>(system->size()));
+  system->ToState(start.q, start.u, y);
+  const auto observe = [&](double t, std::span<double> state) {
+    const bool restart = system->BeginStep(t, state);
+    if (is_wanted(t) && system->FromState(t, state) == Outcome::kFinished) {
+      look(t, system->kinematics());
     }
-    for (const Velocity<Space, double>& V : kinematics.motions()) {
-      run_.rate = std::max({run_.rate, V.angular.norm(), V.linear.norm() / mechanism_.length()});
-    }
-    run_.duration = t;
-  }
-
-  const MechanismDescription& description_;
-  Mechanism<Space, double> mechanism_;
-  std::vector<RelativePose<Space>> first_;
-  ShortRun run_;
-};
-
-}  // namespace
-
-ShortRun MakeShortRun(const MechanismDescription& description, double duration, double cpu_s) {
-  return description.space == SpaceKind::kPlanar
-             ? Watching<Planar>(description).Run(duration, cpu_s)
-             : Watching<Spatial>(description).Run(duration, cpu_s);
+    return restart ? StepAction::kRestart : StepAction::kContinue;
+  };
+  return Integrate(*system, 0.0, end, y, options, observe);
 }
 
-namespace {
-
-constexpr double kTolerance = 1e-10;
-constexpr int kTimes = 50;
+template <class Space>
+ShortRun Watch(const MechanismDescription& description, double duration, double cpu_s) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  std::vector<Pose<Space, double>> first_poses;     // of the bodies of each joint, at the start
+  std::vector<Linear<Space, double>> first_points;  // of its M, from P's centre of mass in P's axes
+  ShortRun run;
+  const auto look = [&](double t, const Kinematics<Space, double>& kinematics) {
+    for (std::size_t j = 0; j < description.joints.size(); ++j) {
+      const Joint<Space, double>& joint = mechanism.joints()[j];
+      const Pose<Space, double> X_PQ =
+          Compose(Inverse(kinematics.poses()[joint.from]), kinematics.poses()[joint.to]);
+      const Linear<Space, double> point = Compose(X_PQ, joint.X_QM).p;
+      if (first_poses.size() == j) {
+        first_poses.push_back(X_PQ);
+        first_points.push_back(point);
+      }
+      Travel& travel = run.travels[description.joints[j].name];
+      const Pose<Space, double> turned = Compose(Inverse(first_poses[j]), X_PQ);
+      travel.turn = std::max(travel.turn, RotationVector(turned).norm());
+      travel.shift = std::max(travel.shift, (point - first_points[j]).norm());
+    }
+    for (const Velocity<Space, double>& V : kinematics.motions()) {
+      run.rate = std::max({run.rate, V.angular.norm(), V.linear.norm() / mechanism.length()});
+    }
+    run.duration = t;
+  };
+  IntegratorOptions options;
+  options.rtol = options.atol = 1e-6;
+  options.time_limit_s = cpu_s;
+  options.stop_times = mechanism.stop_times();
+  const auto result = RunBare(
+      description, mechanism, "odca", duration, options, &run.message, [](double) { return true; },
+      look);
+  if (result && result->outcome != Outcome::kFinished) {
+    run.message = fmt::format(
+        "it ended after {:.3g} s of {:.3g} s: {}", result->t_reached, duration,
+        result->message.empty() ? ToString(result->outcome) : std::string_view(result->message));
+  }
+  return run;
+}
 
 template <class Space>
-class Tracking {
- public:
-  Tracking(const MechanismDescription& model, const Eigen::Matrix3d& R_WC,
-           const MechanismDescription& whole)
-      : model_(model), R_WC_(R_WC), mechanism_(model, Coordinates::kJoint) {
-    for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
-      const std::string& body = whole.bodies[b].name;
-      for (const auto& [point, at] : whole.bodies[b].points) {
-        const FoundPoint found = FindPoint(model, body, point);
-        if (found.body < 0) continue;
-        points_.push_back(found);
-        track_.names.push_back(body + "." + point);
-      }
+Track Follow(const MechanismDescription& model, const Eigen::Matrix3d& R_WC,
+             const MechanismDescription& whole, double horizon, double cpu_s) {
+  constexpr double kTolerance = 1e-10;
+  constexpr int kTimes = 50;
+  const Mechanism<Space, double> mechanism(model, Coordinates::kJoint);
+  Track track;
+  std::vector<FoundPoint> points;
+  for (std::size_t b = 1; b < whole.bodies.size(); ++b) {
+    const std::string& body = whole.bodies[b].name;
+    for (const auto& [point, at] : whole.bodies[b].points) {
+      const FoundPoint found = FindPoint(model, body, point);
+      if (found.body < 0) continue;
+      points.push_back(found);
+      track.names.push_back(body + "." + point);
     }
   }
-
-  Track Run(double horizon, double cpu_s) {
-    auto [system, y, failure] = StartAtLevelPosition<Space>(model_, mechanism_, "lagrange");
-    track_.failure = failure;
-    if (system == nullptr) return track_;
-    std::vector<double> wanted;
-    for (int i = 1; i <= kTimes; ++i) wanted.push_back(horizon * i / kTimes);
-    IntegratorOptions options;
-    options.profile = "dormand-prince";
-    options.rtol = options.atol = kTolerance;
-    options.time_limit_s = cpu_s;
-    options.stop_times = mechanism_.stop_times();
-    options.stop_times.insert(options.stop_times.end(), wanted.begin(), wanted.end());
-    std::ranges::sort(options.stop_times);
-    std::size_t next = 0;
-    const auto observe = [&, &system = system](double t, std::span<double> state) {
-      const bool restart = system->BeginStep(t, state);
-      // a stop is met to round-off
-      const bool is_wanted = next < wanted.size() && t > wanted[next] - 1e-9 * horizon;
-      if (is_wanted && system->FromState(t, state) == Outcome::kFinished) {
-        Look(wanted[next++], system->kinematics());
-      }
-      return restart ? StepAction::kRestart : StepAction::kContinue;
-    };
-    const IntegratorResult result = Integrate(*system, 0.0, horizon, y, options, observe);
-    track_.rhs_evaluations = result.rhs_evaluations;
-    if (result.outcome != Outcome::kFinished) track_.failure = ToString(result.outcome);
-    return track_;
-  }
-
- private:
-  void Look(double t, const Kinematics<Space, double>& kinematics) {
-    track_.times.push_back(t);
-    std::vector<Eigen::Vector3d>& places = track_.points.emplace_back();
-    for (const FoundPoint& point : points_) {
+  std::vector<double> wanted;
+  for (int i = 1; i <= kTimes; ++i) wanted.push_back(horizon * i / kTimes);
+  std::size_t next = 0;
+  // a stop is met to round-off
+  const auto is_wanted = [&](double t) {
+    return next < wanted.size() && t > wanted[next] - 1e-9 * horizon;
+  };
+  const auto look = [&](double, const Kinematics<Space, double>& kinematics) {
+    track.times.push_back(wanted[next++]);
+    std::vector<Eigen::Vector3d>& places = track.points.emplace_back();
+    for (const FoundPoint& point : points) {
       const Pose<Space, double>& X = kinematics.poses()[point.body];
       Eigen::Vector3d from_com = point.at;
-      if (point.body != kGround) from_com -= model_.bodies[point.body].com;
+      if (point.body != kGround) from_com -= model.bodies[point.body].com;
       Eigen::Vector3d p = Eigen::Vector3d::Zero();
       Linear<Space, double> arm;
       for (int i = 0; i < Space::kLin; ++i) arm[i] = from_com[i];
       p.head<Space::kLin>() = (X.p + X.R * arm).eigen();
-      places.push_back(R_WC_ * p);
+      places.push_back(R_WC * p);
     }
-  }
-
-  const MechanismDescription& model_;
-  Eigen::Matrix3d R_WC_;
-  Mechanism<Space, double> mechanism_;
-  std::vector<FoundPoint> points_;
-  Track track_;
-};
+  };
+  IntegratorOptions options;
+  options.profile = "dormand-prince";
+  options.rtol = options.atol = kTolerance;
+  options.time_limit_s = cpu_s;
+  options.stop_times = mechanism.stop_times();
+  options.stop_times.insert(options.stop_times.end(), wanted.begin(), wanted.end());
+  std::ranges::sort(options.stop_times);
+  const auto result =
+      RunBare(model, mechanism, "lagrange", horizon, options, &track.failure, is_wanted, look);
+  if (!result) return track;
+  track.rhs_evaluations = result->rhs_evaluations;
+  if (result->outcome != Outcome::kFinished) track.failure = ToString(result->outcome);
+  return track;
+}
 
 }  // namespace
 
+ShortRun MakeShortRun(const MechanismDescription& description, double duration, double cpu_s) {
+  return description.space == SpaceKind::kPlanar ? Watch<Planar>(description, duration, cpu_s)
+                                                 : Watch<Spatial>(description, duration, cpu_s);
+}
+
 Track TrackOf(const MechanismDescription& model, const Eigen::Matrix3d& R_WC,
               const MechanismDescription& whole, double horizon, double cpu_s) {
-  return model.space == SpaceKind::kPlanar
-             ? Tracking<Planar>(model, R_WC, whole).Run(horizon, cpu_s)
-             : Tracking<Spatial>(model, R_WC, whole).Run(horizon, cpu_s);
+  return model.space == SpaceKind::kPlanar ? Follow<Planar>(model, R_WC, whole, horizon, cpu_s)
+                                           : Follow<Spatial>(model, R_WC, whole, horizon, cpu_s);
 }
 
 ModelError Compare(const Track& whole, const Track& model) {

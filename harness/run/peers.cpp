@@ -3,7 +3,6 @@
 #include <map>
 
 #include "harness/base/text.h"
-#include "harness/config/formulations.h"
 #include "harness/run/run.h"
 #include "mechanism/description/registration.h"
 

@@ -11,8 +11,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
-#include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -22,14 +20,9 @@
 #include <memory>
 #include <new>
 #include <set>
-#include <stdexcept>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "harness/base/record.h"
 #include "harness/base/text.h"
-#include "mechanism/model/dense_memory.h"
+#include "mechanism/algebra/dense_memory.h"
 
 namespace loopbench::harness {
 namespace {
@@ -51,97 +44,14 @@ bool RunsProgram(pid_t pid) {
   return static_cast<bool>(file >> child);
 }
 
-}  // namespace
-
-double ChildWatch::cpu_s() const {
-  clockid_t clock{};
-  std::timespec time{};
-  if (::clock_getcpuclockid(pid_, &clock) != 0 || ::clock_gettime(clock, &time) != 0) return 0.0;
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-void ChildWatch::Look(bool unread) {
-  const Clock::time_point now = Clock::now();
-  const double since = std::chrono::duration<double>(now - looked_).count();
-  if (since < kLook_s) return;
-  constexpr double kComputes = 0.01;  // minimum CPU share of computing; naps use less
-  const double used = cpu_s();
-  const bool computed = used - cpu_before_ > kComputes * since;
-  if (computed || unread) {
-    idle_s_ = 0.0;
-  } else if (StateOf(pid_) == 'S' && !RunsProgram(pid_)) {
-    idle_s_ += std::min(since, kLook_s);
-  }
-  looked_ = now;
-  cpu_before_ = used;
-}
-namespace {
-
 constexpr int kSignals[] = {SIGHUP, SIGINT, SIGTERM};
 
 volatile std::sig_atomic_t asked = 0;
 
 extern "C" void Remember(int signal) { asked = signal; }
 
-}  // namespace
-
-Interrupted::Interrupted(int signal) : std::runtime_error("interrupted"), signal_(signal) {}
-
-Interruption::Interruption() {
-  asked = 0;
-  for (std::size_t i = 0; i < before_.size(); ++i) {
-    ::sigaction(kSignals[i], nullptr, &before_[i]);
-    if (before_[i].sa_handler == SIG_IGN) continue;
-    struct sigaction remember = {};
-    remember.sa_handler = &Remember;
-    // SA_RESTART: writes in progress complete; waiting for processes is still interrupted
-    remember.sa_flags = static_cast<int>(SA_RESTART | SA_RESETHAND);
-    ::sigaction(kSignals[i], &remember, nullptr);
-  }
-}
-
-Interruption::~Interruption() {
-  for (std::size_t i = 0; i < before_.size(); ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
-  asked = 0;
-}
-
-void Interruption::Check() {
-  if (asked != 0) throw Interrupted(asked);
-}
-
-void Interruption::LeaveToParent() {
-  for (const int signal : kSignals) std::signal(signal, SIG_IGN);
-}
-
-std::optional<std::string> PlantedFault(const Record& keys) {
-  const char* planted = std::getenv("LOOPBENCH_FAULT");
-  if (planted == nullptr) return std::nullopt;
-  const std::string_view text = planted;
-  const std::size_t colon = text.find(':');
-  const std::string_view fault = text.substr(0, colon);
-  if (colon == std::string_view::npos || !Matches(keys, {ParseCondition(text.substr(colon + 1))})) {
-    return std::nullopt;
-  }
-  if (fault == "crash") std::raise(SIGSEGV);
-  if (fault == "throw") throw std::logic_error("planted");
-  if (fault == "garbage") return "{\"kind\": \"accu\x01\xff";
-  if (fault == "memory") {
-    std::vector<std::unique_ptr<char[]>> hoard;
-    for (;;) hoard.emplace_back(new char[1 << 26]);  // requested but not touched: fast
-  }
-  while (fault == "hang") ::pause();
-  return std::nullopt;
-}
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
 constexpr int kThrewExit = 91, kMemoryExit = 92,
               kFaultExit = 93;  ///< free for any use by this program
-
-double SecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 double Seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
@@ -183,7 +93,8 @@ void WriteAll(int descriptor, std::string_view text) {
 /// Runs the child. Never returns: destructors and exit handlers belong to the parent.
 [[noreturn]] void Work(int answer, pid_t parent, const ProcessLimits& limits,
                        const std::function<std::string()>& work) {
-  Interruption::LeaveToParent();
+  // the parent decides, since a terminal sends Ctrl-C to both
+  for (const int signal : kSignals) std::signal(signal, SIG_IGN);
   // an ignored or blocked signal survives exec
   sigset_t end;
   ::sigemptyset(&end);
@@ -211,38 +122,64 @@ void WriteAll(int descriptor, std::string_view text) {
   ::_exit(EXIT_SUCCESS);
 }
 
-constexpr double kEnd_s = 3.0;  ///< for a child to end its program and remove its files
+constexpr double kLook_s = 0.25;  ///< between two checks of a child
+constexpr double kEnd_s = 3.0;    ///< for a child to end its program and remove its files
 
 struct Child {
   std::size_t piece = 0;
   pid_t pid = -1;
   int answer = -1;
   ProcessLimits limits;
-  Clock::time_point begin;
-  ChildWatch watch;
-  std::string text;
-  std::string killed;  ///< reason, as text
-  Clock::time_point killed_at = {};
+  double begin = WallSeconds(), looked = begin, killed_at = 0.0;  ///< [s]
+  double cpu_before = 0.0;                                        ///< at the last check [s]
+  double idle_s = 0.0;  ///< continuous time asleep since it last computed
+  std::string text = {};
+  std::string killed = {};  ///< reason, as text
+
+  /// Returns the CPU time used so far by all threads [s].
+  double cpu_s() const {
+    clockid_t clock{};
+    std::timespec time{};
+    if (::clock_getcpuclockid(pid, &clock) != 0 || ::clock_gettime(clock, &time) != 0) return 0.0;
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
 
   /// Returns the time before which no limit can be exceeded and no check is needed [s].
   double Wait() const {
     if (!killed.empty() || limits.cpu_s <= 0.0) return kLook_s;
-    return std::clamp(limits.cpu_s - watch.cpu_s(), 0.01, kLook_s);
+    return std::clamp(limits.cpu_s - cpu_s(), 0.01, kLook_s);
+  }
+
+  /// Measures its sleep. `unread`: its answer is waiting to be read, which does not count as sleep.
+  /// States other than S (ready, stopped, waiting for a disk) are caused by the machine. The parent
+  /// may be stopped too: a check adds at most the nominal time between two.
+  void Look(bool unread) {
+    const double since = WallSeconds() - looked;
+    if (since < kLook_s) return;
+    constexpr double kComputes = 0.01;  // minimum CPU share of computing; naps use less
+    const double used = cpu_s();
+    if (used - cpu_before > kComputes * since || unread) {
+      idle_s = 0.0;
+    } else if (StateOf(pid) == 'S' && !RunsProgram(pid)) {
+      idle_s += std::min(since, kLook_s);
+    }
+    looked = WallSeconds();
+    cpu_before = used;
   }
 
   void KillIfOver() {
     if (!killed.empty()) {
-      if (SecondsSince(killed_at) > kEnd_s) ::kill(pid, SIGKILL);
+      if (WallSeconds() - killed_at > kEnd_s) ::kill(pid, SIGKILL);
       return;
     }
-    if (limits.cpu_s > 0.0 && watch.cpu_s() >= limits.cpu_s) {
+    if (limits.cpu_s > 0.0 && cpu_s() >= limits.cpu_s) {
       killed = fmt::format("killed after {:.4g} s of CPU time", limits.cpu_s);
-    } else if (watch.idle_s() >= limits.idle_s) {
+    } else if (idle_s >= limits.idle_s) {
       killed = fmt::format("killed after {:.4g} s asleep, computing nothing", limits.idle_s);
     } else {
       return;
     }
-    killed_at = Clock::now();
+    killed_at = WallSeconds();
     ::kill(pid, kRemoveAndEnd);  // its pipe closes, which the next Wait() detects
   }
 };
@@ -252,10 +189,10 @@ class Children {
  public:
   ~Children() {
     for (const Child& child : running_) ::kill(child.pid, kRemoveAndEnd);
-    const Clock::time_point begin = Clock::now();
+    const double begin = WallSeconds();
     for (const Child& child : running_) {
       while (::waitpid(child.pid, nullptr, WNOHANG) == 0) {
-        if (SecondsSince(begin) > kEnd_s) ::kill(child.pid, SIGKILL);
+        if (WallSeconds() - begin > kEnd_s) ::kill(child.pid, SIGKILL);
         ::usleep(1000);
       }
       ::close(child.answer);
@@ -281,7 +218,7 @@ class Children {
       ::close(ends[0]);
       Fail("start a process");
     }
-    running_.push_back({piece, pid, ends[0], limits, Clock::now(), ChildWatch(pid), {}, {}});
+    running_.push_back({piece, pid, ends[0], limits});
   }
 
   /// Waits for an event and returns the children that ended.
@@ -300,7 +237,7 @@ class Children {
     for (std::size_t i = running_.size(); i-- > 0;) {
       Child& child = running_[i];
       const bool unread = (waiting[i].revents & (POLLIN | POLLHUP)) != 0;
-      child.watch.Look(unread);
+      child.Look(unread);
       child.KillIfOver();
       if (!unread || Read(child)) continue;
       ended.push_back(std::move(child));
@@ -329,7 +266,7 @@ ProcessResult ResultOf(Child child) {
   }
   ::close(child.answer);
   ProcessResult result;
-  result.wall_s = SecondsSince(child.begin);
+  result.wall_s = WallSeconds() - child.begin;
   result.cpu_s = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
   if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS) {
     result.text = std::move(child.text);
@@ -357,32 +294,13 @@ ProcessResult ResultOf(Child child) {
   return result;
 }
 
-}  // namespace
-
-std::string_view OutcomeOf(ProcessEnding ending) {
-  switch (ending) {
-    case ProcessEnding::kOverTime:
-      return "process-time-limit";
-    case ProcessEnding::kOverMemory:
-      return "memory-limit";
-    default:
-      return "crashed";
-  }
-}
-
-bool LimitsMemory() {
-#ifdef __SANITIZE_ADDRESS__
-  return false;
-#else
-  return true;
-#endif
-}
-
-void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int jobs,
-                    const std::function<std::string(std::size_t)>& work,
-                    const std::function<ProcessLimits(std::size_t)>& limits,
-                    const std::function<void(std::size_t, const ProcessResult&)>& done,
-                    const ProcessNews& news) {
+/// As RunInProcesses() for each piece that `next` returns. `next` returns nothing while there is
+/// nothing to start, and is called again after each ending.
+void Supervise(const std::function<std::optional<std::size_t>()>& next, int jobs,
+               const std::function<std::string(std::size_t)>& work,
+               const std::function<ProcessLimits(std::size_t)>& limits,
+               const std::function<void(std::size_t, const ProcessResult&)>& done,
+               const ProcessNews& news) {
   Children children;
   std::vector<std::size_t> killed;  // to be started again
   std::set<std::size_t> started_again;
@@ -414,27 +332,6 @@ void RunInProcesses(const std::function<std::optional<std::size_t>()>& next, int
   }
 }
 
-void RunInProcesses(std::size_t count, int jobs,
-                    const std::function<std::string(std::size_t)>& work,
-                    const std::function<ProcessLimits(std::size_t)>& limits,
-                    const std::function<void(std::size_t, const ProcessResult&)>& done,
-                    const ProcessNews& news) {
-  const auto next = [i = std::size_t{0}, count]() mutable {
-    return i < count ? std::optional(i++) : std::nullopt;
-  };
-  RunInProcesses(next, jobs, work, limits, done, news);
-}
-
-ProcessResult RunInProcess(const ProcessLimits& limits, const std::function<std::string()>& work) {
-  ProcessResult result;
-  RunInProcesses(
-      1, 1, [&](std::size_t) { return work(); }, [&](std::size_t) { return limits; },
-      [&](std::size_t, const ProcessResult& ended) { result = ended; });
-  return result;
-}
-
-namespace {
-
 /// @param deliver  receives the printed text, before any exception
 int FromChild(const std::string& name, const ProcessLimits& limits,
               const std::function<int()>& work,
@@ -458,19 +355,6 @@ int FromChild(const std::string& name, const ProcessLimits& limits,
   PrintError("{}: cut off ({}): {}\n", name, OutcomeOf(result.ending), result.text);
   return 2;
 }
-
-}  // namespace
-
-int PrintFromChild(const std::string& name, const ProcessLimits& limits,
-                   const std::function<int()>& work) {
-  return FromChild(name, limits, work, &PrintText);
-}
-
-int TextFromChild(const std::string& name, const ProcessLimits& limits,
-                  const std::function<int()>& work, std::string* text) {
-  return FromChild(name, limits, work, [text](const std::string& printed) { *text = printed; });
-}
-namespace {
 
 constexpr double kBusy_s = 0.1;     ///< duration of a process; its start takes about 5 ms
 constexpr std::size_t kMost = 500;  ///< maximum tasks of a process: all repeat after a crash
@@ -504,108 +388,167 @@ std::vector<TaskResult> ReadAnswers(const std::vector<std::size_t>& tasks,
   return at == text.size() ? results : std::vector<TaskResult>();
 }
 
-/// Distributes tasks to processes.
-class Batches {
- public:
-  Batches(std::size_t count, int jobs, const std::function<std::size_t(std::size_t)>& together)
-      : count_(count), jobs_(static_cast<std::size_t>(jobs)), together_(together) {}
-
-  /// Returns nothing if all tasks are running or done.
-  std::vector<std::size_t> Next() {
-    if (!alone_.empty()) {
-      const std::size_t task = alone_.front();
-      alone_.pop_front();
-      return {task};
-    }
-    if (next_ == count_) return {};
-    // smaller batches at the end, so that the last processes end together
-    const std::size_t fair = std::max<std::size_t>(1, (count_ - next_) / (2 * jobs_));
-    const std::size_t size =
-        std::min(std::max(std::min(size_, fair), together_(next_)), count_ - next_);
-    std::vector<std::size_t> tasks(size);
-    for (std::size_t& task : tasks) task = next_++;
-    return tasks;
-  }
-
-  void Answered(std::size_t tasks, double cpu_s) {
-    const double each_s = std::max(cpu_s / static_cast<double>(tasks), 1e-6);
-    const auto fitting = static_cast<std::size_t>(kBusy_s / each_s);
-    size_ = std::clamp<std::size_t>(fitting, 1, std::min(kMost, kGrowth * size_));
-  }
-
-  void RunAlone(const std::vector<std::size_t>& tasks) {
-    alone_.insert(alone_.end(), tasks.begin(), tasks.end());
-    size_ = 1;
-  }
-
- private:
-  std::size_t count_, jobs_, next_ = 0, size_ = 1;
-  const std::function<std::size_t(std::size_t)>& together_;
-  std::deque<std::size_t> alone_;  ///< tasks of failed processes
-};
+/// Returns the lower of two limits, of which 0 is none.
+double Lower(double a, double b) { return a > 0.0 && b > 0.0 ? std::min(a, b) : a + b; }
 
 }  // namespace
+
+Interruption::Interruption() {
+  asked = 0;
+  for (std::size_t i = 0; i < before_.size(); ++i) {
+    ::sigaction(kSignals[i], nullptr, &before_[i]);
+    if (before_[i].sa_handler == SIG_IGN) continue;
+    struct sigaction remember = {};
+    remember.sa_handler = &Remember;
+    // SA_RESTART: writes in progress complete; waiting for processes is still interrupted
+    remember.sa_flags = static_cast<int>(SA_RESTART | SA_RESETHAND);
+    ::sigaction(kSignals[i], &remember, nullptr);
+  }
+}
+
+Interruption::~Interruption() {
+  for (std::size_t i = 0; i < before_.size(); ++i) ::sigaction(kSignals[i], &before_[i], nullptr);
+  asked = 0;
+}
+
+void Interruption::Check() {
+  if (asked != 0) throw Interrupted(asked);
+}
+
+std::optional<std::string> PlantedFault(const Record& keys) {
+  const char* planted = std::getenv("LOOPBENCH_FAULT");
+  if (planted == nullptr) return std::nullopt;
+  const std::string_view text = planted;
+  const std::size_t colon = text.find(':');
+  const std::string_view fault = text.substr(0, colon);
+  if (colon == std::string_view::npos || !Matches(keys, {ParseCondition(text.substr(colon + 1))})) {
+    return std::nullopt;
+  }
+  if (fault == "crash") std::raise(SIGSEGV);
+  if (fault == "throw") throw std::logic_error("planted");
+  if (fault == "garbage") return "{\"kind\": \"accu\x01\xff";
+  if (fault == "memory") {
+    std::vector<std::unique_ptr<char[]>> hoard;
+    for (;;) hoard.emplace_back(new char[1 << 26]);  // requested but not touched: fast
+  }
+  while (fault == "hang") ::pause();
+  return std::nullopt;
+}
+
+std::string_view OutcomeOf(ProcessEnding ending) {
+  return ending == ProcessEnding::kOverTime     ? "process-time-limit"
+         : ending == ProcessEnding::kOverMemory ? "memory-limit"
+                                                : "crashed";
+}
+
+bool LimitsMemory() {
+#ifdef __SANITIZE_ADDRESS__
+  return false;
+#else
+  return true;
+#endif
+}
+
+void RunInProcesses(std::size_t count, int jobs,
+                    const std::function<std::string(std::size_t)>& work,
+                    const std::function<ProcessLimits(std::size_t)>& limits,
+                    const std::function<void(std::size_t, const ProcessResult&)>& done,
+                    const ProcessNews& news) {
+  const auto next = [i = std::size_t{0}, count]() mutable {
+    return i < count ? std::optional(i++) : std::nullopt;
+  };
+  Supervise(next, jobs, work, limits, done, news);
+}
+
+ProcessResult RunInProcess(const ProcessLimits& limits, const std::function<std::string()>& work) {
+  ProcessResult result;
+  RunInProcesses(
+      1, 1, [&](std::size_t) { return work(); }, [&](std::size_t) { return limits; },
+      [&](std::size_t, const ProcessResult& ended) { result = ended; });
+  return result;
+}
+
+int PrintFromChild(const std::string& name, const ProcessLimits& limits,
+                   const std::function<int()>& work) {
+  return FromChild(name, limits, work, &PrintText);
+}
+
+int TextFromChild(const std::string& name, const ProcessLimits& limits,
+                  const std::function<int()>& work, std::string* text) {
+  return FromChild(name, limits, work, [text](const std::string& printed) { *text = printed; });
+}
 
 std::size_t RunInSharedProcesses(
     std::size_t count, int jobs,
     const std::function<std::vector<std::string>(const std::vector<std::size_t>&)>& work,
     const std::function<ProcessLimits(std::size_t)>& limits,
-    const std::function<void(const std::vector<TaskResult>&)>& done, const SharedNews& news) {
-  Batches batches(count, jobs, news.together);
+    const std::function<void(const std::vector<TaskResult>&)>& done, const Sharing& sharing,
+    const ProcessNews& news) {
   std::deque<std::vector<std::size_t>> processes;  // by number; finished ones are empty
+  std::deque<std::size_t> alone;                   // tasks of failed processes
+  std::size_t dealt = 0, size = 1;                 // tasks given to processes; of the next process
   std::size_t begun = 0;                           // tasks start in order, except for repetitions
+  const auto together = [&](std::size_t task) {
+    return sharing.is_allowed ? sharing.together(task) : 1;
+  };
   const auto next = [&]() -> std::optional<std::size_t> {
-    std::vector<std::size_t> tasks = batches.Next();
-    if (tasks.empty()) return std::nullopt;
+    std::vector<std::size_t> tasks;
+    if (!alone.empty()) {
+      tasks = {alone.front()};
+      alone.pop_front();
+    } else if (dealt < count) {
+      // smaller batches at the end, so that the last processes end together
+      const std::size_t left = count - dealt;
+      const std::size_t fair =
+          std::max<std::size_t>(1, left / (2 * static_cast<std::size_t>(jobs)));
+      tasks.resize(std::min(std::max(std::min(size, fair), together(dealt)), left));
+      for (std::size_t& task : tasks) task = dealt++;
+    } else {
+      return std::nullopt;
+    }
     processes.push_back(std::move(tasks));
     return processes.size() - 1;
   };
   const auto limits_of = [&](std::size_t process) {
-    ProcessLimits least = limits(processes[process].front());
-    for (const std::size_t task : processes[process]) {
-      const ProcessLimits own = limits(task);
-      const auto lower = [](double a, double b) {
-        return a > 0.0 && b > 0.0 ? std::min(a, b) : a + b;
-      };
-      least = {lower(least.cpu_s, own.cpu_s), lower(least.memory_mb, own.memory_mb),
+    const std::vector<std::size_t>& tasks = processes[process];
+    ProcessLimits least = limits(tasks.front());
+    for (std::size_t i = 1; i < tasks.size(); ++i) {
+      const ProcessLimits own = limits(tasks[i]);
+      least = {Lower(least.cpu_s, own.cpu_s), Lower(least.memory_mb, own.memory_mb),
                std::min(least.idle_s, own.idle_s)};
     }
-    const auto together = static_cast<double>(
-        std::min(news.together(processes[process].front()), processes[process].size()));
-    least.cpu_s *= together;
-    least.memory_mb *= together;
+    const auto times = static_cast<double>(std::min(together(tasks.front()), tasks.size()));
+    least.cpu_s *= times;
+    least.memory_mb *= times;
     return least;
   };
   const auto ended = [&](std::size_t process, const ProcessResult& result) {
-    const std::vector<std::size_t> tasks = std::move(processes[process]);
-    processes[process].clear();
-    if (tasks.size() == 1 && result.ending != ProcessEnding::kAnswered) {
-      done({{tasks.front(), result}});
-      return;
-    }
+    const std::vector<std::size_t> tasks = std::exchange(processes[process], {});
     std::vector<TaskResult> results;
     if (result.ending == ProcessEnding::kAnswered) results = ReadAnswers(tasks, result);
     if (results.empty() && tasks.size() > 1) {
-      batches.RunAlone(tasks);
+      alone.insert(alone.end(), tasks.begin(), tasks.end());
+      size = 1;
       return;
     }
-    if (results.empty())
-      results = {{tasks.front(), result}};  // the reader of the records reports the error
-    batches.Answered(tasks.size(), result.cpu_s);
+    // the reader of the records reports an answer that cannot be read
+    if (results.empty()) results = {{tasks.front(), result}};
+    if (result.ending == ProcessEnding::kAnswered && sharing.is_allowed) {
+      const double each_s = std::max(result.cpu_s / static_cast<double>(tasks.size()), 1e-6);
+      const auto fitting = static_cast<std::size_t>(kBusy_s / each_s);
+      size = std::clamp<std::size_t>(fitting, 1, std::min(kMost, kGrowth * size));
+    }
     done(results);
   };
-  RunInProcesses(next, jobs, [&](std::size_t process) { return Packed(work(processes[process])); },
-                 limits_of, ended,
-                 {.started =
-                      [&](std::size_t process) {
-                        if (!news.started) return;
-                        for (const std::size_t task : processes[process]) {
-                          if (task < begun) continue;
-                          begun = task + 1;
-                          news.started(task);
-                        }
-                      },
-                  .waited = news.waited});
+  const auto started = [&](std::size_t process) {
+    for (const std::size_t task : processes[process]) {
+      if (task < begun) continue;
+      begun = task + 1;
+      if (news.started) news.started(task);
+    }
+  };
+  Supervise(next, jobs, [&](std::size_t process) { return Packed(work(processes[process])); },
+            limits_of, ended, {started, news.waited});
   return processes.size();
 }
 

@@ -27,8 +27,6 @@
 
 namespace loopbench::harness {
 
-// A problem as it is simulated, and the keys that name its cases.
-
 // A problem as it is run: simplified descriptions with their known solutions (docs/decisions/009).
 
 struct SimplifiedProblem {
@@ -50,8 +48,7 @@ std::string ToString(const CompileOptions& options);
 //
 // A case consists of its keys and its content: all other data that determine the run (mechanism,
 // limits, ensemble, simplification, ...). "case_id" identifies both, "id" both and the program that
-// ran them, "config_hash" the content alone. Cases of equal keys and different content are
-// different cases. Limits belong to the content because they affect the outcome.
+// ran them, "config_hash" the content alone.
 
 /// Sets "case_id" and "content" (eight digits, for people to choose by) behind the keys.
 /// @param content  from one of the functions below
@@ -75,10 +72,6 @@ std::string LadderContent(const Experiment& experiment, const Case& entry,
 /// "id" of a record: its case and this very program.
 std::string RunId(const Record& record);
 
-// Runs from perturbed starts, and records of parts as one.
-
-// Merges the runs of independent parts into one record.
-
 /// Results of one run.
 struct Run {
   Record record;
@@ -98,17 +91,13 @@ struct Run {
 /// are omitted.
 Run MergeParts(std::span<const Run> parts);
 
-// Members of an ensemble: their starts, and the number that stay on their branch.
-
 /// Returns the description of one member: fixed coordinates moved by uniform random amounts of at
 /// most `perturb`, or coordinates in `between` drawn uniformly between their bounds. The same seed
 /// and member give the same start everywhere.
 ///
-/// Loops stay on their branch: a start is reached in steps of at most 0.1 rad or m. Each is
-/// assembled from the extrapolated previous positions, which passes positions where branches cross.
-/// Shorter paths take one step, with the description's own guesses. If a step cannot be closed, the
-/// member has the drawn coordinates and those guesses; its run ends as inconsistent-start if they
-/// fail.
+/// Loops stay on their branch: a start is reached in steps of at most 0.1 rad or m, each assembled
+/// from the extrapolated previous positions. Shorter paths take one step, with the description's
+/// own guesses. If a step cannot be closed, the member has the drawn coordinates and those guesses.
 MechanismDescription MemberStart(const MechanismDescription& description, const Case& entry,
                                  int member);
 
@@ -142,32 +131,12 @@ class EnsembleTally {
   Record largest_;
 };
 
-// Many runs of the same kind: on several threads, and on each of them side by side, as many as
-// there are lanes (mechanism/formulation/side_by_side.h).
-
-/// Calls run(i, beside) for each i < count. Runs on one thread switch where they Meet(); each has
-/// its own stack of kStackBytes. If memory is short, fewer runs alternate. Returns when all have
-/// ended; rethrows the exception of the first run that threw. Sanitizers follow one stack only:
-/// with them runs are sequential.
+/// Calls run(i, beside) for each i < count: on several threads, and on each of them side by side,
+/// as many as there are lanes (mechanism/formulation/side_by_side.h). Runs on one thread switch
+/// where they Meet(); each has its own stack of 8 MiB. If memory is short, fewer runs alternate.
+/// Returns when all have ended; rethrows the exception of the first run that threw. Sanitizers
+/// follow one stack only: with them runs are sequential.
 void RunSideBySide(int count, int threads, const std::function<void(int, SideBySide&)>& run);
-
-inline constexpr std::size_t kStackBytes = std::size_t{8} << 20;
-
-// Runs one case with all its runs.
-
-// Run-level record keys besides the observers' measurements.
-
-/// Writes the outcome of the run and the integrator's counters. Newton steps of a projection count
-/// as evaluations, too.
-void WriteCounts(const IntegratorResult& result, std::int64_t projection_steps, bool is_implicit,
-                 Record& record);
-
-/// Growth of drift over an ensemble, of which `failed` did not finish.
-void WriteGrowth(const Growth& growth, int failed, Record& record);
-
-/// Writes the exponent of a growth other than drift, known only in this run, without a verdict.
-void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
-                   Record& record);
 
 // Runs one case for accuracy: start, integration, observers, record.
 
@@ -195,10 +164,12 @@ void GiveJacobian(const std::string& integrator, JacobianKind kind,
 }
 
 /// Gives a system, after its start and IntegrateWork(), the generated right-hand side of a method.
-/// `mechanism` as RecordingSubject has it. Throws NotCovered (harness/generate/record.h).
+/// `mechanism` as RecordingSubject has it. Stores NotCovered (harness/generate/record.h) as outcome
+/// and message of `result`.
 template <class Space>
 void GiveExecution(const Method& method, const MechanismDescription& description,
-                   System<Space, double>& system, const void* mechanism = nullptr) {
+                   System<Space, double>& system, IntegratorResult* result,
+                   const void* mechanism = nullptr) try {
   if (!IsGenerated(method.execution)) return;
   system.UseCompiled(std::make_unique<generate::GeneratedDerivative<Space>>(
       generate::RecordingSubject{.description = description,
@@ -209,19 +180,9 @@ void GiveExecution(const Method& method, const MechanismDescription& description
       system,
       method.execution == Execution::kGeneratedFma ? generate::Contraction::kFused
                                                    : generate::Contraction::kNone));
-}
-
-/// Stores NotCovered as outcome and message of `result` instead of throwing it.
-template <class Space>
-void GiveExecution(const Method& method, const MechanismDescription& description,
-                   System<Space, double>& system, IntegratorResult* result,
-                   const void* mechanism = nullptr) {
-  try {
-    GiveExecution(method, description, system, mechanism);
-  } catch (const generate::NotCovered& why) {
-    result->outcome = Outcome::kInexpressible;
-    result->message = why.what();
-  }
+} catch (const generate::NotCovered& why) {
+  result->outcome = Outcome::kInexpressible;
+  result->message = why.what();
 }
 
 /// Sets flops, numbers of operations by kind, and depth, as `loopbench count` has them.
@@ -273,79 +234,22 @@ std::vector<double> AtolsOf(const Case& entry, const MechanismDescription& descr
 /// the outcome and all measured values of the unperturbed run. Growth is analysed over the ensemble
 /// (or over the single run, which resolves nothing). Limits hold for each run.
 ///
-/// With a reference (harness/observers/), the unperturbed run is compared with it at the
-/// reference's times, by dense output.
-///
-/// If the experiment requests output, the unperturbed run's trajectory is written to `trajectory`
-/// (harness/observers/), unless that is empty.
-///
-/// Members of the ensemble run in batches on `threads` threads (side_by_side.h), which does not
-/// change their bits. Other cases may run `beside` the unperturbed run.
-///
-/// Numerical failures are stored in the record; only misuse throws.
+/// The unperturbed run is compared with a reference at its times, by dense output. If the
+/// experiment requests output, its trajectory is written to `trajectory`, unless that is empty.
+/// Members run in batches on `threads` threads, which does not change their bits. Other cases may
+/// run `beside` the unperturbed run. Numerical failures are stored in the record; only misuse
+/// throws.
 Record RunCase(const Experiment& experiment, const Case& entry,
                const Reference* reference = nullptr, const std::filesystem::path& trajectory = {},
                int threads = 1, SideBySide* beside = nullptr);
 
-// One motion of a case: start, integration, observers, and their records.
-
-/// Reference for the motion: one of these, or none.
-struct ErrorReference {
-  const Reference* reference = nullptr;     ///< with snapshots
-  const PublishedSeries* series = nullptr;  ///< with times within the horizon
-};
-
-/// The case itself, or a member of its ensemble, which has fewer observers.
-enum class RunKind { kCase, kMember };
-
-/// `description` is the case's or the start of an ensemble member. Other runs may be `beside` it.
-/// Parts connected through ground alone run one after another.
-Run RunOnce(const Experiment& experiment, const Case& entry,
-            const MechanismDescription& description, RunKind kind, SideBySide* beside,
-            const ErrorReference& held = {}, const TrajectoryTask* trajectory = nullptr);
-
-// Short runs: detection of nearly constant coordinates, and errors of simplified models.
-
-// A description prepared to run alone, without observers: joint coordinates, loops at level
-// projection.
-
-template <class Space>
-struct ReadyToRun {
-  std::unique_ptr<System<Space, double>> system;  ///< null if it has no start
-  std::vector<double> y;                          ///< its state at time 0
-  std::string failure;                            ///< why it does not start
-};
-
-/// `mechanism` is the description in joint coordinates and outlives the returned object.
-template <class Space>
-ReadyToRun<Space> StartAtLevelPosition(const MechanismDescription& description,
-                                       const Mechanism<Space, double>& mechanism,
-                                       const std::string& formulation) {
-  ReadyToRun<Space> ready;
-  const Start<double> start = Assemble<Space>(description, mechanism);
-  ready.failure = start.message;
-  if (start.outcome != Outcome::kFinished) return ready;
-  const Method method{.formulation = formulation, .enforcement = Enforcement::kPosition};
-  auto system = MakeFormulation<Space>(method, mechanism);
-  const Outcome outcome = system->Start(0.0, start.q, start.u);
-  if (outcome != Outcome::kFinished) {
-    ready.failure = ToString(outcome);
-    return ready;
-  }
-  ready.y.assign(static_cast<std::size_t>(system->size()), 0.0);
-  system->ToState(start.q, start.u, ready.y);
-  ready.system = std::move(system);
-  return ready;
-}
-
-// A short run of a full model to detect nearly constant coordinates (mechanism/simplify/model.h).
+// Short runs: detection of nearly constant coordinates (mechanism/simplify/model.h), and errors of
+// simplified models.
 
 /// Runs the description for `duration` seconds by O-DCA at level projection, ode45 at 1e-6, in
 /// joint coordinates. A run that ends earlier (its CPU time is limited to `cpu_s`) returns its data
 /// so far and the reason. A run that cannot start returns no data.
 ShortRun MakeShortRun(const MechanismDescription& description, double duration, double cpu_s);
-
-// Error and cost of a simplified model relative to the full model (mechanism/simplify/).
 
 /// Named points of bodies at equal times, ground axes [m].
 struct Track {
@@ -369,9 +273,8 @@ struct ModelError {
 };
 ModelError Compare(const Track& whole, const Track& model);
 
-// The peers of this build (docs/decisions/018): their rows are among the formulations
-// (harness/config/formulations.h) in every build, the programs themselves only where CMake has
-// LOOPBENCH_PEERS.
+// The peers of this build (docs/decisions/018). Their rows are among the formulations in every
+// build, the programs only where CMake has LOOPBENCH_PEERS.
 
 /// Makes a peer for a mechanism; it throws Inexpressible.
 using PeerFactory = std::function<std::unique_ptr<Peer>(const MechanismDescription&)>;

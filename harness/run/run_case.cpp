@@ -3,125 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <optional>
 
 #include "harness/base/text.h"
-#include "harness/integrator/arkode.h"
-#include "harness/judge/analysis.h"
 #include "harness/observers/observer.h"
-#include "harness/observers/reference.h"
 #include "harness/observers/registry.h"
-#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
 
 namespace loopbench::harness {
-
-void WriteCounts(const IntegratorResult& result, std::int64_t projection_steps, bool is_implicit,
-                 Record& record) {
-  record.Set("outcome", std::string(ToString(result.outcome)));
-  record.Set("message", result.message);
-  record.Set("t_reached", result.t_reached);
-  record.Set("steps", result.steps);
-  record.Set("rejected", result.rejected);
-  record.Set("rhs_evaluations", result.rhs_evaluations);
-  record.Set("rhs_equivalents", result.rhs_evaluations + projection_steps);
-  record.Set("restarts", result.restarts);
-  if (is_implicit) {
-    record.Set("newton_jacobians", result.jacobians);
-    record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
-    record.Set("newton_dual_evaluations", result.dual_evaluations);
-    record.Set("newton_iterations", result.newton_iterations);
-    record.Set("newton_failures", result.newton_failures);
-  }
-  record.Set("wall_s", result.wall_s);
-  record.Set("cpu_s", result.cpu_s);
-}
-
-void WriteGrowth(const Growth& growth, int failed, Record& record) {
-  record.Set("growth_exponent", growth.exponent);
-  record.Set("growth_spread", growth.spread);
-  record.Set("growth_exponent_late", growth.exponent_late);
-  record.Set("growth_spread_late", growth.spread_late);
-  record.Set("growth_regime", growth.regime);
-  record.Set("growth_resolved", growth.resolved && failed == 0);
-  record.Set("growth_hypothesis", growth.hypothesis.name);
-  record.Set("growth_hypothesis_resolved", growth.hypothesis_resolved && failed == 0);
-  record.Set("growth_hypothesis_ratio", growth.hypothesis.ratio);
-  record.Set("growth_rate", growth.hypothesis.rate);
-  record.Set("growth_from", growth.t_from);
-  record.Set("growth_to", growth.t_to);
-  record.Set("ensemble", std::int64_t{growth.members});
-  record.Set("ensemble_failed", std::int64_t{failed});
-}
-
-void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
-                   Record& record) {
-  if (series.t.empty() || !(scale > 0.0)) return;
-  const Growth growth = AnalyseGrowth({&series, 1}, horizon, scale);
-  if (std::isfinite(growth.exponent)) record.Set(key, growth.exponent);
-}
-
-namespace {
-
-/// Runs the members of a case's ensemble and hands them over in their order, with their starts.
-template <class Keep>
-void ForEachMember(const Experiment& experiment, const Case& entry, int threads, const Keep& keep) {
-  constexpr int kHeld = 1024;  // at most, of which runs wait to be handed over
-  const int members = entry.ensemble > 1 ? entry.ensemble : 0;
-  struct Member {
-    MechanismDescription start;
-    Run run;
-  };
-  std::vector<Member> held;
-  for (int first = 0; first < members; first += kHeld) {
-    held.assign(static_cast<std::size_t>(std::min(kHeld, members - first)), {});
-    const auto run_member = [&](int i, SideBySide& beside) {
-      Member& member = held[static_cast<std::size_t>(i)];
-      member.start =
-          MemberStart(experiment.problems[entry.problem].mechanism.description, entry, first + i);
-      member.run = RunOnce(experiment, entry, member.start, RunKind::kMember, &beside);
-    };
-    RunSideBySide(static_cast<int>(held.size()), threads, run_member);
-    for (Member& member : held) keep(std::move(member.run), member.start);
-  }
-}
-
-/// Returns the reference for the case's errors, and writes its certified error to the record.
-ErrorReference WriteCertificateOf(const ExperimentProblem& problem, const Case& entry,
-                                  const Reference* reference, Record& record) {
-  ErrorReference held;
-  if (problem.series) {
-    WriteCertificate(problem.mechanism.description, *problem.series, entry.horizon, record);
-    if (problem.series->NumWithin(entry.horizon) > 0) held.series = &*problem.series;
-  } else if (reference != nullptr) {
-    WriteCertificate(*reference, record);
-    if (reference->NumTrusted() > 0) held.reference = reference;
-  }
-  return held;
-}
-
-bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Outcome::kFinished); }
-
-/// The largest difference of final poses from a run at a tenth of the tolerance, or at half the
-/// fixed step; infinite where that run does not finish.
-void WriteRefinement(const Experiment& experiment, Case entry, SideBySide* beside, Record& record) {
-  entry.step /= 2.0;
-  if (entry.step > 0.0) entry.limits.steps *= 2;
-  entry.rtol /= 10.0;
-  entry.atol /= 10.0;
-  if (entry.atols) {
-    for (double* tolerance : entry.atols->All()) *tolerance /= 10.0;
-  }
-  const Run finer =
-      RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description,
-              RunKind::kCase, beside);
-  record.Set("refinement_difference", HasFinished(finer.record)
-                                          ? DifferenceOf(record, finer.record).largest
-                                          : std::numeric_limits<double>::infinity());
-}
-
-}  // namespace
 
 IntegratorOptions OptionsOf(const Case& entry, const std::vector<double>& stop_times) {
   IntegratorOptions options;
@@ -172,74 +61,6 @@ void LimitSteps(const Case& entry, const Mechanism<Space, double>& mechanism,
 template void LimitSteps(const Case&, const Mechanism<Planar, double>&, IntegratorOptions*);
 template void LimitSteps(const Case&, const Mechanism<Spatial, double>&, IntegratorOptions*);
 
-/// Constraints that differ by 1e-11 lengths still count as redundant
-/// (mechanism/loops/excursion.cpp), dropped ones by ten times more (self_stress.h). Projection
-/// cannot close them. Warnings allow 25 times the goal.
-constexpr double kRedundantOpen = 4e-12;
-
-Record RunCase(const Experiment& experiment, const Case& entry, const Reference* reference,
-               const std::filesystem::path& trajectory, int threads, SideBySide* beside) {
-  const ExperimentProblem& problem = experiment.problems[entry.problem];
-  Record record = entry.keys;
-  record.Set("problem_id", Fnv1a(problem.mechanism.canonical));
-  const double link = LinkLength(problem.mechanism.description);
-  record.Set("link_length", link);
-  const double goal = 4 * std::numeric_limits<double>::epsilon() * link *
-                      static_cast<double>(problem.mechanism.description.bodies.size() - 1);
-  record.Set("position_goal", goal);
-  const ErrorReference held = WriteCertificateOf(problem, entry, reference, record);
-  std::optional<TrajectoryTask> task;
-  if (experiment.output && !trajectory.empty()) {
-    task.emplace(*experiment.output, trajectory,
-                 fmt::format("{} {} {} {}", entry.mechanism, ToString(entry.method),
-                             entry.integrator, SettingOf(entry)));
-  }
-  Run nominal = RunOnce(experiment, entry, problem.mechanism.description, RunKind::kCase, beside,
-                        held, task ? &*task : nullptr);
-  for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
-  record.Set("position_goal", std::max(goal, nominal.min_violation * link));
-
-  // fixed steps have no tolerance to be judged by; pilots lack the reference of their experiment
-  const bool is_unjudged = entry.step > 0.0 && held.series == nullptr &&
-                           held.reference == nullptr &&
-                           (reference != nullptr || !experiment.reference);
-  if ((experiment.refine || is_unjudged) && !IsPeer(record) && HasFinished(record)) {
-    WriteRefinement(experiment, entry, beside, record);
-  }
-
-  std::vector<DriftSeries> runs;
-  EnsembleTally tally(nominal, entry.branch_bound);
-  int failed = 0;
-  ForEachMember(experiment, entry, threads, [&](Run run, const MechanismDescription& start) {
-    tally.Add(run, start);
-    if (!HasFinished(run.record)) {
-      ++failed;
-    } else {
-      runs.push_back(std::move(run.drift));
-    }
-  });
-  if (entry.ensemble <= 1) runs.push_back(nominal.drift);
-  std::erase_if(runs, [](const DriftSeries& run) { return run.t.empty(); });
-  if (!runs.empty()) {
-    const double length = problem.mechanism.observe.length;
-    GrowthOptions options;
-    // the bound for round-off holds for some ten lengths of path; paths grow with the horizon
-    options.round_off *= std::max(1.0, entry.horizon / 10.0);
-    WriteGrowth(AnalyseGrowth(runs, entry.horizon, length, options), failed, record);
-  }
-  WriteExponent("energy_growth_exponent", nominal.energy, entry.horizon, nominal.kinetic, record);
-  WriteExponent("correction_growth_exponent", nominal.correction, entry.horizon,
-                problem.mechanism.observe.length, record);
-  if (entry.ensemble > 1) tally.Write(record);
-  const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
-  record.Set("series.drift_t", envelope.t);
-  record.Set("series.drift", envelope.value);
-  if (HasFinished(record)) {
-    record.Set("warnings", OwnWarnings(record));
-  }
-  return record;
-}
-
 void SetOperations(const generate::MethodCounts& counts, Record& record) {
   const generate::OperationCounts& of = counts.result;
   record.Set("flops", of.flops());
@@ -269,6 +90,43 @@ void WriteOperations(const Method& method, const MechanismDescription& descripti
 
 namespace {
 
+/// Writes the outcome of the run and the integrator's counters. Newton steps of a projection count
+/// as evaluations, too.
+void WriteCounts(const IntegratorResult& result, std::int64_t projection_steps, bool is_implicit,
+                 Record& record) {
+  record.Set("outcome", std::string(ToString(result.outcome)));
+  record.Set("message", result.message);
+  record.Set("t_reached", result.t_reached);
+  record.Set("steps", result.steps);
+  record.Set("rejected", result.rejected);
+  record.Set("rhs_evaluations", result.rhs_evaluations);
+  record.Set("rhs_equivalents", result.rhs_evaluations + projection_steps);
+  record.Set("restarts", result.restarts);
+  if (is_implicit) {
+    record.Set("newton_jacobians", result.jacobians);
+    record.Set("newton_rhs_evaluations", result.jacobian_rhs_evaluations);
+    record.Set("newton_dual_evaluations", result.dual_evaluations);
+    record.Set("newton_iterations", result.newton_iterations);
+    record.Set("newton_failures", result.newton_failures);
+  }
+  record.Set("wall_s", result.wall_s);
+  record.Set("cpu_s", result.cpu_s);
+}
+
+/// Constraints that differ by 1e-11 lengths still count as redundant
+/// (mechanism/loops/excursion.cpp), dropped ones by ten times more (self_stress.h). Projection
+/// cannot close them. Warnings allow 25 times the goal.
+constexpr double kRedundantOpen = 4e-12;
+
+/// Reference for the motion: one of these, or none.
+struct ErrorReference {
+  const Reference* reference = nullptr;     ///< with snapshots
+  const PublishedSeries* series = nullptr;  ///< with times within the horizon
+};
+
+/// The case itself, or a member of its ensemble, which has fewer observers.
+enum class RunKind { kCase, kMember };
+
 /// Returns a hash of the last state, without the sign of zeros: equal hashes mean equal runs.
 std::string StateHash(std::span<const double> y) {
   std::vector<double> numbers(y.begin(), y.end());
@@ -295,14 +153,14 @@ class Runner {
         beside_(beside) {
     const Measured measured{user_, compiled_};
     if (held.series != nullptr) {
-      errors_ = std::make_unique<SeriesMeter>(measured, part, *held.series, entry.horizon);
+      errors_ = MakeMeter(measured, part, *held.series, entry.horizon);
     } else if (held.reference != nullptr) {
-      errors_ = std::make_unique<ErrorMeter>(measured, part, *held.reference);
+      errors_ = MakeMeter(measured, part, *held.reference);
     }
     if (trajectory != nullptr) PrepareRows(*trajectory);
     const Watched<Space> watched{description_, mechanism_, problem_, experiment.series_points,
                                  stops_};
-    observers_ = IsMember() ? MakeMemberObservers<Space>(watched) : MakeObservers<Space>(watched);
+    observers_ = MakeObservers<Space>(watched, IsMember());
   }
 
   Run Execute() {
@@ -315,7 +173,7 @@ class Runner {
     } else {
       Kinematics<Space, double> kinematics(mechanism_);
       kinematics.UpdatePosition(start.q);
-      run.branch_start = ExactObserver<Space>(problem_, mechanism_).BranchAt(kinematics);
+      run.branch_start = BranchAt<Space>(problem_, kinematics);
       result = Integrate(start);
       for (const auto& observer : observers_) observer->Write(run.record);
       if (const Value* regularized = run.record.Find("regularized_evaluations")) {
@@ -372,13 +230,6 @@ class Runner {
     stops_.insert(stops_.end(), rows_.begin(), rows_.end());
     std::ranges::sort(stops_);
     stops_.erase(std::unique(stops_.begin(), stops_.end()), stops_.end());
-  }
-
-  void Show(const Sample<Space>& sample, Outcome outcome) {
-    for (const auto& observer : observers_) {
-      if (outcome == Outcome::kFinished) observer->Observe(sample);
-      if (outcome == Outcome::kSingular) observer->ObserveSingular(sample);
-    }
   }
 
   /// Holds the state at the k-th time of the reference against it. `lower` is the same with more of
@@ -462,7 +313,10 @@ class Runner {
       Sample<Space> sample{t, *formulation};
       sample.knows_work = !peer || !mechanism_.has_power();
       if (!work.empty()) sample.supplied = work[0], sample.dissipated = work[1];
-      Show(sample, outcome);
+      for (const auto& observer : observers_) {
+        if (outcome == Outcome::kFinished) observer->Observe(sample);
+        if (outcome == Outcome::kSingular) observer->ObserveSingular(sample);
+      }
       looked_by_then_ = looked_;
       if (recorder_ && by_steps_) {
         recorder_->Take(t, *formulation, outcome == Outcome::kFinished, work);
@@ -519,11 +373,11 @@ class Runner {
   std::vector<double> y_;
 };
 
-}  // namespace
-
+/// One motion of a case. `description` is the case's or the start of an ensemble member. Other runs
+/// may be `beside` it. Parts connected through ground alone run one after another.
 Run RunOnce(const Experiment& experiment, const Case& entry,
             const MechanismDescription& description, RunKind kind, SideBySide* beside,
-            const ErrorReference& held, const TrajectoryTask* trajectory) {
+            const ErrorReference& held = {}, const TrajectoryTask* trajectory = nullptr) {
   const ObservedQuantities& observe = experiment.problems[entry.problem].mechanism.observe;
   const SimplifiedProblem problem = SimplifyProblem(description, observe, experiment.compile);
   std::vector<Run> parts;
@@ -542,6 +396,153 @@ Run RunOnce(const Experiment& experiment, const Case& entry,
     run.record.Set("preprocessed", ToString(problem.compiled.done));
   }
   return run;
+}
+
+/// Growth of drift over an ensemble, of which `failed` did not finish.
+void WriteGrowth(const Growth& growth, int failed, Record& record) {
+  record.Set("growth_exponent", growth.exponent);
+  record.Set("growth_spread", growth.spread);
+  record.Set("growth_exponent_late", growth.exponent_late);
+  record.Set("growth_spread_late", growth.spread_late);
+  record.Set("growth_regime", growth.regime);
+  record.Set("growth_resolved", growth.resolved && failed == 0);
+  record.Set("growth_hypothesis", growth.hypothesis.name);
+  record.Set("growth_hypothesis_resolved", growth.hypothesis_resolved && failed == 0);
+  record.Set("growth_hypothesis_ratio", growth.hypothesis.ratio);
+  record.Set("growth_rate", growth.hypothesis.rate);
+  record.Set("growth_from", growth.t_from);
+  record.Set("growth_to", growth.t_to);
+  record.Set("ensemble", std::int64_t{growth.members});
+  record.Set("ensemble_failed", std::int64_t{failed});
+}
+
+/// Writes the exponent of a growth other than drift, known only in this run, without a verdict.
+void WriteExponent(const std::string& key, const DriftSeries& series, double horizon, double scale,
+                   Record& record) {
+  if (series.t.empty() || !(scale > 0.0)) return;
+  const Growth growth = AnalyseGrowth({&series, 1}, horizon, scale);
+  if (std::isfinite(growth.exponent)) record.Set(key, growth.exponent);
+}
+
+/// Runs the members of a case's ensemble and hands them over in their order, with their starts.
+template <class Keep>
+void ForEachMember(const Experiment& experiment, const Case& entry, int threads, const Keep& keep) {
+  constexpr int kHeld = 1024;  // at most, of which runs wait to be handed over
+  const int members = entry.ensemble > 1 ? entry.ensemble : 0;
+  struct Member {
+    MechanismDescription start;
+    Run run;
+  };
+  std::vector<Member> held;
+  for (int first = 0; first < members; first += kHeld) {
+    held.assign(static_cast<std::size_t>(std::min(kHeld, members - first)), {});
+    const auto run_member = [&](int i, SideBySide& beside) {
+      Member& member = held[static_cast<std::size_t>(i)];
+      member.start =
+          MemberStart(experiment.problems[entry.problem].mechanism.description, entry, first + i);
+      member.run = RunOnce(experiment, entry, member.start, RunKind::kMember, &beside);
+    };
+    RunSideBySide(static_cast<int>(held.size()), threads, run_member);
+    for (Member& member : held) keep(std::move(member.run), member.start);
+  }
+}
+
+/// Returns the reference for the case's errors, and writes its certified error to the record.
+ErrorReference WriteCertificateOf(const ExperimentProblem& problem, const Case& entry,
+                                  const Reference* reference, Record& record) {
+  ErrorReference held;
+  if (problem.series) {
+    WriteCertificate(problem.mechanism.description, *problem.series, entry.horizon, record);
+    if (problem.series->NumWithin(entry.horizon) > 0) held.series = &*problem.series;
+  } else if (reference != nullptr) {
+    WriteCertificate(*reference, record);
+    if (reference->NumTrusted() > 0) held.reference = reference;
+  }
+  return held;
+}
+
+bool HasFinished(const Record& run) { return run.Text("outcome") == ToString(Outcome::kFinished); }
+
+/// The largest difference of final poses from a run at a tenth of the tolerance, or at half the
+/// fixed step; infinite where that run does not finish.
+void WriteRefinement(const Experiment& experiment, Case entry, SideBySide* beside, Record& record) {
+  entry.step /= 2.0;
+  if (entry.step > 0.0) entry.limits.steps *= 2;
+  entry.rtol /= 10.0;
+  entry.atol /= 10.0;
+  if (entry.atols) {
+    for (double* tolerance : entry.atols->All()) *tolerance /= 10.0;
+  }
+  const Run finer =
+      RunOnce(experiment, entry, experiment.problems[entry.problem].mechanism.description,
+              RunKind::kCase, beside);
+  record.Set("refinement_difference", HasFinished(finer.record)
+                                          ? DifferenceOf(record, finer.record).largest
+                                          : std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+
+Record RunCase(const Experiment& experiment, const Case& entry, const Reference* reference,
+               const std::filesystem::path& trajectory, int threads, SideBySide* beside) {
+  const ExperimentProblem& problem = experiment.problems[entry.problem];
+  Record record = entry.keys;
+  record.Set("problem_id", Fnv1a(problem.mechanism.canonical));
+  const double link = LinkLength(problem.mechanism.description);
+  record.Set("link_length", link);
+  const double goal = 4 * std::numeric_limits<double>::epsilon() * link *
+                      static_cast<double>(problem.mechanism.description.bodies.size() - 1);
+  record.Set("position_goal", goal);
+  const ErrorReference held = WriteCertificateOf(problem, entry, reference, record);
+  std::optional<TrajectoryTask> task;
+  if (experiment.output && !trajectory.empty()) {
+    task.emplace(*experiment.output, trajectory,
+                 fmt::format("{} {} {} {}", entry.mechanism, ToString(entry.method),
+                             entry.integrator, SettingOf(entry)));
+  }
+  Run nominal = RunOnce(experiment, entry, problem.mechanism.description, RunKind::kCase, beside,
+                        held, task ? &*task : nullptr);
+  for (const auto& [key, value] : nominal.record.items()) record.Set(key, value);
+  record.Set("position_goal", std::max(goal, nominal.min_violation * link));
+
+  // fixed steps have no tolerance to be judged by; pilots lack the reference of their experiment
+  const bool is_unjudged = entry.step > 0.0 && held.series == nullptr &&
+                           held.reference == nullptr &&
+                           (reference != nullptr || !experiment.reference);
+  if ((experiment.refine || is_unjudged) && !IsPeer(record) && HasFinished(record)) {
+    WriteRefinement(experiment, entry, beside, record);
+  }
+
+  std::vector<DriftSeries> runs;
+  EnsembleTally tally(nominal, entry.branch_bound);
+  int failed = 0;
+  ForEachMember(experiment, entry, threads, [&](Run run, const MechanismDescription& start) {
+    tally.Add(run, start);
+    if (!HasFinished(run.record)) {
+      ++failed;
+    } else {
+      runs.push_back(std::move(run.drift));
+    }
+  });
+  if (entry.ensemble <= 1) runs.push_back(nominal.drift);
+  std::erase_if(runs, [](const DriftSeries& run) { return run.t.empty(); });
+  if (!runs.empty()) {
+    const double length = problem.mechanism.observe.length;
+    // the bound for round-off holds for some ten lengths of path; paths grow with the horizon
+    const double round_off = kRoundOffDrift * std::max(1.0, entry.horizon / 10.0);
+    WriteGrowth(AnalyseGrowth(runs, entry.horizon, length, round_off), failed, record);
+  }
+  WriteExponent("energy_growth_exponent", nominal.energy, entry.horizon, nominal.kinetic, record);
+  WriteExponent("correction_growth_exponent", nominal.correction, entry.horizon,
+                problem.mechanism.observe.length, record);
+  if (entry.ensemble > 1) tally.Write(record);
+  const DriftSeries envelope = Envelope(nominal.drift, experiment.series_points);
+  record.Set("series.drift_t", envelope.t);
+  record.Set("series.drift", envelope.value);
+  if (HasFinished(record)) {
+    record.Set("warnings", OwnWarnings(record));
+  }
+  return record;
 }
 
 }  // namespace loopbench::harness

@@ -3,12 +3,10 @@
 #include <boost/context/fiber.hpp>
 #include <boost/context/protected_fixedsize_stack.hpp>
 #include <exception>
-#include <memory>
 #include <new>
 #include <system_error>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "harness/base/text.h"
 #include "harness/run/run.h"
@@ -27,7 +25,7 @@ constexpr int kMost = kLanes;
 
 /// Stacks start at different offsets within a page. Otherwise data used by all runs would compete
 /// for the same few sets of the nearest cache.
-constexpr std::size_t kApart = 4096 / kLanes;
+constexpr std::size_t kApart = 4096 / kLanes, kStackBytes = std::size_t{8} << 20;
 
 /// Stack that successive runs use.
 class Place {

@@ -4,8 +4,8 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
-#include <vector>
 
 #include "harness/base/text.h"
 #include "harness/integrator/arkode.h"
@@ -15,7 +15,6 @@
 #include "mechanism/start/assembly.h"
 
 namespace loopbench::harness {
-
 namespace {
 
 // Short compared with any motion of unit bars; the second is for small and fast machines.
@@ -151,23 +150,14 @@ std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& descri
   return std::make_unique<SubjectIn<Spatial>>(description, method, state, integrator, step);
 }
 
-namespace {
-
-/// Returns the text after `key` at the start of a line, or nothing.
-std::optional<std::string_view> LineAfter(std::string_view text, std::string_view key) {
-  for (std::size_t start = 0; start < text.size();) {
-    const std::size_t end = std::min(text.find('\n', start), text.size());
-    const std::string_view line = text.substr(start, end - start);
-    if (line.starts_with(key)) return line.substr(key.size());
-    start = end + 1;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 std::int64_t CallgrindInstructions(std::string_view text, const std::string& file) {
-  const auto events = LineAfter(text, "events: "), totals = LineAfter(text, "totals: ");
+  constexpr std::string_view kEvents = "events: ", kTotals = "totals: ";
+  std::optional<std::string> events, totals;
+  std::istringstream lines{std::string(text)};
+  for (std::string line; std::getline(lines, line);) {
+    if (!events && line.starts_with(kEvents)) events = line.substr(kEvents.size());
+    if (!totals && line.starts_with(kTotals)) totals = line.substr(kTotals.size());
+  }
   std::int64_t count = 0;
   bool is_count = false;
   if (totals) {

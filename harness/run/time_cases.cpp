@@ -1,13 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+#include <deque>
 #include <limits>
-#include <memory>
-#include <optional>
 
-#include "harness/base/record.h"
-#include "harness/config/benchmarks.h"
+#include "harness/base/text.h"
 #include "harness/integrator/arkode.h"
 #include "harness/run/run.h"
 #include "harness/run/timing.h"
@@ -19,33 +16,12 @@ namespace {
 
 constexpr int kStates = 16;  ///< states a batch goes through
 
-using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
 /// One method of one mechanism, ready to be timed.
+template <class Space>
 class Subject {
  public:
-  virtual ~Subject() = default;
-  /// Runs the simulation once, keeping states for the right-hand sides. Not timed.
-  virtual void Prepare() = 0;
-  /// Times one batch of right-hand sides.
-  virtual void TimeDerivative() = 0;
-  /// Times one whole simulation.
-  virtual void TimeSimulation() = 0;
-  virtual Record Finish(const Record& keys) = 0;
-
-  std::vector<double> rhs_ns;  ///< one value per batch
-  std::vector<double> wall_s;  ///< one value per simulation, empty on failure
-};
-
-template <class Space>
-class SubjectIn final : public Subject {
- public:
   /// `description` must outlive the subject.
-  SubjectIn(const MechanismDescription& description, const Case& entry, bool simulate)
+  Subject(const MechanismDescription& description, const Case& entry, bool simulate)
       : case_(entry),
         simulate_(simulate),
         description_(description),
@@ -57,7 +33,8 @@ class SubjectIn final : public Subject {
     peer_ = TryPeer(entry.method.formulation, description, &result_);
   }
 
-  void Prepare() override {
+  /// Runs the simulation once, keeping states for the right-hand sides. Not timed.
+  void Prepare() {
     if (result_.outcome != Outcome::kFinished) return;
     Reset();
     if (result_.outcome != Outcome::kFinished) return;  // nothing is generated
@@ -79,23 +56,25 @@ class SubjectIn final : public Subject {
     CalibrateBatch();
   }
 
-  void TimeDerivative() override {
+  /// Times one batch of right-hand sides.
+  void TimeDerivative() {
     if (evaluations_ == 0) return;
-    const Clock::time_point begin = Clock::now();
+    const double begin = WallSeconds();
     for (int i = 0; i < evaluations_; ++i) {
       ode().Derivative(0.0, states_[i % states_.size()], ydot_);
     }
-    rhs_ns.push_back(SecondsSince(begin) * 1e9 / evaluations_);
+    rhs_ns.push_back((WallSeconds() - begin) * 1e9 / evaluations_);
   }
 
-  void TimeSimulation() override {
+  /// Times one whole simulation.
+  void TimeSimulation() {
     if (!simulate_ || result_.outcome != Outcome::kFinished) return;
     Reset();
     result_ = Simulate({});
     wall_s.push_back(result_.wall_s);
   }
 
-  Record Finish(const Record& keys) override {
+  Record Finish(const Record& keys) {
     Record record = keys;
     record.Set("outcome", std::string(ToString(result_.outcome)));
     record.Set("message", result_.message);
@@ -142,6 +121,9 @@ class SubjectIn final : public Subject {
     }
     return record;
   }
+
+  std::vector<double> rhs_ns;  ///< one value per batch
+  std::vector<double> wall_s;  ///< one value per simulation, empty on failure
 
  private:
   /// Returns the timed object.
@@ -190,7 +172,7 @@ class SubjectIn final : public Subject {
   void CalibrateBatch() {
     evaluations_ = 1;
     for (double spent = 0.0; spent < kBatchSeconds / 4; evaluations_ *= 2) {
-      const Clock::time_point begin = Clock::now();
+      const double begin = WallSeconds();
       for (int i = 0; i < evaluations_; ++i) {
         const auto& state = states_[i % states_.size()];
         if (ode().Derivative(0.0, state, ydot_) != Outcome::kFinished) {
@@ -198,7 +180,7 @@ class SubjectIn final : public Subject {
           return;
         }
       }
-      spent = SecondsSince(begin);
+      spent = WallSeconds() - begin;
     }
     evaluations_ *= 2;
   }
@@ -217,14 +199,6 @@ class SubjectIn final : public Subject {
   IntegratorResult result_;
 };
 
-std::unique_ptr<Subject> MakeSubject(const MechanismDescription& description, const Case& entry,
-                                     bool simulate) {
-  if (description.space == SpaceKind::kPlanar) {
-    return std::make_unique<SubjectIn<Planar>>(description, entry, simulate);
-  }
-  return std::make_unique<SubjectIn<Spatial>>(description, entry, simulate);
-}
-
 /// Calibration values of the kept rounds, and the number of discarded rounds.
 struct Rounds {
   double calibration = std::numeric_limits<double>::quiet_NaN();
@@ -233,8 +207,10 @@ struct Rounds {
 
 /// Times rounds of one kind, the subjects in turn, the calibration between them. If other load
 /// disturbs the machine, more rounds are taken and the quietest are kept.
-Rounds TimeInTurn(std::size_t wanted, const std::vector<std::unique_ptr<Subject>>& subjects,
-                  void (Subject::*time)(), std::vector<double> Subject::*times) {
+template <class Subject>
+Rounds TimeInTurn(int number, std::deque<Subject>& subjects, void (Subject::*time)(),
+                  std::vector<double> Subject::*times) {
+  const auto wanted = static_cast<std::size_t>(number);
   constexpr double kPatience_s = 1.0;  // as long as a neighbour's burst of work; some stay longer
   std::vector<std::vector<double>> calibrations;
   std::vector<double> slowest;
@@ -242,25 +218,25 @@ Rounds TimeInTurn(std::size_t wanted, const std::vector<std::unique_ptr<Subject>
   const auto is_quiet = [&](std::size_t round) {
     return slowest[round] <= kOtherSpeed * CalibrationBaselineNs();
   };
-  Clock::time_point enough = Clock::now();
+  double enough = WallSeconds();
   do {
     std::vector<double>& round = calibrations.emplace_back();
-    for (const auto& subject : subjects) {
+    for (Subject& subject : subjects) {
       round.push_back(CalibrationNs());
-      (*subject.*time)();
+      (subject.*time)();
     }
     round.push_back(CalibrationNs());
     slowest.push_back(std::ranges::max(round));
-    if (slowest.size() <= wanted) enough = Clock::now();
+    if (slowest.size() <= wanted) enough = WallSeconds();
     kept = QuietRounds(slowest, CalibrationBaselineNs(), wanted);
   } while (slowest.size() < wanted ||
-           (!std::ranges::all_of(kept, is_quiet) && SecondsSince(enough) < kPatience_s));
+           (!std::ranges::all_of(kept, is_quiet) && WallSeconds() - enough < kPatience_s));
   std::vector<double> of_kept;
   for (const std::size_t round : kept) {
     of_kept.insert(of_kept.end(), calibrations[round].begin(), calibrations[round].end());
   }
-  for (const auto& subject : subjects) {
-    std::vector<double>& all = (*subject).*times;
+  for (Subject& subject : subjects) {
+    std::vector<double>& all = subject.*times;
     if (all.size() != slowest.size()) continue;  // a failed simulation
     for (std::size_t i = 0; i < kept.size(); ++i) all[i] = all[kept[i]];
     all.resize(kept.size());
@@ -268,52 +244,39 @@ Rounds TimeInTurn(std::size_t wanted, const std::vector<std::unique_ptr<Subject>
   return {Quantile(std::move(of_kept), 0.5), std::ssize(slowest) - std::ssize(kept)};
 }
 
-/// Returns the noise keys of one mechanism, from its A/A pair and the machine state.
-Record NoiseKeys(const MachineState& machine, const Subject& first, const Subject& again) {
-  const double rhs = AaSpread(first.rhs_ns, again.rhs_ns);
-  const double wall = AaSpread(first.wall_s, again.wall_s);
-  Record keys;
-  keys.Set("aa_spread", rhs);
-  keys.Set("aa_spread_wall", wall);
-  keys.Set("load1", machine.load1);
-  keys.Set("processors", std::int64_t{machine.processors});
-  keys.Set("governor", machine.governor);
-  keys.Set("noise", NoiseReasons(machine, rhs, wall));
-  return keys;
-}
-
-}  // namespace
-
-std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group,
-                                 int batches) {
-  const MechanismDescription description = group.describe();
-  std::vector<std::unique_ptr<Subject>> subjects;
-  for (const Case& entry : group.cases) {
-    subjects.push_back(MakeSubject(description, entry, group.simulate));
-  }
+template <class Space>
+std::vector<Record> TimeIn(const MechanismDescription& description, const Experiment& experiment,
+                           const TimingGroup& group, int batches) {
+  std::deque<Subject<Space>> subjects;
+  for (const Case& entry : group.cases) subjects.emplace_back(description, entry, group.simulate);
   // the A/A pair is first and last: maximum distance between two methods
-  subjects.push_back(MakeSubject(description, group.cases.front(), group.simulate));
-  for (auto& subject : subjects) subject->Prepare();
+  subjects.emplace_back(description, group.cases.front(), group.simulate);
+  for (Subject<Space>& subject : subjects) subject.Prepare();
   const MachineState machine = ReadMachineState();
-  const Rounds rhs = TimeInTurn(static_cast<std::size_t>(batches), subjects,
-                                &Subject::TimeDerivative, &Subject::rhs_ns);
-  const Rounds wall = TimeInTurn(static_cast<std::size_t>(experiment.timing.repeats), subjects,
-                                 &Subject::TimeSimulation, &Subject::wall_s);
-  Record noise = NoiseKeys(machine, *subjects.front(), *subjects.back());
+  const Rounds rhs =
+      TimeInTurn(batches, subjects, &Subject<Space>::TimeDerivative, &Subject<Space>::rhs_ns);
+  const Rounds wall = TimeInTurn(experiment.timing.repeats, subjects,
+                                 &Subject<Space>::TimeSimulation, &Subject<Space>::wall_s);
+  const Subject<Space>&first = subjects.front(), &again = subjects.back();
+  const double aa_rhs = AaSpread(first.rhs_ns, again.rhs_ns);
+  const double aa_wall = AaSpread(first.wall_s, again.wall_s);
+  Record noise;
+  noise.Set("aa_spread", aa_rhs);
+  noise.Set("aa_spread_wall", aa_wall);
+  noise.Set("load1", machine.load1);
+  noise.Set("processors", std::int64_t{machine.processors});
+  noise.Set("governor", machine.governor);
+  noise.Set("noise", NoiseReasons(machine, aa_rhs, aa_wall));
   noise.Set("calibration_ns", rhs.calibration);
   noise.Set("calibration_wall_ns", wall.calibration);
   noise.Set("discarded_repetitions", rhs.disturbed + wall.disturbed);
   std::vector<Record> records;
   for (std::size_t i = 0; i < group.cases.size(); ++i) {
-    records.push_back(subjects[i]->Finish(group.cases[i].keys));
+    records.push_back(subjects[i].Finish(group.cases[i].keys));
     for (const auto& [key, value] : noise.items()) records.back().Set(key, value);
   }
   return records;
 }
-
-// Subjects timed together: the methods of a problem, or of a family member.
-
-namespace {
 
 /// Returns one system per timing: parts are not timed separately.
 MechanismDescription OneSystem(const Experiment& experiment, std::size_t problem) {
@@ -331,6 +294,14 @@ void SetTimingId(const std::string& content, Record* keys) {
 }
 
 }  // namespace
+
+std::vector<Record> TimeTogether(const Experiment& experiment, const TimingGroup& group,
+                                 int batches) {
+  const MechanismDescription description = group.describe();
+  return description.space == SpaceKind::kPlanar
+             ? TimeIn<Planar>(description, experiment, group, batches)
+             : TimeIn<Spatial>(description, experiment, group, batches);
+}
 
 std::vector<TimingGroup> TimingGroups(const Experiment& experiment, const Selection& filter) {
   std::vector<TimingGroup> groups;

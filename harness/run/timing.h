@@ -31,10 +31,8 @@ void CheckAllocationsAreCounted();
 
 // Calibration workload: measures the current speed of the machine by constant work.
 //
-// On a virtual machine another VM may share the physical core, for milliseconds or minutes, and a
-// processor may lower its clock. Program times then grow by a third without any sign of the cause.
-// The calibration reveals it: one compiler generates the same instructions at the same offsets of
-// cache lines in every build.
+// Another virtual machine may share the physical core, and a processor may lower its clock. Times
+// then grow by a third. The calibration reveals it: its instructions are the same in every build.
 
 /// Time [ns] of factoring a small matrix and of going through the first cache several times: the
 /// work whose time shows a neighbour best (loops that stay in registers show 2 %). The least of
@@ -45,14 +43,9 @@ double CalibrationNs();
 /// for an otherwise idle machine. Infinite before the first call.
 double CalibrationBaselineNs();
 
-// Timed objects and the counter of their instructions.
-
-// Work of one benchmark, ready to be repeated: a right-hand side or an integrator step of one
-// method of one mechanism, always from the same state.
-//
-// States are computed, not stored: the mechanism's start, moved for a short time, so that speeds
-// and all terms of the equations are nonzero. Their hashes are saved (configs/benchmarks/). A state
-// that differs is rejected, because times of different states are not comparable.
+// Benchmarks: a right-hand side or an integrator step of one method of one mechanism, always from
+// the same state. States are computed, not stored. Their hashes are saved (configs/benchmarks/),
+// and a state that differs is rejected, because times of different states are not comparable.
 
 /// Positions and speeds at which a mechanism is measured, the same for all methods of one
 /// coordinate set.
@@ -93,23 +86,19 @@ std::unique_ptr<BenchmarkSubject> MakeSubject(const MechanismDescription& descri
                                               const Method& method, const BenchmarkState& state,
                                               const std::string& integrator, double step);
 
-// Instruction counts from the files of Callgrind (valgrind --tool=callgrind).
-
-/// Executed instructions in one file of Callgrind: the first number of its "totals:" line, counted
-/// as event "Ir". Throws std::runtime_error that names `file` when there is no such line.
+/// Executed instructions in one file of Callgrind (valgrind --tool=callgrind): the first number of
+/// its "totals:" line, counted as event "Ir". Throws std::runtime_error that names `file` when
+/// there is no such line.
 std::int64_t CallgrindInstructions(std::string_view text, const std::string& file);
 
 // Times of right-hand sides and of whole simulations, in separate runs.
 //
 // The methods of one mechanism are measured in turn, batch by batch, so that speed changes of the
-// machine affect all of them; minimum, median, 10th and 90th percentile are reported. The first
-// method of each mechanism is timed a second time without a name. The difference (`aa_spread`,
-// record.h) is the smallest significant difference between methods. The calibration workload
-// measures the machine's speed, as the median between all rounds: `calibration_ns`
-// of right-hand sides, `calibration_wall_ns` of simulations. Rounds on a slowed machine are
-// measured again, for a second at most, and the quietest are kept; `discarded_repetitions` are left
-// out. Right-hand sides of problems are evaluated at states of a run; families at their moving
-// start.
+// machine affect all of them. The first one is timed a second time without a name; the difference
+// (`aa_spread`, record.h) is the smallest significant one. `calibration_ns` and
+// `calibration_wall_ns` are medians of the calibration between all rounds. Rounds on a slowed
+// machine are measured again, for a second at most, and the quietest are kept. Right-hand sides of
+// problems are evaluated at states of a run; families at their moving start.
 
 /// Cases of one mechanism, timed against each other.
 struct TimingGroup {

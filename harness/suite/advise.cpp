@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
 
-#include "harness/base/record.h"
+#include "harness/base/text.h"
 #include "harness/config/formulations.h"
 #include "harness/config/options.h"
 #include "harness/integrator/arkode.h"
-#include "harness/observers/reference.h"
 #include "harness/run/run.h"
 #include "harness/run/timing.h"
 #include "mechanism/start/assembly.h"
@@ -54,12 +52,12 @@ class BenchIn final : public TrialBench {
     if (bare.outcome != Outcome::kFinished) return trial;
     // a short run is soon disturbed, and searches go by its time
     if (bare.wall_s < kShortTrial_s) Remeasure(&trial);
-    ErrorMeter meter({problem_.user, compiled_, problem_.points}, 0, problem_.reference);
+    auto meter = MakeMeter({problem_.user, compiled_, problem_.points}, 0, problem_.reference);
     // interpolation doubles the cost of a run, and more at many times of a short one
-    if (Run(choice, std::max(10 * cpu_s, kLongTrial_s), &meter).outcome != Outcome::kFinished)
+    if (Run(choice, std::max(10 * cpu_s, kLongTrial_s), meter.get()).outcome != Outcome::kFinished)
       return trial;
     Record record;
-    meter.Write(record);
+    meter->Write(record);
     trial.error = record.Number("error_position_max");
     trial.late = record.Number("error_phase_max");
     trial.shape = record.Number("error_path_max");
@@ -97,7 +95,7 @@ class BenchIn final : public TrialBench {
     return fastest;
   }
 
-  IntegratorResult Run(const Choice& choice, double cpu_s, ErrorMeter* meter) {
+  IntegratorResult Run(const Choice& choice, double cpu_s, Meter* meter) {
     Coordinated& in = choice.method.coordinates == Coordinates::kJoint ? joint_ : absolute_;
     Case entry;
     entry.method = choice.method;
@@ -140,47 +138,6 @@ class BenchIn final : public TrialBench {
   const MechanismDescription& description_;
   Coordinated joint_, absolute_;
 };
-
-}  // namespace
-
-void TrialBench::Settle(Trial* trial) {
-  // re-times runs up to this long: a disturbance may hide a shorter one
-  constexpr double kMaybeShort_s = 2.5 * kShortTrial_s;
-  constexpr int kSame = 3, kMaxTimings = 12;
-  for (int same = 0, i = 0; same < kSame && i < kMaxTimings && trial->wall_s < kMaybeShort_s; ++i) {
-    const double before = trial->wall_s;
-    Remeasure(trial);
-    same = trial->wall_s < 0.97 * before ? 0 : same + 1;
-  }
-}
-
-std::string ToString(const Choice& choice) {
-  const std::string how = choice.step > 0.0 ? fmt::format("in steps of {:.3g} s", choice.step)
-                                            : fmt::format("at rtol {:.2g}", choice.rtol);
-  return fmt::format("{}/{}/{}, {} {}", choice.method.formulation,
-                     ToString(choice.method.enforcement), ToString(choice.method.coordinates),
-                     choice.integrator, how);
-}
-
-std::unique_ptr<TrialBench> MakeTrialBench(const TrialProblem& problem) {
-  Compiled compiled = Compile(problem.user, InOnePiece());
-  if (compiled.parts.front().description.space == SpaceKind::kPlanar) {
-    return std::make_unique<BenchIn<Planar>>(problem, std::move(compiled));
-  }
-  return std::make_unique<BenchIn<Spatial>>(problem, std::move(compiled));
-}
-
-std::string WhatLimits(const Trial& trial, double reference_error) {
-  if (!std::isfinite(trial.error)) return "it did not finish";
-  if (trial.error <= 10 * reference_error) {
-    return "unknown, because the reference is not certified much below it";
-  }
-  if (trial.shape < 0.2 * trial.error) {
-    return fmt::format("phase error {:.1e} s; path error {:.1e} m", trial.late, trial.shape);
-  }
-  return fmt::format("path error {:.1e} m; phase error {:.1e} s", trial.shape, trial.late);
-}
-namespace {
 
 /// Tolerances that trials are made at. Below the least rounding rules, above the largest the error
 /// estimate means nothing.
@@ -291,8 +248,7 @@ class Pilot {
     }
   }
 
-  using Clock = std::chrono::steady_clock;
-  double Elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  double Elapsed() const { return WallSeconds() - begin_; }
   bool OutOfTime() const { return Elapsed() > request_.cpu_s; }
   double Budget() const { return *request_.budget * horizon_; }
 
@@ -364,73 +320,70 @@ class Pilot {
     choice.method = {.formulation = fastest_, .enforcement = level};
     choice.integrator = profile;
     std::optional<Trial> best;
-    const auto take = [&](const Trial& trial) {
-      if (!best || Better(trial, *best)) best = trial;
-    };
     if (request_.error) {
-      SearchError(choice, take);
+      // a coarse trial is cheap and guides the search
+      choice.rtol = Tolerance(10 * *request_.error / length_);
+      Search(choice, &Pilot::ForError, &best);
     } else {
-      SearchBudget(choice, take);
-      if (!FindProfile(profile)->is_implicit) SearchSteps(choice, take);
+      choice.rtol = 1e-8;
+      Search(choice, &Pilot::ForBudget, &best);
+      choice.step = horizon_ / 1000;
+      if (!FindProfile(profile)->is_implicit) Search(choice, &Pilot::ForBudgetOfSteps, &best);
     }
     if (best) advice_.looked_at.push_back(*best);
   }
 
-  template <class Take>
-  void SearchError(Choice choice, Take take) {
-    const double asked = *request_.error;
-    // a coarse trial is cheap and guides the search
-    choice.rtol = Tolerance(10 * asked / length_);
+  /// Tries choices until `next` gives none.
+  void Search(Choice choice, std::optional<Choice> (Pilot::*next)(const Trial&) const,
+              std::optional<Trial>* best) {
     for (int i = 0; i < kMaxTrials && !OutOfTime(); ++i) {
       const Trial trial = Try(choice);
-      take(trial);
-      if (trial.outcome != Outcome::kFinished) {
-        // too coarse for its loops, or too expensive
-        if (trial.outcome == Outcome::kTimeLimit || trial.outcome == Outcome::kStepLimit) return;
-        choice.rtol = Tolerance(choice.rtol / 10);
-        continue;
-      }
-      if (trial.error <= asked && trial.error >= kContent * asked) return;
-      const double factor = std::clamp(kAim * asked / std::max(trial.error, 1e-300), 1e-4, 1e4);
-      const double next = Tolerance(choice.rtol * factor);
-      if (next == choice.rtol) return;
-      choice.rtol = next;
+      if (!*best || Better(trial, **best)) *best = trial;
+      const std::optional<Choice> other = (this->*next)(trial);
+      if (!other) return;
+      choice = *other;
     }
   }
 
-  template <class Take>
-  void SearchBudget(Choice choice, Take take) {
-    choice.rtol = 1e-8;
-    for (int i = 0; i < kMaxTrials && !OutOfTime(); ++i) {
-      const Trial trial = Try(choice);
-      take(trial);
-      if (trial.outcome != Outcome::kFinished && trial.outcome != Outcome::kTimeLimit) return;
-      const double used = trial.wall_s / Budget();
-      if (Keeps(trial) && used > kAim) return;
-      const double factor = std::clamp(std::pow(used / 0.9, kOrder), 1e-5, 1e5);
-      const double next = Tolerance(choice.rtol * factor);
-      if (next == choice.rtol) return;
-      choice.rtol = next;
+  /// Returns the choice of a trial with another tolerance, unless that is the same.
+  static std::optional<Choice> With(double rtol, const Trial& trial) {
+    Choice choice = trial.choice;
+    choice.rtol = Tolerance(rtol);
+    return choice == trial.choice ? std::nullopt : std::optional(choice);
+  }
+
+  std::optional<Choice> ForError(const Trial& trial) const {
+    const double asked = *request_.error;
+    if (trial.outcome != Outcome::kFinished) {
+      // too expensive, or too coarse for its loops
+      if (trial.outcome == Outcome::kTimeLimit || trial.outcome == Outcome::kStepLimit) return {};
+      Choice choice = trial.choice;
+      choice.rtol = Tolerance(choice.rtol / 10);
+      return choice;
     }
+    if (trial.error <= asked && trial.error >= kContent * asked) return {};
+    const double factor = std::clamp(kAim * asked / std::max(trial.error, 1e-300), 1e-4, 1e4);
+    return With(trial.choice.rtol * factor, trial);
+  }
+
+  static bool HasRun(const Trial& trial) {
+    return trial.outcome == Outcome::kFinished || trial.outcome == Outcome::kTimeLimit;
+  }
+
+  std::optional<Choice> ForBudget(const Trial& trial) const {
+    const double used = trial.wall_s / Budget();
+    if (!HasRun(trial) || (Keeps(trial) && used > kAim)) return {};
+    return With(trial.choice.rtol * std::clamp(std::pow(used / 0.9, kOrder), 1e-5, 1e5), trial);
   }
 
   /// Fixed steps have no error estimate and cost the same every time.
-  template <class Take>
-  void SearchSteps(Choice choice, Take take) {
-    choice.step = horizon_ / 1000;
-    for (int i = 0; i < kMaxTrials && !OutOfTime(); ++i) {
-      const Trial trial = Try(choice);
-      take(trial);
-      const double used = trial.wall_s / Budget();
-      if (Keeps(trial) && used > kAim) return;
-      // a run that failed may need shorter steps, if they can be had
-      if (trial.outcome != Outcome::kFinished && trial.outcome != Outcome::kTimeLimit &&
-          used > 0.5) {
-        return;
-      }
-      const double factor = std::clamp(used / 0.85, 1e-3, 1e3);
-      choice.step = std::min(choice.step * factor, horizon_ / 4);
-    }
+  std::optional<Choice> ForBudgetOfSteps(const Trial& trial) const {
+    const double used = trial.wall_s / Budget();
+    // a run that failed may need shorter steps, if they can be had
+    if ((Keeps(trial) && used > kAim) || (!HasRun(trial) && used > 0.5)) return {};
+    Choice choice = trial.choice;
+    choice.step = std::min(choice.step * std::clamp(used / 0.85, 1e-3, 1e3), horizon_ / 4);
+    return choice;
   }
 
   /// Keeps the most promising trials. With a budget, methods with one integrator err alike at one
@@ -509,13 +462,51 @@ class Pilot {
   AdviceRequest request_;
   TrialBench& bench_;
   double horizon_, length_;
-  Clock::time_point begin_ = Clock::now();
+  double begin_ = WallSeconds();  ///< [s]
   std::string fastest_;
   std::optional<Trial> best_;
   Advice advice_;
 };
 
 }  // namespace
+
+void TrialBench::Settle(Trial* trial) {
+  // re-times runs up to this long: a disturbance may hide a shorter one
+  constexpr double kMaybeShort_s = 2.5 * kShortTrial_s;
+  constexpr int kSame = 3, kMaxTimings = 12;
+  for (int same = 0, i = 0; same < kSame && i < kMaxTimings && trial->wall_s < kMaybeShort_s; ++i) {
+    const double before = trial->wall_s;
+    Remeasure(trial);
+    same = trial->wall_s < 0.97 * before ? 0 : same + 1;
+  }
+}
+
+std::string ToString(const Choice& choice) {
+  const std::string how = choice.step > 0.0 ? fmt::format("in steps of {:.3g} s", choice.step)
+                                            : fmt::format("at rtol {:.2g}", choice.rtol);
+  return fmt::format("{}/{}/{}, {} {}", choice.method.formulation,
+                     ToString(choice.method.enforcement), ToString(choice.method.coordinates),
+                     choice.integrator, how);
+}
+
+std::unique_ptr<TrialBench> MakeTrialBench(const TrialProblem& problem) {
+  Compiled compiled = Compile(problem.user, InOnePiece());
+  if (compiled.parts.front().description.space == SpaceKind::kPlanar) {
+    return std::make_unique<BenchIn<Planar>>(problem, std::move(compiled));
+  }
+  return std::make_unique<BenchIn<Spatial>>(problem, std::move(compiled));
+}
+
+std::string WhatLimits(const Trial& trial, double reference_error) {
+  if (!std::isfinite(trial.error)) return "it did not finish";
+  if (trial.error <= 10 * reference_error) {
+    return "unknown, because the reference is not certified much below it";
+  }
+  if (trial.shape < 0.2 * trial.error) {
+    return fmt::format("phase error {:.1e} s; path error {:.1e} m", trial.late, trial.shape);
+  }
+  return fmt::format("path error {:.1e} m; phase error {:.1e} s", trial.shape, trial.late);
+}
 
 Advice Advise(const AdviceRequest& request, TrialBench& bench, double horizon, double length,
               const std::function<void(Trial&)>& examine) {

@@ -72,11 +72,9 @@ std::string WhatLimits(const Trial& trial, double reference_error);
 // Finds the cheapest method that meets an error bound, or the most accurate method within a time
 // budget, by short trial runs.
 //
-// Formulations compute the same accelerations. A method's error at a tolerance thus hardly depends
-// on them, nor an evaluation's cost on the method. The search chooses tolerances per method and
-// level in the fastest formulation. The best few then run with all formulations and both coordinate
-// sets until the fastest is known. A trial is stopped once it costs significantly more than the
-// best known.
+// Formulations compute the same accelerations. The search therefore chooses tolerances per method
+// and level in the fastest formulation. The best few then run with all formulations and both
+// coordinate sets. A trial is stopped once it costs significantly more than the best known.
 
 /// Trials must stay below this share of the requested error. Errors may be larger between a
 /// reference's times, and the last bits of another machine change them.

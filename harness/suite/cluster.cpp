@@ -18,52 +18,8 @@
 #include "harness/base/store.h"
 #include "harness/base/text.h"
 #include "harness/run/run.h"
-#include "harness/suite/suite.h"
 
 namespace loopbench::harness {
-
-std::string SubmitJob(const std::filesystem::path& script,
-                      const std::vector<std::string>& options) {
-  std::vector<std::string> words = {"sbatch", "--parsable"};
-  words.insert(words.end(), options.begin(), options.end());
-  words.push_back(script.string());
-  const ProgramResult result = RunProgram(std::move(words));
-  if (const std::string failure = result.Failure("sbatch"); !failure.empty()) {
-    throw std::runtime_error(fmt::format(
-        "{}{}", failure,
-        result.error == 0 ? ""
-                          : "; without Slurm, let another engine call part.sh (docs/clusters.md)"));
-  }
-  // "12" or "12;cluster"
-  const std::string job = result.output.substr(0, result.output.find_first_of(";\n"));
-  if (!job.empty() && job.find_first_not_of("0123456789") == job.npos) return job;
-  throw std::runtime_error(
-      fmt::format("sbatch: found \"{}\", expected a job number", Excerpt(job)));
-}
-
-std::optional<std::map<int, std::string>> QueuedTasks(const std::string& job,
-                                                      std::string* problem) {
-  std::map<int, std::string> tasks;
-  if (job.empty()) return tasks;
-  const ProgramResult result =
-      RunProgram({"squeue", "--noheader", "--array", "--jobs=" + job, "--format=%K %T"});
-  const std::string failure = result.Failure("squeue");
-  if (result.messages.find("Invalid job id") != std::string::npos) return tasks;
-  if (!failure.empty()) {
-    *problem = failure;
-    return std::nullopt;
-  }
-  std::istringstream lines(result.output);
-  std::string index, state;
-  while (lines >> index >> state) {
-    int number = 0;
-    std::from_chars(index.data(), index.data() + index.size(), number);
-    std::ranges::transform(state, state.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (number > 0) tasks[number] = state;
-  }
-  return tasks;
-}
 namespace {
 
 constexpr const char* kRunFile = "cluster.json";
@@ -161,7 +117,94 @@ ClusterRun ToClusterRun(const Record& record) {
   return run;
 }
 
+/// Returns the command that runs a part, without --shard.
+std::vector<std::string> RunWords(const ClusterRun& run) {
+  std::vector<std::string> words = {run.program, "run"};
+  for (const auto& path : run.experiments) words.push_back(path.string());
+  for (const std::string& text : run.settings) words.insert(words.end(), {"--set", text});
+  for (const std::string& text : run.conditions) words.insert(words.end(), {"--filter", text});
+  if (!run.timing) words.push_back("--no-timing");
+  if (run.isolate) words.push_back("--isolate");
+  words.insert(words.end(), {"--jobs", std::to_string(run.jobs), "--wait"});
+  return words;
+}
+
+/// Returns "1-3,7": the shortest form for an array job.
+std::string Ranges(const std::vector<int>& parts) {
+  std::string text;
+  for (std::size_t i = 0; i < parts.size();) {
+    std::size_t last = i;
+    while (last + 1 < parts.size() && parts[last + 1] == parts[last] + 1) ++last;
+    if (!text.empty()) text += ',';
+    text += last == i ? fmt::format("{}", parts[i]) : fmt::format("{}-{}", parts[i], parts[last]);
+    i = last + 1;
+  }
+  return text;
+}
+
+std::string BatchHead(const ClusterRun& run, const std::string& name) {
+  std::string head =
+      fmt::format("#!/bin/sh\n#SBATCH --job-name={}\n#SBATCH --open-mode=append\n", FileName(name));
+  for (const std::string& option : run.batch_options) head += "#SBATCH " + option + '\n';
+  return head;
+}
+
+/// Returns the line that sets a job's output file. Slurm interprets quotes and backslashes as a
+/// shell does, and %X as job properties.
+std::string OutputLine(const std::filesystem::path& folder, const std::string& name) {
+  std::string quoted;
+  for (const char c : folder.string()) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (c == '%') quoted += '%';
+    quoted += c;
+  }
+  return fmt::format("#SBATCH --output=\"{}/logs/{}.log\"\n", quoted, name);
+}
+
 }  // namespace
+
+std::string SubmitJob(const std::filesystem::path& script,
+                      const std::vector<std::string>& options) {
+  std::vector<std::string> words = {"sbatch", "--parsable"};
+  words.insert(words.end(), options.begin(), options.end());
+  words.push_back(script.string());
+  const ProgramResult result = RunProgram(std::move(words));
+  if (const std::string failure = result.Failure("sbatch"); !failure.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}{}", failure,
+        result.error == 0 ? ""
+                          : "; without Slurm, let another engine call part.sh (docs/clusters.md)"));
+  }
+  // "12" or "12;cluster"
+  const std::string job = result.output.substr(0, result.output.find_first_of(";\n"));
+  if (!job.empty() && job.find_first_not_of("0123456789") == job.npos) return job;
+  throw std::runtime_error(
+      fmt::format("sbatch: found \"{}\", expected a job number", Excerpt(job)));
+}
+
+std::optional<std::map<int, std::string>> QueuedTasks(const std::string& job,
+                                                      std::string* problem) {
+  std::map<int, std::string> tasks;
+  if (job.empty()) return tasks;
+  const ProgramResult result =
+      RunProgram({"squeue", "--noheader", "--array", "--jobs=" + job, "--format=%K %T"});
+  const std::string failure = result.Failure("squeue");
+  if (result.messages.find("Invalid job id") != std::string::npos) return tasks;
+  if (!failure.empty()) {
+    *problem = failure;
+    return std::nullopt;
+  }
+  std::istringstream lines(result.output);
+  std::string index, state;
+  while (lines >> index >> state) {
+    int number = 0;
+    std::from_chars(index.data(), index.data() + index.size(), number);
+    std::ranges::transform(state, state.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (number > 0) tasks[number] = state;
+  }
+  return tasks;
+}
 
 ExperimentFiles FilesOf(const ClusterRun& run) {
   ExperimentFiles files;
@@ -253,53 +296,6 @@ std::filesystem::path PartFolder(const std::filesystem::path& folder, int part) 
 bool IsDone(const std::filesystem::path& folder, int part) {
   return std::filesystem::exists(PartFolder(folder, part) / "done");
 }
-namespace {
-
-/// Returns the command that runs a part, without --shard.
-std::vector<std::string> RunWords(const ClusterRun& run) {
-  std::vector<std::string> words = {run.program, "run"};
-  for (const auto& path : run.experiments) words.push_back(path.string());
-  for (const std::string& text : run.settings) words.insert(words.end(), {"--set", text});
-  for (const std::string& text : run.conditions) words.insert(words.end(), {"--filter", text});
-  if (!run.timing) words.push_back("--no-timing");
-  if (run.isolate) words.push_back("--isolate");
-  words.insert(words.end(), {"--jobs", std::to_string(run.jobs), "--wait"});
-  return words;
-}
-
-/// Returns "1-3,7": the shortest form for an array job.
-std::string Ranges(const std::vector<int>& parts) {
-  std::string text;
-  for (std::size_t i = 0; i < parts.size();) {
-    std::size_t last = i;
-    while (last + 1 < parts.size() && parts[last + 1] == parts[last] + 1) ++last;
-    if (!text.empty()) text += ',';
-    text += last == i ? fmt::format("{}", parts[i]) : fmt::format("{}-{}", parts[i], parts[last]);
-    i = last + 1;
-  }
-  return text;
-}
-
-std::string BatchHead(const ClusterRun& run, const std::string& name) {
-  std::string head =
-      fmt::format("#!/bin/sh\n#SBATCH --job-name={}\n#SBATCH --open-mode=append\n", FileName(name));
-  for (const std::string& option : run.batch_options) head += "#SBATCH " + option + '\n';
-  return head;
-}
-
-/// Returns the line that sets a job's output file. Slurm interprets quotes and backslashes as a
-/// shell does, and %X as job properties.
-std::string OutputLine(const std::filesystem::path& folder, const std::string& name) {
-  std::string quoted;
-  for (const char c : folder.string()) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    if (c == '%') quoted += '%';
-    quoted += c;
-  }
-  return fmt::format("#SBATCH --output=\"{}/logs/{}.log\"\n", quoted, name);
-}
-
-}  // namespace
 
 std::string PartScript(const ClusterRun& run, const std::filesystem::path& folder) {
   return fmt::format(R"(#!/bin/sh

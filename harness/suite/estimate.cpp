@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <cstring>
 #include <exception>
-#include <functional>
-#include <limits>
+#include <numeric>
 #include <set>
 #include <sstream>
+#include <type_traits>
 
 #include "harness/base/text.h"
 #include "harness/judge/analysis.h"
@@ -22,7 +21,7 @@
 namespace loopbench::harness {
 
 /// Result of a pilot.
-struct Estimate::PilotCost {
+struct PilotCost {
   double all_s = 0.0, running_s = 0.0;  ///< CPU time, total and proportional to the horizon
   double reached = 1.0;                 ///< part reached [of the horizon]
   double members_s = 0.0;               ///< CPU time of the ensemble members in addition
@@ -40,6 +39,7 @@ constexpr double kNearlyAll = 0.999;            ///< part reached by a reference
 constexpr int kMembers = 16;                    ///< pilot members of an ensemble
 constexpr double kShort_s = 0.1;                ///< too short for a pilot at each tolerance
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kClear = "\r\033[K";  // clears the present line
 
 double Longest(const Experiment& experiment, std::size_t problem) {
   return std::ranges::max(experiment.problems[problem].horizons);
@@ -47,7 +47,6 @@ double Longest(const Experiment& experiment, std::size_t problem) {
 
 double NumberOfRuns(const Case& one) { return static_cast<double>(RunsOf(one)); }
 
-template <class PilotCost>
 Rate Next(const Rate& before, const PilotCost& spent) {
   const double reached = std::max(spent.reached, 1e-9), mean = spent.running_s / reached;
   const double grown = reached - before.reached;
@@ -62,13 +61,58 @@ Rate Next(const Rate& before, const PilotCost& spent) {
           .most_s = spent.most_s};
 }
 
+/// Prefix of a fault in an answer; other answers are lines of warnings.
+constexpr char kFault = '!';
+
+template <class Space>
+std::string AnswerIn(const MechanismDescription& description) {
+  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+  const Start<double> start = Assemble<Space>(description, mechanism);
+  if (start.outcome == Outcome::kInconsistentStart) return kFault + start.message;
+  std::string lines;
+  for (const std::string& warning : FindGuessWarnings(description, start.q)) {
+    lines += warning + '\n';
+  }
+  return lines;
+}
+
+/// Returns faults and warnings of a start. A locked start is assembled: immobility is a result.
+std::string Answer(const MechanismDescription& description) {
+  return description.space == SpaceKind::kPlanar ? AnswerIn<Planar>(description)
+                                                 : AnswerIn<Spatial>(description);
+}
+
+std::string AnswerOfProblem(const Experiment& experiment, const MechanismFile& file) {
+  const SimplifiedProblem problem =
+      SimplifyProblem(file.description, file.observe, experiment.compile);
+  std::string lines;
+  for (const CompiledPart& part : problem.compiled.parts) {
+    std::string answer = Answer(part.description);
+    if (answer.starts_with(kFault)) return answer;
+    lines += answer;
+  }
+  return lines;
+}
+
+StartReport ReportOf(const ProcessLimits& limits, const std::function<std::string()>& answer) {
+  StartReport report;
+  const ProcessResult result = RunInProcess(limits, answer);
+  if (result.ending != ProcessEnding::kAnswered) {
+    report.faults = {
+        fmt::format("its start was not assembled ({}): {}", OutcomeOf(result.ending), result.text)};
+  } else if (result.text.starts_with(kFault)) {
+    report.faults = {
+        fmt::format("found a start that cannot be assembled ({}), expected one from which every "
+                    "loop closes",
+                    result.text.substr(1))};
+  } else {
+    std::istringstream lines(result.text);
+    for (std::string line; std::getline(lines, line);) report.warnings.push_back(line);
+  }
+  return report;
+}
+
 }  // namespace
-
-Estimate::Estimate(const std::vector<Experiment>& experiments, const Budget& budget,
-                   const Selection& filter)
-    : experiments_(experiments), budget_(budget), filter_(filter) {}
-
-Estimate::~Estimate() = default;
 
 std::size_t Estimate::Nearest(std::size_t experiment) const {
   const std::size_t count = experiments_.size();
@@ -110,8 +154,8 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
       const double enough = std::clamp(budget_.share * times * (rate.fixed_s + rate.Running(1.0)),
                                        budget_.least_s, most_s);
       if (spent.failed || fraction >= 1.0 || spent.all_s >= enough) {
-        return fmt::format("{} {} {} {} {} {} {} {}", rate.fixed_s, rate.member, rate.running_s,
-                           rate.reached, rate.slope_s, rate.ends_at, rate.most_s, worked);
+        rate.process_s = worked;
+        return std::string(reinterpret_cast<const char*>(&rate), sizeof(Rate));
       }
     }
   };
@@ -119,13 +163,11 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
   const double before = ThreadCpuSeconds();
   const ProcessResult result = RunInProcess(limits, pilot);
   spent_s_ += result.wall_s;
-  double worked = 0.0;
-  if (result.ending == ProcessEnding::kAnswered &&
-      std::sscanf(result.text.c_str(), "%lf %lf %lf %lf %lf %lf %lf %lf", &rate.fixed_s,
-                  &rate.member, &rate.running_s, &rate.reached, &rate.slope_s, &rate.ends_at,
-                  &rate.most_s, &worked) == 8) {
+  if (result.ending == ProcessEnding::kAnswered && result.text.size() == sizeof(Rate)) {
+    static_assert(std::is_trivially_copyable_v<Rate>);
+    std::memcpy(&rate, result.text.data(), sizeof(Rate));
     // starting a process costs CPU time of its parent and of itself
-    rate.process_s = std::max(0.0, result.cpu_s - worked) + ThreadCpuSeconds() - before;
+    rate.process_s = std::max(0.0, result.cpu_s - rate.process_s) + ThreadCpuSeconds() - before;
   } else {
     rate = {.fixed_s = result.cpu_s};
     cut_off_.push_back(fmt::format("{}: {}, {}", name, OutcomeOf(result.ending), result.text));
@@ -136,7 +178,7 @@ const Rate* Estimate::Known(const std::string& key, const std::string& name,
 /// Returns a folder, or "" on errors: an estimate without output costs is better than none.
 std::filesystem::path Estimate::PlaceForRows() {
   try {
-    if (written_ == nullptr) written_ = std::make_unique<TemporaryFolder>("loopbench-plan");
+    if (written_ == nullptr) written_ = std::make_shared<TemporaryFolder>("loopbench-plan");
     return written_->path() / "rows.csv";
   } catch (const std::exception&) {
     return {};
@@ -247,7 +289,6 @@ double Estimate::OfReference(std::size_t experiment, const ReferenceCase& one) {
                  {.cpu_s = 4.0 * own.reference->cpu_s, .memory_mb = own.limits.memory_mb}, times,
                  run);
   };
-  constexpr double kWitnesses = 3.0;
   const auto total = [&](const Rate& rate) {
     return rate.fixed_s + std::min(rate.Running(1.0), kWitnesses * own.reference->cpu_s);
   };
@@ -271,7 +312,7 @@ double Estimate::OfLadder(std::size_t experiment, const LadderGroup& group) {
     const double all_s = ThreadCpuSeconds() - begin_s;
     return {.all_s = all_s, .running_s = all_s, .reached = fraction};
   };
-  const auto runs = static_cast<double>(group.keys.size() + 1);  // there are two references
+  const double runs = group.runs();
   const Rate* rate =
       Known("ladder/" + group.keys.front().Text("case_id"), group.keys.front().Text("mechanism"),
             LimitsOfRuns(own.limits, runs), 1.0, run);
@@ -311,60 +352,6 @@ double Estimate::OfTiming(std::size_t experiment, const TimingGroup& group) {
             LimitsOfRuns(own.limits, 2.0 * static_cast<double>(group.cases.size() + 1)), 1.0, run);
   return rate == nullptr ? kUnknown : rate->fixed_s + rate->Running(1.0);
 }
-namespace {
-
-/// Prefix of a fault in an answer; other answers are lines of warnings.
-constexpr char kFault = '!';
-
-template <class Space>
-std::string AnswerIn(const MechanismDescription& description) {
-  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
-  const Start<double> start = Assemble<Space>(description, mechanism);
-  if (start.outcome == Outcome::kInconsistentStart) return kFault + start.message;
-  std::string lines;
-  for (const Warning& warning : FindGuessWarnings(description, start.q)) {
-    lines += warning.text + '\n';
-  }
-  return lines;
-}
-
-/// Returns faults and warnings of a start. A locked start is assembled: immobility is a result.
-std::string Answer(const MechanismDescription& description) {
-  return description.space == SpaceKind::kPlanar ? AnswerIn<Planar>(description)
-                                                 : AnswerIn<Spatial>(description);
-}
-
-std::string AnswerOfProblem(const Experiment& experiment, const MechanismFile& file) {
-  const SimplifiedProblem problem =
-      SimplifyProblem(file.description, file.observe, experiment.compile);
-  std::string lines;
-  for (const CompiledPart& part : problem.compiled.parts) {
-    std::string answer = Answer(part.description);
-    if (answer.starts_with(kFault)) return answer;
-    lines += answer;
-  }
-  return lines;
-}
-
-StartReport ReportOf(const ProcessLimits& limits, const std::function<std::string()>& answer) {
-  StartReport report;
-  const ProcessResult result = RunInProcess(limits, answer);
-  if (result.ending != ProcessEnding::kAnswered) {
-    report.faults = {
-        fmt::format("its start was not assembled ({}): {}", OutcomeOf(result.ending), result.text)};
-  } else if (result.text.starts_with(kFault)) {
-    report.faults = {
-        fmt::format("found a start that cannot be assembled ({}), expected one from which every "
-                    "loop closes",
-                    result.text.substr(1))};
-  } else {
-    std::istringstream lines(result.text);
-    for (std::string line; std::getline(lines, line);) report.warnings.push_back(line);
-  }
-  return report;
-}
-
-}  // namespace
 
 StartReport CheckStart(const MechanismDescription& description, const ProcessLimits& limits) {
   return ReportOf(limits, [&] { return Answer(description); });
@@ -414,6 +401,85 @@ void RequireFreedom(const std::vector<Experiment>& experiments) {
       RequireFreedom(problem.mechanism, LimitsOfRuns(experiment.limits, 1));
     }
   }
+}
+
+Progress::Progress(std::string what, std::vector<Piece> pieces, int jobs)
+    : what_(std::move(what)), pieces_(std::move(pieces)), jobs_(jobs), is_seen_(IsSeen()) {
+  double known = 0.0;
+  std::size_t count = 0;
+  for (const Piece& piece : pieces_) {
+    if (std::isnan(piece.estimate_s)) continue;
+    known += piece.estimate_s;
+    ++count;
+  }
+  for (Piece& piece : pieces_) {
+    if (!std::isnan(piece.estimate_s)) continue;
+    piece.estimate_s = count > 0 ? known / static_cast<double>(count) : 0.0;
+  }
+  waiting_s_ =
+      std::accumulate(pieces_.begin(), pieces_.end(), 0.0,
+                      [](double sum, const Piece& piece) { return sum + piece.estimate_s; });
+  Draw();
+}
+
+Progress::~Progress() {
+  if (is_seen_) PrintErrorText(kClear);
+}
+
+bool Progress::IsSeen() { return ErrorScreen().width > 0; }
+
+void Progress::Start(std::size_t piece) {
+  running_.push_back({piece, WallSeconds()});
+  waiting_s_ -= pieces_[piece].estimate_s;
+  Draw();
+}
+
+void Progress::Done(std::size_t piece) {
+  const auto at = std::ranges::find(running_, piece, &Running::piece);
+  ++done_;
+  taken_s_ += WallSeconds() - at->begin;
+  foreseen_s_ += pieces_[piece].estimate_s;
+  running_.erase(at);
+  Draw();
+}
+
+void Progress::Look() {
+  if (is_seen_ && WallSeconds() - drawn_ >= 1.0) Draw();
+}
+
+double Progress::SecondsToGo() const {
+  if (foreseen_s_ + waiting_s_ + (running_.empty() ? 0.0 : pieces_[running_[0].piece].estimate_s) <=
+      0.0) {
+    // without estimates all pieces are assumed equal
+    if (done_ == 0) return -1.0;
+    return (WallSeconds() - begin_) * static_cast<double>(pieces_.size() - done_) /
+           static_cast<double>(done_);
+  }
+  const double factor = foreseen_s_ > 0.0 ? taken_s_ / foreseen_s_ : 1.0;
+  double left = factor * waiting_s_;
+  for (const Running& running : running_) {
+    left +=
+        std::max(0.0, factor * pieces_[running.piece].estimate_s - (WallSeconds() - running.begin));
+  }
+  return left / std::min<double>(jobs_, static_cast<double>(pieces_.size() - done_));
+}
+
+void Progress::Draw() {
+  if (!is_seen_ || done_ == pieces_.size()) return;
+  drawn_ = WallSeconds();
+  const double left = SecondsToGo();
+  std::string line = fmt::format("{} {}/{}  elapsed {:.0f} s", what_, done_, pieces_.size(),
+                                 WallSeconds() - begin_);
+  if (left >= 0.0) line += fmt::format(", about {:.0f} s left", std::ceil(left));
+  if (!running_.empty()) {
+    const Running& oldest = running_.front();
+    line += fmt::format("  now {} ({:.0f} s)", pieces_[oldest.piece].label,
+                        WallSeconds() - oldest.begin);
+    if (running_.size() > 1) line += fmt::format(" and {} more", running_.size() - 1);
+  }
+  // one line; some terminals begin a new line after writing the last cell
+  const std::size_t room = std::max<std::size_t>(ErrorScreen().width, 3) - 1;
+  PrintErrorText(kClear + std::string(Beginning(EscapeTerminal(line), room)));
 }
 
 }  // namespace loopbench::harness

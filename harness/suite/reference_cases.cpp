@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "harness/base/record.h"
 #include "harness/base/text.h"
+#include "harness/config/mechanism_reader.h"
 #include "harness/judge/analysis.h"
-#include "harness/observers/reference.h"
+#include "harness/observers/trajectory.h"
 #include "harness/run/run.h"
 #include "harness/suite/suite.h"
 #include "mechanism/description/outcome.h"
@@ -18,7 +17,6 @@
 #endif
 
 namespace loopbench::harness {
-
 namespace {
 
 /// Returns the planar mechanism of a problem for the ladder, in one piece.
@@ -85,6 +83,27 @@ void Write(const SweepLevel& rung, Record& record) {
   record.Set("cpu_s", rung.cpu_s);
 }
 
+/// Returns true for file names as written by runs; records from other sources are not trusted.
+bool IsId(const std::string& text) {
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+std::filesystem::path MechanismPath(const std::filesystem::path& store_file,
+                                    const std::string& problem_id) {
+  return store_file.parent_path() / "mechanisms" / (problem_id + ".json");
+}
+
+/// Comment with the hash of all bytes of the file, computed with zeros in place of the hash.
+constexpr std::string_view kChecksum = "Kept by a run; checksum ", kZeros = "0000000000000000";
+
+void VerifyMechanism(const std::filesystem::path& file) {
+  if (const std::string text = ReadFile(file); WithOwnHash(text) == text) return;
+  throw ChangedFile(
+      fmt::format("{}: the file was changed after its run wrote it: its checksum differs; remove "
+                  "it: the same run writes it again",
+                  file.string()));
+}
+
 }  // namespace
 
 std::vector<LadderGroup> LadderGroups(const Experiment& experiment, const Selection& filter) {
@@ -140,15 +159,25 @@ void CheckLadders(const Experiment& experiment) {
   if (result.ending == ProcessEnding::kThrew) throw ConfigError(result.text);
 }
 
+void RequireLadders(const Experiment& experiment) {
 #ifdef LOOPBENCH_PRECISIONS
+  CheckLadders(experiment);
+#else
+  if (experiment.precision.scalars.empty()) return;
+  throw ConfigError(
+      fmt::format("{}: /precision: found runs in several scalars, expected none: this program was "
+                  "built without them (cmake -DLOOPBENCH_PRECISIONS=ON)",
+                  experiment.path.string()));
+#endif
+}
 
-void RequireLadders(const Experiment& experiment) { CheckLadders(experiment); }
-
-std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group) {
+std::vector<Record> ClimbTogether([[maybe_unused]] const Experiment& experiment,
+                                  const LadderGroup& group) {
+  std::vector<Record> records = group.keys;
+#ifdef LOOPBENCH_PRECISIONS
   LadderTask task = group.task;
   task.description = PlanarPart(experiment, experiment.problems[group.problem]);
   const Ladder ladder = RunLadder(task);
-  std::vector<Record> records = group.keys;
   for (std::size_t i = 0; i < records.size(); ++i) {
     if (ladder.start != Outcome::kFinished) {
       records[i].Set("outcome", std::string(ToString(ladder.start)));
@@ -157,24 +186,9 @@ std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGrou
       Write(i == 0 ? ladder.reference : ladder.rungs[i - 1], records[i]);
     }
   }
+#endif
   return records;
 }
-
-#else
-
-void RequireLadders(const Experiment& experiment) {
-  if (experiment.precision.scalars.empty()) return;
-  throw ConfigError(
-      fmt::format("{}: /precision: found runs in several scalars, expected none: this program was "
-                  "built without them (cmake -DLOOPBENCH_PRECISIONS=ON)",
-                  experiment.path.string()));
-}
-
-std::vector<Record> ClimbTogether(const Experiment&, const LadderGroup& group) {
-  return group.keys;
-}
-
-#endif
 
 ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
                           const std::filesystem::path& store) {
@@ -211,58 +225,110 @@ std::optional<Reference> FindReference(const Experiment& experiment, const Case&
   return none;
 }
 
-namespace {
-
-Record CertificateOf(const ExperimentProblem& problem, const ReferenceCase& one) {
-  Record record = one.keys;
-  record.Set("outcome", std::string(ToString(Outcome::kFinished)));
-  WriteCertificate(problem.mechanism.description, *problem.series, one.horizon, record);
-  return record;
-}
-
-}  // namespace
-
 bool HasReference(const Experiment& experiment, const Case& one) {
   return experiment.reference || experiment.problems[one.problem].series;
 }
 
-#ifdef LOOPBENCH_PRECISIONS
-
 Record MakeOne(const Experiment& experiment, const ReferenceCase& one) {
   const ExperimentProblem& problem = experiment.problems[one.problem];
-  if (problem.series) return CertificateOf(problem, one);
   const MechanismDescription& user = problem.mechanism.description;
+  Record record = one.keys;
+  if (problem.series) {
+    record.Set("outcome", std::string(ToString(Outcome::kFinished)));
+    WriteCertificate(user, *problem.series, one.horizon, record);
+    return record;
+  }
+#ifdef LOOPBENCH_PRECISIONS
   std::optional<Reference> reference = ReadReference(one.file, one.id, user);
   if (!reference) {
     reference = MakeReference(user, one.horizon, LinkLength(user), *experiment.reference);
     WriteReference(one.file, one.id, user, *reference);
   }
-  Record record = one.keys;
   record.Set("outcome", reference->outcome);
   record.Set("message", reference->message);
   record.Set("cpu_s", reference->cpu_s);
   record.Set("rhs_evaluations", reference->rhs_evaluations);
   WriteCertificate(*reference, record);
+#endif
   return record;
 }
 
-void RequireReferences(const Experiment&) {}
-
-#else
-
-Record MakeOne(const Experiment& experiment, const ReferenceCase& one) {
-  const ExperimentProblem& problem = experiment.problems[one.problem];
-  return problem.series ? CertificateOf(problem, one) : one.keys;
-}
-
-void RequireReferences(const Experiment& experiment) {
+void RequireReferences([[maybe_unused]] const Experiment& experiment) {
+#ifndef LOOPBENCH_PRECISIONS
   if (!experiment.reference) return;
   throw ConfigError(
       fmt::format("{}: /reference: found references, expected none: this program was built "
                   "without wide scalars (cmake -DLOOPBENCH_PRECISIONS=ON)",
                   experiment.path.string()));
+#endif
 }
 
-#endif
+std::string WithOwnHash(std::string text) {
+  const std::size_t at = text.find(kChecksum);
+  if (at == std::string::npos) return text;  // format version 1.0
+  text.replace(at + kChecksum.size(), kZeros.size(), kZeros);
+  return text.replace(at + kChecksum.size(), kZeros.size(), Fnv1a(text));
+}
+
+MechanismDescription ReadKeptMechanism(const std::filesystem::path& file) {
+  VerifyMechanism(file);
+  return ReadMechanism(file).description;
+}
+
+void VerifyFilesOf(const std::vector<Record>& records, const std::filesystem::path& store_file) {
+  std::set<std::filesystem::path> verified;
+  for (const Record& record : records) {
+    const std::filesystem::path mechanism = MechanismOf(record, store_file);
+    const std::filesystem::path trajectory = TrajectoryOf(record, store_file);
+    if (std::filesystem::exists(mechanism) && verified.insert(mechanism).second) {
+      VerifyMechanism(mechanism);
+    }
+    if (std::filesystem::exists(trajectory)) VerifyTrajectory(record, trajectory);
+  }
+}
+
+std::filesystem::path MechanismOf(const Record& record, const std::filesystem::path& store_file) {
+  const std::string id = record.Text("problem_id");
+  return IsId(id) ? MechanismPath(store_file, id) : std::filesystem::path();
+}
+
+std::filesystem::path ReferenceOf(const Record& record, const std::filesystem::path& store_file) {
+  const std::string id = record.Text("reference_file");
+  return IsId(id) ? ReferencePath(store_file, id) : std::filesystem::path();
+}
+
+void KeepMechanisms(const std::vector<Experiment>& experiments,
+                    const std::filesystem::path& store_file) {
+  for (const Experiment& experiment : experiments) {
+    if (!experiment.reference && !experiment.output) continue;
+    for (const ExperimentProblem& problem : experiment.problems) {
+      const auto path = MechanismPath(store_file, Fnv1a(problem.mechanism.canonical));
+      if (std::filesystem::exists(path)) continue;
+      try {
+        WriteFileAtomically(path, WithOwnHash(MechanismText(
+                                      problem.mechanism.description, problem.mechanism.observe,
+                                      fmt::format("{}{}.", kChecksum, kZeros))));
+      } catch (const ConfigError&) {
+      }
+    }
+  }
+}
+
+void CopyMechanisms(const std::vector<Record>& records,
+                    const std::vector<std::filesystem::path>& stores,
+                    const std::filesystem::path& target) {
+  for (const Record& record : records) {
+    const std::filesystem::path to = MechanismOf(record, target);
+    if (to.empty() || std::filesystem::exists(to)) continue;
+    for (const std::filesystem::path& store : stores) {
+      const std::filesystem::path from = MechanismOf(record, store);
+      if (!std::filesystem::exists(from)) continue;
+      const std::string text = ReadFile(from);
+      if (WithOwnHash(text) != text) continue;
+      WriteFileAtomically(to, text);
+      break;
+    }
+  }
+}
 
 }  // namespace loopbench::harness

@@ -1,9 +1,7 @@
-// Runs of experiments: estimates, workloads, references, pieces of work, stores.
+// Runs of experiments: workloads, estimates, references, stores.
 #pragma once
 
 #include <algorithm>
-#include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -12,12 +10,12 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "harness/base/record.h"
 #include "harness/base/store.h"
+#include "harness/base/text.h"
 #include "harness/config/experiment.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/observers/reference.h"
@@ -27,8 +25,6 @@
 
 namespace loopbench::harness {
 
-// Special cases: runs in several scalar types, and certified references.
-
 // Precision ladders of an experiment (harness/precision/ladder.h): one per problem and method.
 
 /// A ladder and the keys of its records: the reference, then every rung in the order of
@@ -37,6 +33,8 @@ struct LadderGroup {
   LadderTask task;  ///< without the description, which the child process makes
   std::size_t problem = 0;
   std::vector<Record> keys;
+
+  double runs() const { return static_cast<double>(keys.size() + 1); }  ///< two references
 };
 
 /// Returns the groups that contain a rung passing the filter.
@@ -50,16 +48,15 @@ std::size_t CountRungs(const Experiment& experiment);
 /// exceeds these limits is not rejected here.
 void CheckLadders(const Experiment& experiment);
 
-/// Throws ConfigError if the experiment has ladders that cannot run: as above, or in a program
-/// built without their scalars (LOOPBENCH_PRECISIONS).
+/// Calls CheckLadders(). Without LOOPBENCH_PRECISIONS, throws ConfigError if the experiment has
+/// ladders.
 void RequireLadders(const Experiment& experiment);
 
 /// Runs a ladder; returns one record per key, in order.
 std::vector<Record> ClimbTogether(const Experiment& experiment, const LadderGroup& group);
 
-// Reference solutions for the accuracy cases of an experiment, one per problem and horizon: a
-// record of each, and a file next to the store for certified ones.
-
+/// Reference solution for the accuracy cases of a problem and horizon: a record, and a file next to
+/// the store if it is certified.
 struct ReferenceCase {
   std::size_t problem = 0;
   double horizon = 0.0;  ///< [s]
@@ -76,6 +73,9 @@ bool HasReference(const Experiment& experiment, const Case& one);
 ReferenceCase ReferenceOf(const Experiment& experiment, const Case& one,
                           const std::filesystem::path& store);
 
+/// Integrations of a certified reference (harness/precision/make_reference.h).
+inline constexpr double kWitnesses = 3.0;
+
 /// Creates the file if needed and absent, and returns a record of the certified accuracy.
 Record MakeOne(const Experiment& experiment, const ReferenceCase& one);
 
@@ -88,11 +88,10 @@ std::optional<Reference> FindReference(const Experiment& experiment, const Case&
 /// their scalars (LOOPBENCH_PRECISIONS).
 void RequireReferences(const Experiment& experiment);
 
-// Before a run: its estimated time, and checks of the start states.
-
 // Estimates the time of the pieces of a suite from pilots: the same work over a shorter horizon.
 
 class TemporaryFolder;
+struct PilotCost;
 
 /// CPU times measured by pilots, and the extrapolation to the full horizon.
 struct Rate {
@@ -129,8 +128,8 @@ class Estimate {
   };
   /// `experiments` must outlive this. Pilots use tolerances of cases that pass `filter`.
   Estimate(const std::vector<Experiment>& experiments, const Budget& budget,
-           const Selection& filter = {});
-  ~Estimate();
+           const Selection& filter = {})
+      : experiments_(experiments), budget_(budget), filter_(filter) {}
 
   /// Returns the CPU time of a piece of the experiment [s], NaN if unknown. A case includes its
   /// unperturbed run and its ensemble, or, if timed, `simulations` runs in one process.
@@ -144,7 +143,6 @@ class Estimate {
   const std::vector<std::string>& cut_off() const { return cut_off_; }
 
  private:
-  struct PilotCost;
   std::size_t Nearest(std::size_t experiment) const;
   const std::pair<double, double>& Tolerances(std::size_t experiment);
   const Rate* Known(const std::string& key, const std::string& name, const ProcessLimits& limits,
@@ -157,15 +155,13 @@ class Estimate {
   Selection filter_;
   std::map<std::size_t, std::pair<double, double>> tolerances_;  ///< finest and loosest
   double spent_s_ = 0.0;
-  std::unique_ptr<TemporaryFolder> written_;  ///< for trajectories of pilots
+  std::shared_ptr<TemporaryFolder> written_;  ///< for trajectories of pilots
   std::map<std::string, Rate> rates_;
   std::vector<std::string> cut_off_;
 };
 
-// Checks before any run that the start states can be assembled.
-
-/// Sentences about starts: faults (not assembled, with found and expected values) and warnings
-/// (initial guesses that are not met).
+/// Sentences about starts, from checks before any run: faults (not assembled, with found and
+/// expected values) and warnings (initial guesses that are not met).
 struct StartReport {
   std::vector<std::string> faults, warnings;
 };
@@ -185,8 +181,6 @@ void RequireFreedom(const std::vector<Experiment>& experiments);
 
 // Cases of a run: shards, sweeps of any length, the whole.
 
-// Shards divide a run among several machines.
-
 /// One of `count` shards: every case is in exactly one.
 struct Shard {
   int index = 1, count = 1;
@@ -197,12 +191,6 @@ struct Shard {
 
 /// Reads "k/n" with 1 <= k <= n. Throws ConfigError.
 Shard ParseShard(const std::string& text);
-
-// A sweep with too many combinations to hold in memory at once.
-//
-// Opening a sweep reads enough combinations to contain each value of each axis. Invalid values are
-// therefore rejected before anything runs. Invalid combinations of values are rejected when they
-// are reached.
 
 /// Maximum number of combinations of a short sweep. Longer ones are read and run in groups, and
 /// sharded by combination: a shard reads only its own.
@@ -225,54 +213,6 @@ struct CaseLine {
 /// Returns the number of runs of a case.
 std::size_t RunsOf(const Case& entry);
 
-/// Adds a case `times` times to its line; lines are in the order of their first case.
-void AddTo(std::vector<CaseLine>* lines, const Case& entry, std::size_t times = 1);
-
-/// Throws ConfigError for a condition on a key that no case has, since it would match nothing.
-void RequireKeys(const std::vector<Experiment>& experiments, const Selection& filter);
-
-/// Returns true if any case of the experiment passes.
-bool Passes(const Experiment& experiment, const Selection& filter);
-
-class LongSweep {
- public:
-  /// Throws ConfigError as the reader, for all combinations read here, and if no case can pass.
-  LongSweep(ExperimentSource source, const ExperimentFiles& files);
-
-  const ExperimentSource& source() const { return source_; }
-  std::size_t count() const { return source_.count(); }
-
-  /// Returns evenly spaced combinations, at most 64, each with at least one passing case.
-  const std::vector<Experiment>& some() const { return some_; }
-
-  /// Returns the number of combinations in a group: fewer for large mechanisms.
-  std::size_t group_size() const { return group_size_; }
-
-  /// Reads combinations from..to-1 of a shard (its first, second, ...) that have passing cases,
-  /// with their numbers in the sweep.
-  std::vector<Experiment> Read(std::size_t from, std::size_t to, const Shard& shard,
-                               std::vector<std::int64_t>* numbers = nullptr);
-
-  /// Counts all passing cases. Takes a microsecond or two per combination if cases differ only in
-  /// parameters; otherwise reads each combination.
-  std::vector<CaseLine> CountCases();
-
- private:
-  /// Returns nothing if no case passes.
-  std::vector<Experiment> ReadOne(std::size_t combination);
-  bool ParametersPass(std::size_t combination) const;
-  std::vector<CaseLine> CountAlike(const Experiment& first) const;
-
-  ExperimentSource source_;
-  Selection filter_, on_axes_;  ///< all conditions, and those on parameters only
-  int threads_;
-  bool are_alike_ = true;  ///< keys of cases differ in parameters only
-  std::vector<Experiment> some_;
-  std::size_t group_size_ = kLongSweep;
-};
-
-// Work of a command: the experiments of its files, a group at a time.
-
 /// Experiments in memory at the same time.
 struct ExperimentGroup {
   std::vector<Experiment> experiments;
@@ -281,7 +221,10 @@ struct ExperimentGroup {
   bool is_sharded = false;            ///< true: selected for the shard already
 };
 
-/// Short files form one group. Long sweeps follow in groups of their own.
+class LongSweep;
+
+/// Work of a command: the experiments of its files, a group at a time. Short files form one group.
+/// Long sweeps follow in groups of their own.
 class Workload {
  public:
   /// Reads all files except the combinations of long sweeps. Throws ConfigError as the readers, and
@@ -301,17 +244,11 @@ class Workload {
   const std::string& content() const { return content_; }
 
  private:
-  struct Part {
-    LongSweep sweep;
-    std::size_t groups;
-    std::int64_t first_number;
-  };
-
-  Shard shard_;
   std::optional<Experiment> first_;
   ExperimentGroup whole_;         ///< all short files
   std::vector<Experiment> some_;  ///< samples, if there are long sweeps
-  std::vector<Part> sweeps_;
+  /// Long sweeps, with the number of the first experiment of each.
+  std::vector<std::pair<std::shared_ptr<LongSweep>, std::int64_t>> sweeps_;
   std::string content_;
 };
 
@@ -328,8 +265,6 @@ struct Overview {
 
 /// Throws ConfigError as Workload.
 Overview MakeOverview(const std::filesystem::path& path, const ExperimentFiles& files);
-
-// Runs of experiments: groups of cases, stores, and files next to them.
 
 // Runs the cases of experiments in child processes and stores their records.
 
@@ -370,16 +305,12 @@ struct SuiteCount {
 /// expensive first), the precision ladders and the timings. Shows progress. Stores each record as
 /// soon as it is complete. Long sweeps repeat all of this for each group, kind by kind.
 ///
-/// A case is done if the store has a record with its id. The id represents all settings of the run
-/// and this very program. `finished` contains the records in the store at the call. Completed
-/// groups of long sweeps are marked next to the store and not read again.
+/// A case is done if the store has a record with its id (all settings, and this very program).
+/// `finished` contains the records in the store at the call. Completed groups of long sweeps are
+/// marked next to the store and not read again. Every case gets a record: outcomes "crashed",
+/// "process-time-limit", "memory-limit" and "invalid-result" come from its process.
 ///
-/// Throws Interrupted (harness/run/processes.h) on Ctrl-C; complete records are then in the
-/// store.
-///
-/// Every case gets a record: outcomes "crashed", "process-time-limit", "memory-limit" and
-/// "invalid-result" come from its process. Short cases share processes
-/// (harness/run/processes.h).
+/// Throws Interrupted (harness/run/processes.h) on Ctrl-C.
 SuiteCount RunSuite(Workload& workload, const SuiteOptions& options, FinishedRuns& finished,
                     ResultStore& store);
 
@@ -394,7 +325,7 @@ std::filesystem::path MechanismOf(const Record& record, const std::filesystem::p
 /// stay.
 std::string WithOwnHash(std::string text);
 
-/// Reads such a file. Throws ChangedFile (trajectory/store_files.h) if its checksum is wrong, and
+/// Reads such a file. Throws ChangedFile (observers/trajectory.h) if its checksum is wrong, and
 /// as ReadMechanism().
 MechanismDescription ReadKeptMechanism(const std::filesystem::path& file);
 
@@ -415,8 +346,6 @@ std::filesystem::path ReferenceOf(const Record& record, const std::filesystem::p
 void CopyMechanisms(const std::vector<Record>& records,
                     const std::vector<std::filesystem::path>& stores,
                     const std::filesystem::path& target);
-
-// Pieces of work, their processes, and the progress line.
 
 // Progress line with the remaining time, on standard error if it is a terminal.
 
@@ -444,10 +373,9 @@ class Progress {
   void Look();
 
  private:
-  using Clock = std::chrono::steady_clock;
   struct Running {
     std::size_t piece;
-    Clock::time_point begin;
+    double begin;  ///< [s]
   };
 
   /// Returns the remaining time, corrected by the durations of finished pieces. Negative: unknown.
@@ -462,71 +390,7 @@ class Progress {
   double taken_s_ = 0.0, foreseen_s_ = 0.0;  ///< of the finished pieces
   double waiting_s_ = 0.0;                   ///< estimate for the pieces that have not begun
   std::vector<Running> running_;
-  Clock::time_point begin_, drawn_;
-};
-
-// One process of a run: its expected records and the function that makes them.
-
-struct Piece {
-  std::vector<Record> owed;     ///< keys, case_id and content: complete except for results
-  std::int64_t experiment = 0;  ///< index among the experiments of the command
-  /// `beside`: other pieces of the process, null without any.
-  std::function<std::vector<Record>(int threads, SideBySide* beside)> work;
-  ProcessLimits limits;
-  std::string label;
-  double cost = 0.0;                      ///< expensive pieces run first
-  std::string lanes = {};                 ///< pieces with equal names share calls; "": none
-  int threads = 1;                        ///< threads of `work`, which may need fewer
-  std::filesystem::path product = {};     ///< file that must exist for the piece to be done
-  std::filesystem::path trajectory = {};  ///< file that its process may leave incomplete
-  std::function<double(Estimate&)> seconds = {};
-};
-
-/// Pieces of an experiment, which must outlive them.
-/// @param one    case with its id
-/// @param store  the store file; references lie in its folder
-Piece AccuracyPiece(const Experiment& experiment, const Case& entry,
-                    const std::filesystem::path& store);
-Piece ReferencePiece(const Experiment& experiment, const ReferenceCase& reference);
-Piece TimingPiece(const Experiment& experiment, const TimingGroup& group);
-Piece LadderPiece(const Experiment& experiment, const LadderGroup& group);
-
-/// Returns the expected records, filled from the answer or with the reason (parent process).
-/// @param set  changes by --set
-std::vector<Record> RecordsOf(const Piece& piece, const ProcessResult& result,
-                              const std::string& set);
-
-// Runs the pieces that a store does not contain yet, and stores their records.
-
-class Runner {
- public:
-  /// `finished`: records in the store when the run begins.
-  Runner(const SuiteOptions& options, FinishedRuns& finished, ResultStore& store)
-      : options_(options), finished_(finished), store_(store) {}
-
-  /// Runs the unfinished pieces of `pieces`, which are in the order of the experiments.
-  /// @param estimate  time estimates of their experiments
-  /// @param shared    short pieces may share a process
-  /// @returns  number of their records with an outcome other than "finished"
-  std::size_t Run(const std::string& what, std::vector<Piece> pieces, int jobs, bool shared,
-                  Estimate* estimate);
-
-  /// Forgets all requests so far: cases of a long sweep are distinguished within their group only.
-  void Forget() {
-    asked_.clear();
-    count.ids.clear();
-  }
-
-  SuiteCount count;
-
- private:
-  bool Done(const Piece& piece, std::size_t* failed);
-  std::vector<Piece> NotAsked(std::vector<Piece> pieces);
-
-  const SuiteOptions& options_;
-  FinishedRuns& finished_;
-  ResultStore& store_;
-  std::unordered_set<std::string> asked_;  ///< ids
+  double begin_ = WallSeconds(), drawn_ = 0.0;  ///< [s]
 };
 
 }  // namespace loopbench::harness

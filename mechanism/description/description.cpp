@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace loopbench {
 
@@ -12,15 +13,12 @@ std::string Quote(const std::string& name) { return "\"" + name + "\""; }
 
 std::string CheckBody(const BodyDescription& body) {
   if (!(body.mass > 0.0) || !std::isfinite(body.mass)) {
-    return "body " + Quote(body.name) + ": mass is " + std::to_string(body.mass) +
-           ", expected a finite number > 0";
+    return "mass is " + std::to_string(body.mass) + ", expected a finite number > 0";
   }
-  if (!body.com.allFinite() || !body.inertia.allFinite()) {
-    return "body " + Quote(body.name) + ": com and inertia must be finite";
-  }
+  if (!body.com.allFinite() || !body.inertia.allFinite()) return "com and inertia must be finite";
   if (!body.inertia.isApprox(body.inertia.transpose()) ||
       Eigen::LLT<Eigen::Matrix3d>(body.inertia).info() != Eigen::Success) {
-    return "body " + Quote(body.name) + ": inertia must be symmetric and positive definite";
+    return "inertia must be symmetric and positive definite";
   }
   return "";
 }
@@ -28,22 +26,19 @@ std::string CheckBody(const BodyDescription& body) {
 /// A planar problem turns about z only: rejects tilts and offsets from the plane.
 std::string CheckPlanarJoint(const JointDescription& joint) {
   if (!TraitsOf(joint.type).in_plane) {
-    return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) +
-           " joint does not exist in the plane";
+    return "a " + std::string(ToString(joint.type)) + " joint does not exist in the plane";
   }
   const auto flat = [](const Eigen::Vector3d& v) { return v.z() == 0.0; };
   const auto about_z = [](const Eigen::Vector3d& v) { return v.x() == 0.0 && v.y() == 0.0; };
-  if (!flat(joint.from.position) || !flat(joint.to.position)) {
-    return "joint " + Quote(joint.name) + ": lies out of the plane";
-  }
+  if (!flat(joint.from.position) || !flat(joint.to.position)) return "lies out of the plane";
   if (!about_z(joint.from.rotation) || !about_z(joint.to.rotation)) {
-    return "joint " + Quote(joint.name) + ": its frames may turn about z only in a planar problem";
+    return "its frames may turn about z only in a planar problem";
   }
   if (joint.axis.isZero()) return "";
   const bool fits = TraitsOf(joint.type).own_axis == 'x'
                         ? flat(joint.axis)
                         : about_z(joint.axis) && joint.axis.z() > 0;
-  if (!fits) return "joint " + Quote(joint.name) + ": its axis does not belong to the plane";
+  if (!fits) return "its axis does not belong to the plane";
   return "";
 }
 
@@ -71,36 +66,30 @@ std::string CheckJoint(const MechanismDescription& description, const JointDescr
   const int num_bodies = static_cast<int>(description.bodies.size());
   for (int body : {joint.from.body, joint.to.body}) {
     if (body < 0 || body >= num_bodies) {
-      return "joint " + Quote(joint.name) + ": body index " + std::to_string(body) +
-             " does not exist";
+      return "body index " + std::to_string(body) + " does not exist";
     }
   }
   if (joint.from.body == joint.to.body) {
-    return "joint " + Quote(joint.name) + ": joins body " +
-           Quote(description.bodies[joint.from.body].name) + " with itself";
+    return "joins body " + Quote(description.bodies[joint.from.body].name) + " with itself";
   }
   if (!joint.from.position.allFinite() || !joint.to.position.allFinite() ||
       !joint.from.rotation.allFinite() || !joint.to.rotation.allFinite() ||
       !joint.axis.allFinite()) {
-    return "joint " + Quote(joint.name) + ": positions, rotations and axis must be finite";
+    return "positions, rotations and axis must be finite";
   }
   const JointParameter& parameter = TraitsOf(joint.type).parameter;
-  if (!std::isfinite(joint.parameter)) {
-    return "joint " + Quote(joint.name) + ": pitch and length must be finite";
-  }
+  if (!std::isfinite(joint.parameter)) return "pitch and length must be finite";
   if (parameter.positive && !(joint.parameter > 0.0)) {
-    return "joint " + Quote(joint.name) + ": a " + std::string(ToString(joint.type)) + " needs a " +
-           std::string(parameter.key) + " > 0";
+    return "a " + std::string(ToString(joint.type)) + " needs a " + std::string(parameter.key) +
+           " > 0";
   }
   if (!std::isfinite(joint.rotor_inertia) || joint.rotor_inertia < 0.0) {
-    return "joint " + Quote(joint.name) + ": rotor_inertia must be finite and not negative";
+    return "rotor_inertia must be finite and not negative";
   }
   if (joint.rotor_inertia > 0.0 && NumValues(joint.type, description.space, false) != 1) {
-    return "joint " + Quote(joint.name) + ": a rotor needs a joint with one coordinate";
+    return "a rotor needs a joint with one coordinate";
   }
-  if (const std::string error = CheckMotions(description.space, joint); !error.empty()) {
-    return "joint " + Quote(joint.name) + ": " + error;
-  }
+  if (std::string error = CheckMotions(description.space, joint); !error.empty()) return error;
   return description.space == SpaceKind::kPlanar ? CheckPlanarJoint(joint) : "";
 }
 
@@ -171,18 +160,20 @@ std::string Validate(const MechanismDescription& description) {
     return "gravity leaves the plane";
   }
   std::string error;
-  for (std::size_t i = 1; i < description.bodies.size() && error.empty(); ++i) {
-    error = CheckBody(description.bodies[i]);
+  const auto note = [&](const char* kind, const std::string& name, const std::string& found) {
+    if (error.empty() && !found.empty()) error = kind + Quote(name) + ": " + found;
+  };
+  for (const BodyDescription& body : std::span(description.bodies).subspan(1)) {
+    note("body ", body.name, CheckBody(body));
   }
-  for (std::size_t i = 0; i < description.joints.size() && error.empty(); ++i) {
-    error = CheckJoint(description, description.joints[i]);
+  for (const JointDescription& joint : description.joints) {
+    note("joint ", joint.name, CheckJoint(description, joint));
   }
-  for (std::size_t i = 0; i < description.couplings.size() && error.empty(); ++i) {
-    error = CheckCoupling(description, description.couplings[i]);
-    if (!error.empty()) error = "coupling " + Quote(description.couplings[i].name) + ": " + error;
+  for (const CouplingDescription& coupling : description.couplings) {
+    note("coupling ", coupling.name, CheckCoupling(description, coupling));
   }
-  for (std::size_t i = 0; i < description.forces.size() && error.empty(); ++i) {
-    error = ValidateForce(description, description.forces[i]);
+  for (const ForceDescription& force : description.forces) {
+    if (error.empty()) error = ValidateForce(description, force);
   }
   if (error.empty()) error = CheckValues(description, description.initial.coordinates, false);
   if (error.empty()) error = CheckValues(description, description.initial.speeds, true);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <string>
@@ -101,6 +102,7 @@ struct InitialDescription {
   /// leave them out.
   std::vector<PoseTarget> poses = {};
 
+  bool IsHeld(int joint) const { return std::ranges::find(held, joint) != held.end(); }
   /// The guess of a joint's coordinate, 0 if there is none.
   double GuessOf(int joint, std::size_t coordinate) const;
 };

@@ -2,7 +2,7 @@
 //
 // Readers, schemas, validation, change of scale, `explain` and preprocessing use only the
 // parameters of a force: a joint, points of bodies, numbers with units, a vector, a function of
-// time. Its mechanics is in mechanism/model/force_NAME.h. User-defined kinds:
+// time. Its mechanics is in mechanism/model/force_elements.h. User-defined kinds:
 // mechanism/model/registry.h.
 #pragma once
 

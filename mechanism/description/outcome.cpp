@@ -1,35 +1,16 @@
 #include "mechanism/description/outcome.h"
 
+#include <array>
+
 namespace loopbench {
 
 std::string_view ToString(Outcome outcome) {
-  switch (outcome) {
-    case Outcome::kFinished:
-      return "finished";
-    case Outcome::kSingular:
-      return "singular";
-    case Outcome::kStepTooSmall:
-      return "step-too-small";
-    case Outcome::kNonFinite:
-      return "non-finite";
-    case Outcome::kStepLimit:
-      return "step-limit";
-    case Outcome::kTimeLimit:
-      return "time-limit";
-    case Outcome::kInconsistentStart:
-      return "inconsistent-start";
-    case Outcome::kInconsistentMotion:
-      return "inconsistent-motion";
-    case Outcome::kLocked:
-      return "locked";
-    case Outcome::kNewtonFailure:
-      return "newton-failure";
-    case Outcome::kInexpressible:
-      return "unsupported";
-    case Outcome::kIntegratorError:
-      return "integrator-error";
-  }
-  return "unknown";
+  static constexpr auto kNames = std::to_array<std::string_view>(
+      {"finished", "singular", "step-too-small", "non-finite", "step-limit", "time-limit",
+       "inconsistent-start", "inconsistent-motion", "locked", "newton-failure", "unsupported",
+       "integrator-error"});  // in the order of Outcome
+  static_assert(kNames.size() == static_cast<std::size_t>(Outcome::kIntegratorError) + 1);
+  return kNames[static_cast<std::size_t>(outcome)];
 }
 
 }  // namespace loopbench

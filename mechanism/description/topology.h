@@ -15,6 +15,9 @@
 // equals the last listed.
 #pragma once
 
+#include <algorithm>
+#include <numeric>
+#include <string_view>
 #include <vector>
 
 #include "mechanism/description/description.h"
@@ -43,6 +46,25 @@ Topology BuildTopology(const MechanismDescription& description, Coordinates coor
 /// coordinates.
 std::vector<bool> OnLoops(const MechanismDescription& description, const Topology& topology);
 
+/// Sets of connected bodies; Find() gives the lowest body of a set.
+class DisjointSets {
+ public:
+  explicit DisjointSets(int n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int Find(int i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  bool Unite(int a, int b) {
+    a = Find(a);
+    b = Find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+    return a != b;
+  }
+
+ private:
+  std::vector<int> parent_;
+};
+
 // Connected components: the graph of bodies and joints without Ground.
 
 /// A set of bodies that are connected with each other, paths through Ground left out.
@@ -59,5 +81,34 @@ enum class Connection { kJoints, kJointsAndForces };
 /// User-defined forces are assumed to connect all bodies.
 std::vector<Island> FindIslands(const MechanismDescription& description,
                                 Connection connection = Connection::kJointsAndForces);
+
+// Parts of a description as descriptions of their own.
+
+/// New indices of a description's parts after a selection, -1 for removed ones.
+struct Renumbering {
+  std::vector<int> bodies, joints;
+};
+
+/// Returns a part of a description: the bodies and joints with index >= 0 in `bodies` and `joints`,
+/// and their couplings, forces, initial values and names of independent speeds. Couplings keep all
+/// of their joints or are left out. `renumbering` has the new indices, in the old order.
+MechanismDescription Select(const MechanismDescription& description,
+                            const Renumbering& renumbering);
+
+/// A separate island, named "whole#1", "whole#2", .. (or like the whole, if it is the only one),
+/// and the indices of its bodies and joints in the whole.
+struct Part {
+  MechanismDescription description;
+  std::vector<int> bodies, joints;
+};
+
+/// `islands` are those that FindIslands() finds, of either connection.
+std::vector<Part> Split(const MechanismDescription& description,
+                        const std::vector<Island>& islands);
+
+/// Returns each set of bodies connected by joints, for analyses of geometry, which springs between
+/// parts do not affect. Only forces along joints are kept, because their joints stay in the tree,
+/// and ranks depend on the tree.
+std::vector<Part> SplitByJoints(MechanismDescription description);
 
 }  // namespace loopbench

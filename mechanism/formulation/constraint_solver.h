@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -78,8 +79,11 @@ class ConstraintSolver {
   /// Fast path for accelerations at the speeds and time of `kinematics`: f = -h, c = gamma -
   /// feedback (`feedback` empty: zero). If false (the default), h and gamma are formed and given to
   /// Solve(). For solvers that take forces body by body and need neither.
-  virtual bool Accelerate(const Kinematics<Space, S>& kinematics, const VectorX<S>& feedback,
-                          VectorX<S>& udot, VectorX<S>* lambda);
+  virtual bool Accelerate(const Kinematics<Space, S>& /*kinematics*/,
+                          const VectorX<S>& /*feedback*/, VectorX<S>& /*udot*/,
+                          VectorX<S>* /*lambda*/) {
+    return false;
+  }
 
   /// Whether forces that replace constraint forces must be given as wrenches to SolveWrenches(),
   /// instead of along the coordinates to Solve() (the default). True if Factor() may regularize
@@ -87,7 +91,10 @@ class ConstraintSolver {
   virtual bool TakesWrenches() const { return false; }
   /// Computes x and, unless null, lambda, of wrenches on bodies alone, after Factor(): [moment;
   /// force] at the centres of mass in ground axes, body by body, Ground first.
-  virtual void SolveWrenches(const VectorX<S>& wrenches, VectorX<S>& x, VectorX<S>* lambda);
+  virtual void SolveWrenches(const VectorX<S>& /*wrenches*/, VectorX<S>& /*x*/,
+                             VectorX<S>* /*lambda*/) {
+    throw std::logic_error("a solver that takes wrenches does not solve for them");
+  }
 
   /// Fast path for a whole right-hand side without feedback and drives: qdot and udot at (q, u),
   /// equal to Factor() and Accelerate() up to round-off, after CompleteSpeeds() if requested.
@@ -96,32 +103,40 @@ class ConstraintSolver {
   /// ended needs no Review(). `kinematics` has the time. If forces other than gravity act, it is
   /// set to q and the speeds used, which invalidates the results of Factor(); otherwise both are
   /// unchanged.
-  virtual bool RightHandSide(SpeedsUsed speeds, Kinematics<Space, S>& kinematics,
-                             std::span<const S> q, std::span<const S> u, std::span<S> qdot,
-                             std::span<S> udot);
+  virtual bool RightHandSide(SpeedsUsed, Kinematics<Space, S>& /*kinematics*/,
+                             std::span<const S> /*q*/, std::span<const S> /*u*/,
+                             std::span<S> /*qdot*/, std::span<S> /*udot*/) {
+    return false;
+  }
 
   /// Fast path for level projection on an accepted (q, u), in place and by Correct(): Newton steps
   /// until violations are at most `goal` [m] or stop shrinking (at least one if they exceed it),
   /// then one step of speeds. Returns nothing (the default) if there is no fast path or Factor()
   /// must judge the position; (q, u) are then unchanged.
-  virtual std::optional<Correction<S>> Project(std::span<S> q, std::span<S> u, S goal);
+  virtual std::optional<Correction<S>> Project(std::span<S> /*q*/, std::span<S> /*u*/, S /*goal*/) {
+    return std::nullopt;
+  }
 
   /// A change x of speeds (or of positions, per time) with J x = c. Here the smallest in the metric
   /// M, which is Solve() without force.
-  virtual void Correct(const VectorX<S>& target, VectorX<S>& x);
+  virtual void Correct(const VectorX<S>& target, VectorX<S>& x) {
+    Solve(VectorX<S>(), target, x, nullptr);
+  }
 
   /// Returns the speeds that a state carries, indices into u; null (the default) if all.
   virtual const std::vector<int>* CarriedSpeeds() const { return nullptr; }
   /// Level velocity: fast path that makes all speeds satisfy the constraints, J u + b = 0, from the
   /// state's speeds; the others are outdated. May change the speeds of `kinematics`. If false (the
   /// default), Correct() receives the violation by u. Implement together with CarriedSpeeds().
-  virtual bool CompleteSpeeds(Kinematics<Space, S>& kinematics, VectorX<S>& u);
+  virtual bool CompleteSpeeds(Kinematics<Space, S>& /*kinematics*/, VectorX<S>& /*u*/) {
+    return false;
+  }
 
   /// Chooses the mode, once at the start, whose positions and speeds are consistent.
-  virtual void Start(const Kinematics<Space, S>& kinematics);
+  virtual void Start(const Kinematics<Space, S>&) {}
   /// Called at accepted steps, the only other place where the mode may change. Returns true if it
   /// did: factors are then recomputed, and the state may carry other speeds.
-  virtual bool Review(const Kinematics<Space, S>& kinematics);
+  virtual bool Review(const Kinematics<Space, S>&) { return false; }
   /// Appends the choices that make the mode, if there are any.
   virtual void AppendMode(std::vector<int>&) const {}
   /// Makes these choices of a solver of the same mechanism, after Start().
@@ -141,10 +156,25 @@ class ConstraintSolver {
 
 /// rank of J in joint coordinates, given how many of this set's constraint rows are dependent.
 template <class Space, class S>
-int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows);
+int LoopRank(const Mechanism<Space, S>& mechanism, int dependent_rows) {
+  int user_tree_rows = 0;
+  if (mechanism.coordinates() == Coordinates::kAbsolute) {
+    // every user joint is a constraint here; those of a spanning forest are always independent and
+    // convert the speeds of free bodies into joint speeds
+    user_tree_rows = mechanism.num_u() - mechanism.num_joint_speeds();
+  }
+  return mechanism.num_rows() - user_tree_rows - dependent_rows;
+}
 
 /// Returns WhySingular() if the rank is uncertain and the deciding dense equations are too large.
 template <class Space, class S>
-std::string TooLargeToDecide(const Mechanism<Space, S>& mechanism, const Conditioning& found);
+std::string TooLargeToDecide(const Mechanism<Space, S>& mechanism, const Conditioning& found) {
+  const int joint = found.worst_joint;
+  return "rank is uncertain" +
+         (joint < 0 ? std::string() : " at joint \"" + mechanism.joint_names()[joint] + '"') +
+         ", and the dense equations that would decide it are too large: " +
+         std::to_string(mechanism.num_rows()) + " constraints and " +
+         std::to_string(mechanism.num_u()) + " speeds";
+}
 
 }  // namespace loopbench

@@ -6,8 +6,7 @@
 // -I R x are unknowns like mu. x0 is the inner solver's result for (f, c). A column of Y is its
 // result for a row of G or R as force, with c = 0. Then
 //
-//   x = x0 + Y [mu; tau],      (X + diag(0, I^-1)) [mu; tau] = [d; 0] - [G; R] x0,      X = [G; R]
-//   Y
+//   x = x0 + Y [mu; tau],   X = [G; R] Y,   (X + diag(0, I^-1)) [mu; tau] = [d; 0] - [G; R] x0
 //
 // X, symmetric and positive semidefinite, is the response of the mechanism to these forces. The sum
 // is scaled by FreeResponseOf() and factored by Cholesky with pivoting. Couplings whose pivots are

@@ -12,11 +12,9 @@
 // The p_1 <= p_2 <= ... are the responses left to each joint once the joints before it are closed:
 // the eigenvalues of its block in the block Cholesky factorisation. They fall with the square of
 // the distance from a singular configuration, like the lambda, and have the same product, but lie
-// closer together. A row of n windows has an eigenvalue of 2 / n^2 in its best position; by this
-// criterion 40 windows would be regularized twenty times as far away as one. Closed along the row,
-// its p do not depend on n; in random order the smallest fall with 1 / n. A single joint has p_1 ..
-// = lambda_1 .. . If a small eigenvalue hides behind moderate p, lambda_least regularizes it while
-// a hundredth of it is accurate.
+// closer together. A row of n windows has an eigenvalue of 2 / n^2 in its best position; its p,
+// closed along the row, do not depend on n. A single joint has p_i = lambda_i. A small eigenvalue
+// behind moderate p is regularized by lambda_least while a hundredth of it is accurate.
 #pragma once
 
 #include <span>

@@ -58,8 +58,7 @@ class Drives {
   /// Factor on the relative violation of positions and speeds.
   static constexpr double kOfMismatch = 10.0;
   /// A larger violation is no drift: contradictory drivers violate speeds in full. Stages of a step
-  /// have violations of about 1e-5 at rtol 1e-9. Of 68 contradictions in 600 random mechanisms one
-  /// was below 1e-2, none below this.
+  /// have violations of about 1e-5 at rtol 1e-9. No contradiction of random mechanisms was smaller.
   static constexpr double kMaxDrift = 1e-3;
 
   /// Largest residual in a singular configuration, relative to the largest term. Accepted steps

@@ -80,20 +80,11 @@ double Excursion<Space>::Size(const VectorX<double>& u) const {
   return u.size() == 0 ? 0.0 : u.cwiseQuotient(units_).template lpNorm<Eigen::Infinity>();
 }
 
-template <class Space>
-VectorX<double> Excursion<Space>::Moved(const VectorX<double>& q, const VectorX<double>& u) const {
-  VectorX<double> rate(q.size());
-  mechanism_->Rates(q, u, rate);
-  VectorX<double> moved = q + rate;
-  mechanism_->Normalise(moved);
-  return moved;
-}
-
 /// Newton's method from q_ moved by u, with a rank of at most `rank`. True when the loops close.
 template <class Space>
 bool Excursion<Space>::Close(int rank, double distance, const VectorX<double>& u,
                              VectorX<double>& q, VectorX<double>& travelled) {
-  q = Moved(q_, u);
+  q = mechanism_->Moved(q_, u);
   travelled = u;
   // quadratic where the loops are regular; where they are not, the way left halves each time, and
   // too long a step back may miss by more than before
@@ -121,7 +112,7 @@ bool Excursion<Space>::Close(int rank, double distance, const VectorX<double>& u
     bool nearer = false;
     for (int halving = 0; halving < kMaxHalvings && !nearer; ++halving, back *= 0.5) {
       if (Size(back) > distance) continue;
-      const VectorX<double> trial = Moved(q, back);
+      const VectorX<double> trial = mechanism_->Moved(q, back);
       kinematics_.UpdatePosition(trial);
       DirectionRows there = RowsOfDirections(kinematics_);
       nearer = there.mismatch.norm() < before;

@@ -69,7 +69,6 @@ class Excursion {
   double Size(const VectorX<double>& u) const;
   bool Close(int rank, double distance, const VectorX<double>& u, VectorX<double>& q,
              VectorX<double>& travelled);
-  VectorX<double> Moved(const VectorX<double>& q, const VectorX<double>& u) const;
 
   const Mechanism<Space, double>* mechanism_;
   Kinematics<Space, double> kinematics_;

@@ -18,8 +18,7 @@
 //
 //     X = (K L) (K L)^T,        T = (K L)^-1
 //
-// As K is lower triangular, K L is the Cholesky factor of X itself, and its diagonal over K's is
-// L's: T costs no scaling, and only the decision needs K.
+// K L is the Cholesky factor of X itself: T costs no scaling, and only the decision needs K.
 //
 // *Geometric*, for X_g, the response of the same mechanism with unit masses, and weights w_i
 // (direction_weights.h).
@@ -50,8 +49,7 @@ namespace loopbench {
 
 /// Returns the share of the usual pivot limit for a joint that closes an assembly of so many
 /// bodies. More than eight respond like a single body of their mass in any position, with smaller
-/// pivots. A thousandth is the minimum: there, at 1e-7, geometry would begin to regularize (kTheta:
-/// weights of 0.998 where its largest eigenvalue is 1, of 0.8 where it is 2).
+/// pivots. A thousandth is the minimum: there, at 1e-7, geometry begins to regularize (kTheta).
 constexpr double ShareOfLimit(int bodies) { return std::clamp(8.0 / bodies, 1e-3, 1.0); }
 
 /// Room for intermediate matrices; many solvers may share one, not at the same time.

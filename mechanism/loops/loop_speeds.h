@@ -1,9 +1,28 @@
 // Speeds of the forest that move the two sides of a cut joint relative to each other.
 #pragma once
 
+#include <utility>
+#include <vector>
+
 #include "mechanism/model/kinematics.h"
 
 namespace loopbench {
+
+/// The steps of the tree from the two sides of a cut joint, Q and P, inwards to where they meet.
+template <class Space, class S>
+std::pair<std::vector<TreeStep>, std::vector<TreeStep>> WaysOfLoop(
+    const Mechanism<Space, S>& mechanism, int index) {
+  std::pair<std::vector<TreeStep>, std::vector<TreeStep>> ways;
+  int to_Q = mechanism.step_of_body(mechanism.joints()[index].to),
+      to_P = mechanism.step_of_body(mechanism.joints()[index].from);
+  while (to_Q != to_P) {
+    // a step comes after its inward step: the later one is on one path only
+    int& s = to_Q > to_P ? to_Q : to_P;
+    (to_Q > to_P ? ways.first : ways.second).push_back(mechanism.tree()[s]);
+    s = mechanism.step_of_body(mechanism.tree()[s].parent);
+  }
+  return ways;
+}
 
 /// Calls sink(index into u, V) for each speed of the forest between the two sides of a cut joint; V
 /// is the change of V_Q - V_P at the joint's Mo per unit of that speed. A speed of a joint at p_j

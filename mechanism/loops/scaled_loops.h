@@ -1,5 +1,4 @@
-// The constraints of all loops at one position, scaled so that their rank depends on geometry
-// alone.
+// Constraints of all loops at one position, scaled so that rank depends on geometry alone.
 //
 // With M_g = L L^T the mass matrix of unit bodies (loop_solver.h) and K_g K_g^T the free response
 // of each cut joint, the singular values of

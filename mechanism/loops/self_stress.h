@@ -26,8 +26,7 @@
 // For one loop in joint coordinates this is complete, and solvers solve (1). Otherwise a solution
 // x0 violates c by rho = J x0 - c in the range of [-T_b; 1], T_b the blocks of T that belong to one
 // joint, and rho must lie along W. The solution is x0 + y with U_b^T J y = U_b^T W W^T rho.
-// Multipliers then have a part along W, whose force J^T W W^T lambda is also of first order in e.
-// It stays: without it, Bennett's linkage drifted three times as far in absolute coordinates.
+// Multipliers then have a part along W, whose force J^T W W^T lambda, of first order in e, stays.
 //
 // Rates of W follow from W^T e = 0, W'^T e = -W^T e', and from J^T W = 0, W' x = -(J^+)^T J'^T W x.
 // Multiplication by the transpose of J' is a sum along the loops, not a matrix.

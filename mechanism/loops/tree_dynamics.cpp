@@ -45,8 +45,6 @@ Block<Space, S> ShiftInertia(const Block<Space, S>& I, const Linear<Space, S>& r
 /// inward and projected on H of each joint on the way:
 ///
 ///   M_ki = H_k^T S^T .. S^T I_composite S H_i
-///
-/// The choice of masses is made once, not in the loop over all pairs of joints.
 template <Masses masses, class Space, class S>
 void FillMassMatrix(const Kinematics<Space, S>& kinematics, std::vector<Block<Space, S>>& composite,
                     MatrixX<S>& M) {
@@ -122,7 +120,6 @@ void TreeDynamics<Space, S>::MassMatrix(const Kinematics<Space, S>& kinematics, 
 ///   A at Mo of the parent's side  =  S(r_parent) A_parent + n_parent
 ///   A at Mo of the child's side   =  that +- (H udot + g)
 ///   A_child                       =  S(-r_child) (that) + n_child
-///
 template <class Space, class S>
 template <bool kWithBias>
 void TreeDynamics<Space, S>::Outward(const Kinematics<Space, S>& kinematics, const VectorX<S>& udot,

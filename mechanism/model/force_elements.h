@@ -1,16 +1,115 @@
-// The forces of a description compiled for one space and scalar: kinds, and the list of all.
+// The forces of a description compiled for one space and scalar: a specialisation of ForceElement
+// for each struct of mechanism/description/force.h, and the list of all.
+//
+// Everything is in ground axes. A wrench on a body is [moment; force] at its centre of mass; a
+// force f at the point r from there adds [r x f; f]. These are the active forces of the paper
+// (section 2), which enter zeta_i3 of its two-handle equations.
 #pragma once
 
 #include <algorithm>
+#include <any>
+#include <concepts>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "mechanism/algebra/dual.h"
+#include "mechanism/algebra/space.h"
+#include "mechanism/description/description.h"
 #include "mechanism/description/time_function.h"
-#include "mechanism/model/force_element.h"
-#include "mechanism/model/force_other.h"
 
 namespace loopbench {
+
+template <class Space, class S>
+class Kinematics;
+
+/// Power [W] of the forces without a potential, at time(), position and speed:
+///   d/dt (kinetic + potential) = supplied - dissipated
+/// where the joints themselves do no work.
+template <class S>
+struct Power {
+  S supplied = S(0);    ///< torques that depend on time, forces that turn with a body; any sign
+  S dissipated = S(0);  ///< dampers and drag; >= 0
+};
+
+/// Built from a force and its valid description. Derives from ForceDefaults and has
+/// AddWrenches(kinematics, wrenches), which adds [moment; force] body by body, and any overrides.
+/// Its effect needs either a potential or power: otherwise the energy balance does not close.
+template <class Space, class S, class Description>
+class ForceElement;
+
+template <class Space, class S>
+struct ForceDefaults {
+  /// Potential energy [J].
+  S Potential(const Kinematics<Space, S>&) const { return S(0); }
+  /// Adds supplied or dissipated power; called only if has_power().
+  void AddPower(const Kinematics<Space, S>&, Power<S>&) const {}
+  bool has_power() const { return false; }
+  /// Times [s] at which it is not smooth.
+  const std::vector<double>& knots() const {
+    static const std::vector<double> none;
+    return none;
+  }
+};
+
+/// A description's 3-vector in the components of the space.
+template <class Space, class S>
+Linear<Space, S> ToLinear(const Eigen::Vector3d& v) {
+  Linear<Space, S> linear;
+  for (int i = 0; i < Space::kLin; ++i) linear[i] = S(v[i]);
+  return linear;
+}
+
+/// A material point, in ground axes.
+template <class Space, class S>
+struct PointState {
+  Linear<Space, S> r;  ///< from the centre of mass
+  Linear<Space, S> p;  ///< from the ground origin
+  Linear<Space, S> v;
+};
+
+/// A material point of a body.
+template <class Space, class S>
+struct PointOfBody {
+  int body;
+  Linear<Space, S> at;  ///< from the centre of mass, body axes
+
+  PointOfBody(const BodyPoint& point, const MechanismDescription& description)
+      : body(point.body), at(ToLinear<Space, S>(point.at - description.bodies[point.body].com)) {}
+
+  PointState<Space, S> StateIn(const Kinematics<Space, S>& kinematics) const {
+    const Pose<Space, S>& X_WB = kinematics.poses()[body];
+    const Velocity<Space, S>& V = kinematics.motions()[body];
+    PointState<Space, S> state;
+    state.r = X_WB.R * at;
+    state.p = X_WB.p + state.r;
+    state.v = V.linear + Cross<S>(V.angular, state.r);
+    return state;
+  }
+
+  /// Adds the force f at the point.
+  void AddForce(const Linear<Space, S>& f, const PointState<Space, S>& state,
+                std::span<Wrench<Space, S>> wrenches) const {
+    wrenches[body] += {Moment<S>(state.r, f), f};
+  }
+};
+
+/// The effort tau of a joint at Mo on Q, its opposite on P, both moved to the centres of mass.
+template <class Space, class S>
+void AddJointForce(const Kinematics<Space, S>& kinematics, int index, S tau,
+                   std::span<Wrench<Space, S>> wrenches) {
+  const auto& joint = kinematics.mechanism().joints()[index];
+  const auto& state = kinematics.joints()[index];
+  const Wrench<Space, S> F =
+      WrenchOfEffort<Space, S>(state.H(0), joint.kind->inverse_H_squared, tau);
+  wrenches[joint.to] += ShiftForce<Space, S>(F, state.r_Q);
+  wrenches[joint.from] -= ShiftForce<Space, S>(F, state.r_P);
+}
 
 // Forces along the coordinate of a joint: torque, spring, damper.
 
@@ -213,6 +312,53 @@ class ForceElement<Space, S, SpringDamper> : public ForceDefaults<Space, S> {
   S stiffness_, damping_, length_, preload_;
 };
 
+// User-defined kinds (registry.h): their elements behind virtual functions, in double and in dual
+// numbers.
+
+/// Interface of a ForceElement of any kind.
+template <class Space, class S>
+class OtherElement {
+ public:
+  virtual ~OtherElement() = default;
+  virtual void AddWrenches(const Kinematics<Space, S>& kinematics,
+                           std::span<Wrench<Space, S>> wrenches) const = 0;
+  virtual S Potential(const Kinematics<Space, S>& kinematics) const = 0;
+  virtual void AddPower(const Kinematics<Space, S>& kinematics, Power<S>& power) const = 0;
+  virtual bool has_power() const = 0;
+  virtual const std::vector<double>& knots() const = 0;
+};
+
+/// Makes the element of a force, an OtherForce::force().
+template <class Space, class S>
+using MakeOtherElement = std::shared_ptr<const OtherElement<Space, S>> (*)(
+    const std::any& force, const MechanismDescription& description);
+
+struct ForceCompiler {
+  std::tuple<MakeOtherElement<Planar, double>, MakeOtherElement<Planar, Dual>,
+             MakeOtherElement<Spatial, double>, MakeOtherElement<Spatial, Dual>>
+      make;
+};
+
+template <class Space, class S>
+class ForceElement<Space, S, OtherForce> {
+ public:
+  ForceElement(OtherForce force, const MechanismDescription& description) {
+    if constexpr (std::same_as<S, double> || std::same_as<S, Dual>) {
+      const auto make = std::get<MakeOtherElement<Space, S>>(force.compiler().make);
+      element_ = make(force.force(), description);
+    } else {
+      throw std::invalid_argument(
+          "forces of kind \"" + std::string(PartsOf(force).name) +
+          "\", which another program has registered, exist in double alone");
+    }
+  }
+
+  const OtherElement<Space, S>& operator*() const { return *element_; }
+
+ private:
+  std::shared_ptr<const OtherElement<Space, S>> element_;
+};
+
 /// A force of any kind.
 template <class Space, class S, class Descriptions = ForceDescription>
 struct AnyForceElement;
@@ -241,7 +387,17 @@ class ForceElements {
   /// Calls visit(element) for each.
   template <class Visit>
   void ForEach(Visit visit) const {
-    for (const auto& element : elements_) std::visit(visit, element);
+    for (const auto& element : elements_) {
+      std::visit(
+          [&](const auto& one) {
+            if constexpr (requires { *one; }) {
+              visit(*one);
+            } else {
+              visit(one);
+            }
+          },
+          element);
+    }
   }
 
   bool empty() const { return elements_.empty(); }

@@ -96,6 +96,10 @@ struct JointKind {
 
   bool has_quaternion() const { return num_q > num_u; }
   int num_constraints() const { return Space::kDim - num_u; }
+  /// Returns true for an angle that is measured modulo a turn; the shift of a helix determines its.
+  bool IsAngle(int coordinate) const {
+    return !has_quaternion() && parameter == S(0) && axes[coordinate] < Space::kRot;
+  }
 };
 
 /// The kind's data and functions, with parameter zero. Lives forever.
@@ -105,6 +109,10 @@ const JointKind<Space, S>& KindOf(JointType type);
 /// Does the same for one joint, with its own parameter.
 template <class Space, class S>
 JointKind<Space, S> KindWith(JointType type, S parameter);
+
+/// Adds a kind's functions under the number that its traits have got.
+template <class Space, class S>
+void AddKind(JointType type, const JointKind<Space, S>& kind);
 
 /// X_FM at q, all of it.
 template <class Space, class S>

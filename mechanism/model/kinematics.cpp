@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <type_traits>
 
@@ -261,6 +262,369 @@ typename Inertia<Space, S>::Matrix Kinematics<Space, S>::RotationalInverse(
   } else {
     return poses_[body].R * inertia.rotational_inverse * poses_[body].R.transpose();
   }
+}
+
+// Directions H and D of the joints at the current poses, and which of them are imposed.
+
+namespace {
+
+/// [H D] in ground axes, F having the axes R = R_WF. Each column is a rotation about one axis of F
+/// or a shift along one, all different, so D^T H = 0 holds as it is (9). Shifts may be along the
+/// axes of ground. The plane has one axis to rotate about, which is normal to it.
+template <class Space, class S>
+void SetBasis(const JointKind<Space, S>& kind, const Rotation<Space, S>& R, bool ground_shifts,
+              Basis<Space, S>& basis) {
+  for (int i = 0; i < Space::kDim; ++i) {
+    const int axis = kind.axes[i];
+    basis[i].setZero();
+    if (axis >= Space::kRot) {
+      const int shift = axis - Space::kRot;
+      basis[i].linear = ground_shifts ? Linear<Space, S>::Unit(shift) : R.col(shift);
+    } else if constexpr (Space::kRot == 1) {
+      basis[i].angular[0] = S(1);
+    } else {
+      basis[i].angular = R.col(axis);
+    }
+  }
+}
+
+/// [H D] in ground axes of a kind whose directions depend on its pose: the kind gives them in F
+/// axes, and R = R_WF turns both halves, angular and linear.
+template <class Space, class S>
+void SetBasisAt(const JointKind<Space, S>& kind, const Rotation<Space, S>& R,
+                const Pose<Space, S>& X_FM, Basis<Space, S>& basis) {
+  kind.basis(X_FM, basis, kind.parameter);
+  for (int i = 0; i < Space::kDim; ++i) {
+    const bool turns = kind.axes[i] < Space::kRot;
+    if constexpr (Space::kRot == 3) {
+      if (turns || kind.has_screws) basis[i].angular = R * basis[i].angular;
+    }
+    if (!turns || kind.has_screws) basis[i].linear = R * basis[i].linear;
+  }
+}
+
+/// Step of central differences: rounding and truncation errors are alike, 4e-11.
+constexpr double kRelativeStep = 6e-6;
+
+/// A pose that moves with V (in F axes) for a short time.
+template <class Space, class S>
+Pose<Space, S> Moved(Pose<Space, S> X, const Velocity<Space, S>& V, S time) {
+  if constexpr (Space::kRot == 1) {
+    X.SetAngle(X.angle + time * V.angular[0]);
+  } else {
+    for (int j = 0; j < 3; ++j) {
+      const Linear<Space, S> turn = V.angular.cross(X.R.col(j)) * time;
+      for (int i = 0; i < 3; ++i) X.R(i, j) += turn[i];
+    }
+  }
+  X.p += V.linear * time;
+  return X;
+}
+
+/// Ground axes are valid for H and D if their spans do not depend on axes: nothing is prescribed or
+/// released.
+template <class Space, class S>
+bool AnyAxes(const Joint<Space, S>& joint) {
+  return joint.kind->rotation_invariant && joint.num_drives == 0 && joint.num_released == 0;
+}
+
+/// Ground axes are valid for shifts if D spans all of them. Products with them cost nothing.
+template <class Space, class S>
+bool HasGroundShifts(const Joint<Space, S>& joint) {
+  const auto H = std::span(joint.kind->axes).first(joint.kind->num_u);
+  return joint.num_drives == 0 && joint.num_released == 0 &&
+         std::ranges::none_of(H, [](int axis) { return axis >= Space::kRot; });
+}
+
+}  // namespace
+
+/// Fixed directions are set once: directions whose span needs no axes, and directions of joints on
+/// Ground, for which X_PF fixes F. UpdatePosition() sets the others.
+template <class Space, class S>
+void Kinematics<Space, S>::Release(const std::vector<Released>& released) {
+  released_ = released;
+  moving_rows_.clear();
+  for (const Released& out : released_) {
+    const int first = Space::kDim - static_cast<int>(out.directions.size());
+    for (int i = 0; i < static_cast<int>(out.directions.size()); ++i) {
+      if (out.IsMoving(out.directions[i])) moving_rows_.push_back({out.joint, first + i});
+    }
+  }
+  for (int j = 0; j < static_cast<int>(joints_.size()); ++j) {
+    const Joint<Space, S>& joint = mechanism_->joints()[j];
+    if (joint.kind->basis != nullptr) continue;
+    SetDirections(j, AnyAxes(joint) ? Rotation<Space, S>::Identity() : joint.X_PF.R);
+  }
+}
+
+/// Rows count prescribed coordinates, then the kind's D without the released directions, then the
+/// released ones; each released direction before the row moves it one place on.
+template <class Space, class S>
+int Kinematics<Space, S>::DirectionOf(int index, int row) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  int direction = row - joint.num_drives;
+  const auto out = std::ranges::find(released_, index, &Released::joint);
+  if (out == released_.end()) return direction;
+  const int kept = joint.num_constraints() - joint.num_drives;
+  if (direction >= kept) return out->directions[direction - kept];
+  for (const int released : out->directions) direction += released <= direction;
+  return direction;
+}
+
+/// Directions of prescribed coordinates go from H to the head of D, released ones to its end.
+template <class Space, class S>
+template <class Columns>
+void Kinematics<Space, S>::OrderDirections(int index, Columns& columns) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.num_drives == 0 && joint.num_released == 0) return;
+  const Columns all = columns;
+  int free = 0, driven = joint.num_u();
+  for (int i = 0; i < joint.kind->num_u; ++i) {
+    columns[mechanism_->DriveOf(joint, i) >= 0 ? driven++ : free++] = all[i];
+  }
+  if (joint.num_released == 0) return;
+  const std::vector<int>& out = std::ranges::find(released_, index, &Released::joint)->directions;
+  int kept = joint.kind->num_u, last = Space::kDim - joint.num_released;
+  for (int i = 0; i < joint.kind->num_constraints(); ++i) {
+    const bool is_out = std::ranges::binary_search(out, i);
+    columns[is_out ? last++ : kept++] = all[joint.kind->num_u + i];
+  }
+}
+
+/// [H D] in ground axes.
+template <class Space, class S>
+void Kinematics<Space, S>::SetDirections(int index, const Rotation<Space, S>& R_WF) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  Basis<Space, S>& basis = joints_[index].basis;
+  if (joint.kind->basis != nullptr) {
+    SetBasisAt<Space, S>(*joint.kind, R_WF, joint_poses_[index], basis);
+  } else {
+    SetBasis<Space, S>(*joint.kind, R_WF, HasGroundShifts(joint), basis);
+  }
+  OrderDirections(index, basis);
+}
+
+template <class Space, class S>
+std::array<DirectionParts, Space::kDim> Kinematics<Space, S>::PartsOf(int index) const {
+  const JointKind<Space, S>& kind = *mechanism_->joints()[index].kind;
+  std::array<DirectionParts, Space::kDim> parts;
+  for (int i = 0; i < Space::kDim; ++i) {
+    const bool turns = kind.axes[i] < Space::kRot;
+    parts[i].turns = turns || kind.has_screws;
+    parts[i].shifts = !turns || kind.has_screws;
+    parts[i].moves = kind.basis_rate != nullptr ? parts[i].turns : kind.basis != nullptr;
+  }
+  OrderDirections(index, parts);
+  return parts;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::OwnRates(int index, const std::array<DirectionParts, Space::kDim>& parts,
+                                    int count, Basis<Space, S>& rates) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const JointState<Space, S>& state = joints_[index];
+  if (joint.kind->basis == nullptr) return;
+  const Rotation<Space, S> R_WF = poses_[joint.from].R * joint.X_PF.R;
+  const Velocity<Space, S> V = Rotate<Space, S>(R_WF.transpose(), state.V_rel);
+  if (joint.kind->basis_rate != nullptr) {
+    joint.kind->basis_rate(joint_poses_[index], V, rates);
+  } else {
+    const S speed = state.V_rel.angular.norm() + state.V_rel.linear.norm() / mechanism_->length();
+    const S step = speed > S(0) ? S(kRelativeStep) / speed : S(1);
+    Basis<Space, S> behind;
+    joint.kind->basis(Moved(joint_poses_[index], V, step), rates, joint.kind->parameter);
+    joint.kind->basis(Moved(joint_poses_[index], V, -step), behind, joint.kind->parameter);
+    for (int i = 0; i < Space::kDim; ++i) rates[i] = (rates[i] - behind[i]) / (S(2) * step);
+  }
+  OrderDirections(index, rates);
+  for (int i = 0; i < count; ++i) {
+    if (!parts[i].moves) continue;
+    if constexpr (Space::kRot == 3) {
+      if (parts[i].turns) rates[i].angular = R_WF * rates[i].angular;
+    }
+    if (parts[i].shifts) rates[i].linear = R_WF * rates[i].linear;
+  }
+}
+
+/// [H D] of a joint whose directions move.
+template <class Space, class S>
+void Kinematics<Space, S>::FollowDirections(int index, const Rotation<Space, S>& R_WF) {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.kind->basis != nullptr) {
+    if constexpr (Space::kRot == 1) {
+      joint_poses_[index].R = R_WF.transpose() * (poses_[joint.to].R * joint.X_QM.R);
+    }
+    SetDirections(index, R_WF);
+  } else if (!AnyAxes(joint) && (joint.from != kGround || joint.num_released > 0)) {
+    SetDirections(index, R_WF);
+  }
+}
+
+// Measured values of joints at the current poses and motions: violations, coordinates, speeds.
+
+template <class Space, class S>
+Velocity<Space, S> Kinematics<Space, S>::ConstraintMismatch(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  Velocity<Space, S> mismatch = Rotate<Space, S>(poses_[joint.from].R * joint.X_PF.R,
+                                                 Mismatch(*joint.kind, joint_poses_[index]));
+  if (joint.num_drives == 0) return mismatch;
+  S q[7];
+  joint.kind->coordinates(joint_poses_[index], q, joint.kind->parameter);
+  for (int k = 0; k < joint.num_drives; ++k) {
+    const int drive = joint.first_drive + k, coordinate = mechanism_->drives()[drive].coordinate;
+    S miss = q[coordinate] - drives_[drive].value;
+    using std::remainder;
+    if (joint.kind->IsAngle(coordinate)) miss = remainder(miss, S(2 * std::numbers::pi_v<S>));
+    mismatch += joints_[index].D(k) * miss;
+  }
+  return mismatch;
+}
+
+template <class Space, class S>
+Components<Space, S> Kinematics<Space, S>::ConstraintSpeed(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const JointState<Space, S>& state = joints_[index];
+  Components<Space, S> speed = state.Along(state.V_rel, state.rows());
+  for (int k = 0; k < joint.num_drives; ++k) {
+    speed[k] -= drives_[joint.first_drive + k].rate / joint.kind->inverse_H_squared;
+  }
+  return speed;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::JointCoordinate(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.in_tree()) {
+    return joint.num_drives > 0 ? drives_[joint.first_drive].value : q_[joint.q_offset];
+  }
+  const S q = Measured(index);
+  if (!joint.kind->IsAngle(0)) return q;
+  // In the plane angles of bodies count turns, but not from the joint's initial value.
+  if constexpr (Space::kRot == 1) {
+    return q + (turns_are_counted_ ? whole_turns_[index] : WholeTurns(index, q));
+  }
+  // Space measures an angle modulo a turn; take the value nearest to the prediction by the last
+  // speed.
+  using std::remainder;
+  const S near = accepted_[index] + accepted_speeds_[index] * (time_ - accepted_time_);
+  return near + remainder(q - near, S(2 * std::numbers::pi_v<S>));
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::Measured(int index) const {
+  const JointKind<Space, S>& kind = *mechanism_->joints()[index].kind;
+  S q;
+  kind.coordinates(joint_poses_[index], &q, kind.parameter);
+  return q;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::WholeTurns(int index, const S& measured) const {
+  using std::round;
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  const S turn = 2 * std::numbers::pi_v<S>;
+  const S near = joint.num_drives > 0 ? drives_[joint.first_drive].value : accepted_[index];
+  return turn * round((near - measured) / turn);
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::JointSpeed(int index) const {
+  const Joint<Space, S>& joint = mechanism_->joints()[index];
+  if (joint.in_tree()) {
+    return joint.num_drives > 0 ? drives_[joint.first_drive].rate : u_[joint.u_offset];
+  }
+  return WrenchOfEffort<Space, S>(joints_[index].H(0), joint.kind->inverse_H_squared, S(1))
+      .dot(joints_[index].V_rel);
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::CouplingMismatch(int index) const {
+  const Coupling<S>& coupling = mechanism_->couplings()[index];
+  if (coupling.is_moving_row) {
+    const MovingRow& row = moving_row(index);
+    return direction(row).dot(ConstraintMismatch(row.joint));
+  }
+  S sum = -coupling.offset - turns_[index];
+  for (const auto& [joint, ratio] : coupling.parts) sum += ratio * JointCoordinate(joint);
+  return sum;
+}
+
+template <class Space, class S>
+S Kinematics<Space, S>::CouplingSpeed(int index) const {
+  const Coupling<S>& coupling = mechanism_->couplings()[index];
+  if (coupling.is_moving_row) {
+    const MovingRow& row = moving_row(index);
+    return direction(row).dot(joints_[row.joint].V_rel);
+  }
+  S sum = S(0);
+  for (const auto& [joint, ratio] : coupling.parts) sum += ratio * JointSpeed(joint);
+  return sum;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::ForgetSteps() {
+  for (int j = 0; j < static_cast<int>(accepted_.size()); ++j) {
+    ContinueFrom(j, S(mechanism_->joints()[j].initial));
+  }
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::AcceptStep() {
+  for (int index : mechanism_->constraints()) {
+    if (mechanism_->joints()[index].kind->num_u != 1) continue;
+    if (!turns_are_counted_) whole_turns_[index] = WholeTurns(index, Measured(index));
+    accepted_[index] = JointCoordinate(index);
+    if constexpr (Space::kRot == 3) accepted_speeds_[index] = JointSpeed(index);
+  }
+  turns_are_counted_ = true;
+  accepted_time_ = time_;
+}
+
+template <class Space, class S>
+void Kinematics<Space, S>::CountTurns() {
+  using std::abs;
+  constexpr double kOpen = 1e-3;  // of the smallest turn; less is a start that is not consistent
+  for (std::size_t c = 0; c < turns_.size(); ++c) {
+    turns_[c] = S(0);
+    const std::vector<S>& measured = mechanism_->couplings()[c].measured_turns;
+    if (measured.empty()) continue;
+    const S open = CouplingMismatch(static_cast<int>(c));
+    if (abs(open) > S(kOpen) * measured.back()) turns_[c] = open;
+  }
+}
+
+template <class Space, class S>
+Pose<Space, S> Kinematics<Space, S>::MeasuredPose(const Joint<Space, S>& joint) const {
+  return Compose(Inverse(Compose(poses_[joint.from], joint.X_PF)),
+                 Compose(poses_[joint.to], joint.X_QM));
+}
+
+template <class Space, class S>
+VectorX<S> Kinematics<Space, S>::CoordinatesIn(const Mechanism<Space, S>& other) const {
+  VectorX<S> q(other.num_q());
+  for (const TreeStep& step : other.tree()) {
+    const Joint<Space, S>& joint = other.joints()[step.joint];
+    S all[7];
+    joint.kind->coordinates(MeasuredPose(joint), all, joint.kind->parameter);
+    other.ForEachFree(joint, joint.kind->num_q,
+                      [&](int i, int free) { q[joint.q_offset + free] = all[i]; });
+  }
+  return q;
+}
+
+template <class Space, class S>
+VectorX<S> Kinematics<Space, S>::SpeedsIn(const Kinematics& other) const {
+  VectorX<S> u(other.mechanism().num_u());
+  for (const TreeStep& step : other.mechanism().tree()) {
+    const Joint<Space, S>& joint = other.mechanism().joints()[step.joint];
+    const JointState<Space, S>& state = other.joints()[step.joint];
+    const Velocity<Space, S> V_rel = ShiftMotion<Space, S>(motions_[joint.to], state.r_Q) -
+                                     ShiftMotion<Space, S>(motions_[joint.from], state.r_P);
+    for (int i = 0; i < state.num_u; ++i) {
+      u[joint.u_offset + i] = joint.kind->inverse_H_squared * state.H(i).dot(V_rel);
+    }
+  }
+  return u;
 }
 
 #define LOOPBENCH_INSTANTIATE(Space, S) template class Kinematics<Space, S>;

@@ -224,7 +224,14 @@ class Kinematics {
   void CountTurns();
   /// Continues angles from where `other` does.
   template <class T>
-  void CountTurnsLike(const Kinematics<Space, T>& other);
+  void CountTurnsLike(const Kinematics<Space, T>& other) {
+    accepted_.assign(other.accepted_.begin(), other.accepted_.end());
+    accepted_speeds_.assign(other.accepted_speeds_.begin(), other.accepted_speeds_.end());
+    turns_.assign(other.turns_.begin(), other.turns_.end());
+    whole_turns_.assign(other.whole_turns_.begin(), other.whole_turns_.end());
+    accepted_time_ = S(other.accepted_time_);
+    turns_are_counted_ = other.turns_are_counted_;
+  }
   /// Whole turns [rad] that planar angles of cut joints have beyond the angles of their bodies, by
   /// joint. Part of the mode: counted at the first AcceptStep(), from the initial values.
   const std::vector<S>& whole_turns() const { return whole_turns_; }
@@ -305,7 +312,7 @@ struct Energy {
 template <class Space, class S>
 Energy<S> ComputeEnergy(const Kinematics<Space, S>& kinematics);
 
-/// Returns the power that forces without a potential supply and dissipate (force_element.h).
+/// Returns the power that forces without a potential supply and dissipate (force_elements.h).
 template <class Space, class S>
 Power<S> AppliedPower(const Kinematics<Space, S>& kinematics);
 

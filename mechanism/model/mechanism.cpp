@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -224,8 +225,7 @@ void Mechanism<Space, S>::AddCouplings(const MechanismDescription& description) 
     for (const auto& [index, ratio] : given.parts) {
       const Joint<Space, S>& joint = joints_[index];
       coupling.parts.push_back({index, S(ratio)});
-      const bool is_angle = joint.kind->axes[0] < Space::kRot && joint.kind->parameter == S(0);
-      if (!is_angle || joint.in_tree()) continue;
+      if (!joint.kind->IsAngle(0) || joint.in_tree()) continue;
       coupling.measured_turns.push_back(S(2.0 * std::numbers::pi * std::abs(ratio)));
     }
     std::ranges::sort(coupling.measured_turns, std::greater<>());
@@ -306,11 +306,10 @@ void Mechanism<Space, S>::NameSpeeds(const MechanismDescription& description) {
   for (const TreeStep& step : tree_) {
     const Joint<Space, S>& joint = joints_[step.joint];
     const std::string& name = joint_names_[step.joint];
-    for (int i = 0; i < joint.kind->num_u; ++i) {
-      if (DriveOf(joint, i) >= 0) continue;
+    ForEachFree(joint, joint.kind->num_u, [&](int i, int) {
       const bool single = joint.kind->num_u == 1;
       speed_names_.push_back(single ? name : name + "." + components[joint.kind->axes[i]]);
-    }
+    });
   }
   for (const std::string& name : description.independent) {
     const auto it = std::ranges::find(speed_names_, name);

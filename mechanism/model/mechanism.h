@@ -14,6 +14,12 @@
 
 namespace loopbench {
 
+/// Returns call(Planar()) or call(Spatial()).
+template <class Call>
+auto ForSpace(SpaceKind space, const Call& call) {
+  return space == SpaceKind::kPlanar ? call(Planar()) : call(Spatial());
+}
+
 /// Mass properties about the centre of mass, in body axes.
 template <class Space, class S>
 struct Inertia {
@@ -153,6 +159,14 @@ class Mechanism {
     }
     return -1;
   }
+  /// Calls call(i, k) for the free ones of the kind's first `count` coordinates (or speeds) i of a
+  /// joint; k counts them.
+  template <class Call>
+  void ForEachFree(const Joint<Space, S>& joint, int count, const Call& call) const {
+    for (int i = 0, k = 0; i < count; ++i) {
+      if (DriveOf(joint, i) < 0) call(i, k++);
+    }
+  }
   const std::vector<TreeStep>& tree() const { return tree_; }
   const std::vector<int>& constraints() const { return constraints_; }  ///< joint indices
   std::vector<int> RowsOfConstraints() const;  ///< of each, scalar constraints
@@ -203,6 +217,14 @@ class Mechanism {
 
   /// qdot = N(q) u.
   void Rates(const VectorX<S>& q, const VectorX<S>& u, Eigen::Ref<VectorX<S>> qdot) const;
+  /// Returns q + N(q) u, normalised. Allocates.
+  VectorX<S> Moved(const VectorX<S>& q, const VectorX<S>& u) const {
+    VectorX<S> rates(q.size());
+    Rates(q, u, rates);
+    VectorX<S> moved = q + rates;
+    Normalise(moved);
+    return moved;
+  }
 
  private:
   void AddBodies(const MechanismDescription& description);

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "mechanism/description/registration.h"
-#include "mechanism/model/joint_kinds.h"
 
 namespace loopbench {
 namespace {

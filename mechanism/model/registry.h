@@ -17,7 +17,7 @@
 #pragma once
 
 #include "mechanism/description/joint_type.h"
-#include "mechanism/model/force_other.h"
+#include "mechanism/model/force_elements.h"
 #include "mechanism/model/joint.h"
 
 namespace loopbench {

@@ -318,17 +318,10 @@ class Search {
 
   Attachment ToGround(int body) const {
     const Pose<Space, double>& at_com = kinematics_.poses()[body];
-    const Eigen::Vector3d& com = description_.bodies[body].com;
     Attachment at;
     at.attached = true;
-    if constexpr (Space::kRot == 1) {
-      at.turn = at_com.angle;
-      at.X.R.topLeftCorner<2, 2>() = at_com.R.eigen();
-      at.X.p.head<2>() = at_com.p.eigen();
-    } else {
-      at.X = {at_com.R.eigen(), at_com.p.eigen()};
-    }
-    at.X.p -= at.X.R * com;
+    if constexpr (Space::kRot == 1) at.turn = at_com.angle;
+    at.X = OriginOf(at_com, description_.bodies[body].com);
     return at;
   }
 
@@ -337,21 +330,17 @@ class Search {
   Kinematics<Space, double> kinematics_;
 };
 
-template <class Space>
-std::vector<Attachment> FindIn(const MechanismDescription& description) {
-  const std::vector<Attachment> none(description.bodies.size());
-  const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
-  if (mechanism.num_u() > kMaxSpeedsForImmovable) return none;
-  const Start<double> start = Assemble<Space>(description, mechanism);
-  if (start.outcome != Outcome::kFinished) return none;
-  return Search<Space>(description, mechanism, start).Run();
-}
-
 }  // namespace
 
 std::vector<Attachment> FindImmovable(const MechanismDescription& description) {
-  return description.space == SpaceKind::kPlanar ? FindIn<Planar>(description)
-                                                 : FindIn<Spatial>(description);
+  return ForSpace(description.space, [&]<class Space>(Space) {
+    const std::vector<Attachment> none(description.bodies.size());
+    const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);
+    if (mechanism.num_u() > kMaxSpeedsForImmovable) return none;
+    const Start<double> start = Assemble<Space>(description, mechanism);
+    if (start.outcome != Outcome::kFinished) return none;
+    return Search<Space>(description, mechanism, start).Run();
+  });
 }
 
 }  // namespace loopbench

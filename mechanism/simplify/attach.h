@@ -7,8 +7,9 @@
 
 #include <vector>
 
+#include "mechanism/algebra/space.h"
 #include "mechanism/description/joint_frames.h"
-#include "mechanism/description/parts.h"
+#include "mechanism/description/topology.h"
 
 namespace loopbench {
 
@@ -19,6 +20,16 @@ struct Attachment {
   double turn = 0.0;      ///< plane: its angle as a number, not modulo a turn
   bool attached = false;  ///< else the body stays and the rest does not matter
 };
+
+/// The axes and origin of a body with its centre of mass `com`, which has this pose.
+template <class Space>
+Frame OriginOf(const Pose<Space, double>& at_com, const Eigen::Vector3d& com) {
+  Frame X;
+  X.R.topLeftCorner<Space::kLin, Space::kLin>() = at_com.R.eigen();
+  X.p.head<Space::kLin>() = at_com.p.eigen();
+  X.p -= X.R * com;
+  return X;
+}
 
 /// The carrier with the mass of another body, given by its place in the carrier's axes.
 void AddMass(const BodyDescription& body, const Frame& X, BodyDescription* carrier);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "mechanism/description/parts.h"
 #include "mechanism/description/topology.h"
 #include "mechanism/simplify/attach.h"
 #include "mechanism/simplify/plane.h"
@@ -37,17 +36,12 @@ bool LosesCoupledJoint(const MechanismDescription& before, const Renumbering& re
 class Compiler {
  public:
   Compiler(const MechanismDescription& description, const CompileOptions& options)
-      : options_(options), name_(description.name) {
-    CompiledPart whole;
-    whole.description = description;
-    result_.parts.push_back(std::move(whole));
+      : options_(options) {
+    result_.parts.push_back({.description = description});
     result_.done = CompileOptions::None();
     for (std::size_t i = 0; i < description.bodies.size(); ++i) {
-      BodyImage image;
-      image.part = i == kGround ? -1 : 0;
-      image.body = static_cast<int>(i);
-      result_.bodies.push_back(image);
-      names_.push_back(description.bodies[i].name);
+      result_.bodies.push_back(
+          {.part = i == kGround ? -1 : 0, .body = static_cast<int>(i), .X = {}});
     }
     for (std::size_t j = 0; j < description.joints.size(); ++j) {
       result_.joints.push_back({.part = 0, .joint = static_cast<int>(j)});
@@ -83,15 +77,12 @@ class Compiler {
     Renumbering renumbering;
     const MechanismDescription before = whole();
     MechanismDescription after = MergeRigidBodies(before, attachments, &renumbering);
-    if (!KeepsCuts(before, after, renumbering)) {
-      result_.report.push_back("bodies that could be " + how +
-                               " to others are kept: a joint with an initial value would have to "
-                               "close a loop");
-      return false;
-    }
-    if (LosesCoupledJoint(before, renumbering)) {
-      result_.report.push_back("bodies that could be " + how +
-                               " to others are kept: they hold a joint of a coupling");
+    const bool keeps_cuts = KeepsCuts(before, after, renumbering);
+    if (!keeps_cuts || LosesCoupledJoint(before, renumbering)) {
+      result_.report.push_back("bodies that could be " + how + " to others are kept: " +
+                               (keeps_cuts ? "they hold a joint of a coupling"
+                                           : "a joint with an initial value would have to close a "
+                                             "loop"));
       return false;
     }
     for (std::size_t i = 1; i < attachments.size(); ++i) {
@@ -211,8 +202,6 @@ class Compiler {
   }
 
   CompileOptions options_;
-  std::string name_;
-  std::vector<std::string> names_;
   Compiled result_;
 };
 
@@ -230,18 +219,9 @@ Frame UserPose(const Compiled& compiled, int body, const Kinematics<Space, doubl
   const BodyImage& image = compiled.bodies[body];
   if (image.part < 0) return image.X;
   const CompiledPart& part = compiled.parts[image.part];
-  const Pose<Space, double>& at_com = kinematics->poses()[image.body];
-  Frame X;  // of the part's body, at its centre of mass
-  if constexpr (Space::kRot == 1) {
-    X.R.topLeftCorner<2, 2>() = at_com.R.eigen();
-    X.p.head<2>() = at_com.p.eigen();
-  } else {
-    X = {at_com.R.eigen(), at_com.p.eigen()};
-  }
-  const Eigen::Vector3d& com = part.description.bodies[image.body].com;
-  X.p -= Space::kRot == 1 ? Eigen::Vector3d(X.R * Eigen::Vector3d(com.x(), com.y(), 0.0))
-                          : Eigen::Vector3d(X.R * com);
-  X = X * image.X;
+  Eigen::Vector3d com = part.description.bodies[image.body].com;
+  if (Space::kRot == 1) com.z() = 0.0;
+  const Frame X = OriginOf(kinematics->poses()[image.body], com) * image.X;
   return {part.R_WC * X.R, part.R_WC * X.p};
 }
 

@@ -115,7 +115,7 @@ struct FoundPoint {
 FoundPoint FindPoint(const MechanismDescription& simplified, const std::string& body,
                      const std::string& point);
 
-// The approximate simplification rules, a file each. Return values: model.h.
+// The approximate simplification rules (rules.cpp, plane.cpp).
 
 /// Merges bodies whose joints have hardly moved in the short run, in their initial poses, also with
 /// Ground. Joints with prescribed motions are excluded.
@@ -124,7 +124,7 @@ Simplified FreezeConstantParts(const MechanismDescription& description, const Sh
 
 /// Replaces a stiff spring between two points by a rod of its free length. A stiff joint spring
 /// fixes its joint, and the two bodies become one. Its damper is removed. The frequency is its
-/// natural frequency alone (freedom.h). The rate of the motion is taken from the start or the short
+/// natural frequency alone (restart.h). The rate of the motion is taken from the start or the short
 /// run, or is the highest frequency of the springs that are not stiff.
 Simplified HoldStiffSprings(const MechanismDescription& description, const ShortRun& run,
                             const SimplifyOptions& options);

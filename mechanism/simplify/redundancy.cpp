@@ -4,7 +4,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "mechanism/description/parts.h"
+#include "mechanism/description/topology.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/row_choice.h"
@@ -252,9 +252,8 @@ Redundancy Find(const MechanismDescription& description) {
 Redundancy FindRedundancy(const MechanismDescription& description) {
   Redundancy whole;
   for (const Part& part : SplitByJoints(description)) {
-    const Redundancy found = description.space == SpaceKind::kPlanar
-                                 ? Find<Planar>(part.description)
-                                 : Find<Spatial>(part.description);
+    const Redundancy found = ForSpace(
+        description.space, [&]<class Space>(Space) { return Find<Space>(part.description); });
     whole.rows += found.rows;
     whole.num_couplings += found.num_couplings;
     std::ranges::copy(found.couplings, std::back_inserter(whole.couplings));
@@ -275,21 +274,19 @@ Redundancy FindRedundancy(const MechanismDescription& description) {
 std::string NameOfDirection(const MechanismDescription& description, const Released& released,
                             int direction) {
   const JointDescription& joint = description.joints[released.joint];
-  const auto name = [&](const auto& kind, int rotations) -> std::string {
+  const JointTraits& traits = TraitsOf(joint.type);
+  return ForSpace(description.space, [&]<class Space>(Space) -> std::string {
+    const auto& kind = KindOf<Space, double>(joint.type);
     const int component = kind.axes[kind.num_u + direction];
-    const bool moment = component < rotations;
-    const JointTraits& traits = TraitsOf(joint.type);
+    const bool moment = component < Space::kRot;
     if (const std::string_view own = moment ? traits.moment : traits.force; !own.empty()) {
       return std::string(own);
     }
-    const std::string frame = " of its frame on " + description.bodies[joint.from.body].name;
     const char axis =
-        moment ? (rotations == 1 ? 'z' : "xyz"[component]) : "xyz"[component - rotations];
-    return std::string(moment ? "the moment about " : "the force along ") + axis + frame;
-  };
-  return description.space == SpaceKind::kPlanar
-             ? name(KindOf<Planar, double>(joint.type), Planar::kRot)
-             : name(KindOf<Spatial, double>(joint.type), Spatial::kRot);
+        moment ? (Space::kRot == 1 ? 'z' : "xyz"[component]) : "xyz"[component - Space::kRot];
+    return std::string(moment ? "the moment about " : "the force along ") + axis +
+           " of its frame on " + description.bodies[joint.from.body].name;
+  });
 }
 
 MechanismDescription Release(const MechanismDescription& description,

@@ -4,9 +4,10 @@
 #include <iterator>
 
 #include "mechanism/algebra/factors.h"
-#include "mechanism/description/parts.h"
+#include "mechanism/description/topology.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/joint_response.h"
+#include "mechanism/loops/loop_speeds.h"
 #include "mechanism/loops/scaled_loops.h"
 
 namespace loopbench {
@@ -133,23 +134,9 @@ class Analysis {
     result_.counted_freedom = Space::kDim * result_.bodies - result_.rows;
   }
 
-  /// Returns the steps of the tree from a body up to Ground.
-  std::vector<TreeStep> PathToGround(int body) const {
-    std::vector<TreeStep> path;
-    while (body != kGround) {
-      path.push_back(mechanism_.tree()[mechanism_.step_of_body(body)]);
-      body = path.back().parent;
-    }
-    return path;
-  }
-
   LoopPath FindLoop(int index, const Kinematics<Space, double>& kinematics) const {
     const Joint<Space, double>& joint = mechanism_.joints()[index];
-    std::vector<TreeStep> up = PathToGround(joint.to), down = PathToGround(joint.from);
-    while (!up.empty() && !down.empty() && up.back().joint == down.back().joint) {
-      up.pop_back();
-      down.pop_back();
-    }
+    const auto [up, down] = WaysOfLoop(mechanism_, index);
     LoopPath loop;
     loop.cut_joint = index;
     loop.joints.push_back(index);
@@ -183,8 +170,8 @@ double Structure::conditioning() const {
 }
 
 Structure AnalyseStructure(const MechanismDescription& description) {
-  return description.space == SpaceKind::kPlanar ? Analysis<Planar>(description).Run()
-                                                 : Analysis<Spatial>(description).Run();
+  return ForSpace(description.space,
+                  [&]<class Space>(Space) { return Analysis<Space>(description).Run(); });
 }
 
 }  // namespace loopbench

@@ -7,9 +7,6 @@
 
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/closure.h"
-#include "mechanism/start/conflict.h"
-#include "mechanism/start/guesses.h"
-#include "mechanism/start/mobility.h"
 
 namespace loopbench {
 
@@ -47,8 +44,7 @@ class Assembler {
   void ReadSpeeds() {
     for (const JointValues& values : description_.initial.speeds) {
       const Joint<Space, double>& joint = mechanism_.joints()[values.joint];
-      for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
-        if (mechanism_.DriveOf(joint, i) >= 0) continue;
+      mechanism_.ForEachFree(joint, joint.kind->num_u, [&](int i, int free) {
         if (!joint.in_tree()) {
           given_cut_.push_back({values.joint, free});
           given_cut_speeds_.push_back(values.values[i]);
@@ -56,8 +52,7 @@ class Assembler {
           start_.u[joint.u_offset + free] = values.values[i];
           given_u_[joint.u_offset + free] = true;
         }
-        ++free;
-      }
+      });
     }
   }
 
@@ -155,14 +150,11 @@ MechanismDescription NearAllImposed(const MechanismDescription& description) {
   const Start<double> start = Assembler<Space>(all, mechanism).Run();
   if (start.outcome != Outcome::kFinished) return near;
   std::vector<JointValues>& values = near.initial.coordinates;
-  const auto is_held = [&](int joint) {
-    return std::ranges::find(near.initial.held, joint) != near.initial.held.end();
-  };
   std::erase_if(values, [&](const JointValues& one) {
-    return mechanism.joints()[one.joint].in_tree() && !is_held(one.joint);
+    return mechanism.joints()[one.joint].in_tree() && !near.initial.IsHeld(one.joint);
   });
   for (JointValues& one : TreeValues(mechanism, start.q)) {
-    if (!is_held(one.joint)) values.push_back(std::move(one));
+    if (!near.initial.IsHeld(one.joint)) values.push_back(std::move(one));
   }
   return near;
 }
@@ -197,13 +189,8 @@ MechanismDescription Perturb(MechanismDescription description, double amplitude,
   std::seed_seq sequence{seed, static_cast<std::uint64_t>(member)};
   std::mt19937_64 generator(sequence);
   for (JointValues& values : description.initial.coordinates) {
-    const std::vector<int>& held = description.initial.held;
-    if (std::ranges::find(held, values.joint) == held.end()) continue;
-    for (double& value : values.values) {
-      // 53 random bits: the same number with every standard library
-      const double unit = static_cast<double>(generator() >> 11) * 0x1p-53;
-      value += amplitude * (2.0 * unit - 1.0);
-    }
+    if (!description.initial.IsHeld(values.joint)) continue;
+    for (double& value : values.values) value += amplitude * (2.0 * UnitNumber(generator) - 1.0);
   }
   return description;
 }

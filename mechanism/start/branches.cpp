@@ -8,7 +8,6 @@
 
 #include "mechanism/algebra/singular_values.h"
 #include "mechanism/start/closure.h"
-#include "mechanism/start/guesses.h"
 #include "mechanism/start/poses.h"
 
 namespace loopbench {
@@ -57,8 +56,7 @@ class BranchSearch {
  private:
   static MechanismDescription WithoutGuesses(MechanismDescription description) {
     std::erase_if(description.initial.coordinates, [&](const JointValues& values) {
-      const auto& held = description.initial.held;
-      return std::ranges::find(held, values.joint) == held.end();
+      return !description.initial.IsHeld(values.joint);
     });
     std::erase_if(description.initial.poses,
                   [](const PoseTarget& target) { return !target.fixed; });
@@ -66,16 +64,10 @@ class BranchSearch {
   }
 
   VectorX<double> Scattered(const VectorX<double>& own, std::mt19937_64& generator) const {
-    VectorX<double> u(mechanism_.num_u()), rates(own.size());
-    for (double& value : u) {
-      // 53 random bits: the same number with every standard library
-      value = std::numbers::pi * (2.0 * static_cast<double>(generator() >> 11) * 0x1p-53 - 1.0);
-    }
+    VectorX<double> u(mechanism_.num_u());
+    for (double& value : u) value = std::numbers::pi * (2.0 * UnitNumber(generator) - 1.0);
     ClearFixed(fixed_, &u);
-    mechanism_.Rates(own, u.cwiseProduct(units_.columns), rates);
-    VectorX<double> q = own + rates;
-    mechanism_.Normalise(q);
-    return q;
+    return mechanism_.Moved(own, u.cwiseProduct(units_.columns));
   }
 
   /// Free coordinates less the rank of the loops, at the current position.
@@ -122,8 +114,7 @@ class BranchSearch {
     poses_.push_back(kinematics_.poses());
     InitialDescription& initial = branch.description.initial;
     for (JointValues& values : TreeValues(mechanism_, q)) {
-      if (std::ranges::find(initial.held, values.joint) != initial.held.end()) continue;
-      initial.coordinates.push_back(std::move(values));
+      if (!initial.IsHeld(values.joint)) initial.coordinates.push_back(std::move(values));
     }
     result->found.push_back(std::move(branch));
   }
@@ -142,8 +133,8 @@ class BranchSearch {
 
 Branches FindBranches(const MechanismDescription& description, int starts) {
   const MechanismDescription whole = Unreleased(description);
-  if (whole.space == SpaceKind::kPlanar) return BranchSearch<Planar>(whole).Run(starts);
-  return BranchSearch<Spatial>(whole).Run(starts);
+  return ForSpace(whole.space,
+                  [&]<class Space>(Space) { return BranchSearch<Space>(whole).Run(starts); });
 }
 
 }  // namespace loopbench

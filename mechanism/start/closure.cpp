@@ -6,8 +6,6 @@
 #include <numbers>
 #include <random>
 
-#include "mechanism/start/guesses.h"
-
 namespace loopbench {
 
 namespace {
@@ -194,11 +192,7 @@ class Closure {
   /// q moved by the speeds d, in units, for unit time (quaternions renormalised).
   Vector Move(const Vector& q, Vector d) const {
     ClearFixed(guesses_.fixed(), &d);
-    Vector step(q.size());
-    mechanism_.Rates(q, d.cwiseProduct(units_.columns), step);
-    Vector moved = q + step;
-    mechanism_.Normalise(moved);
-    return moved;
+    return mechanism_.Moved(q, d.cwiseProduct(units_.columns));
   }
 
   /// Levenberg-Marquardt from q, with the residual e, to a closed position: whether it gets there.
@@ -341,17 +335,15 @@ class Closure {
   /// one loop moved from the best position so far. Returns false if no start closes.
   bool Search(bool closed, Vector* best) {
     std::mt19937_64 generator;
-    // 53 random bits: the same number with every standard library
-    const auto random = [&] { return static_cast<double>(generator() >> 11) * 0x1p-53; };
     double least = closed ? Distance(*best) : std::numeric_limits<double>::infinity();
     const std::vector<int>& loops = mechanism_.constraints();
     work_ = 0.0;
     searching_ = true;
     for (int start = 0, in_vain = 0; in_vain < kStarts && work_ < kMaxWork; ++start, ++in_vain) {
       Vector d = Vector::Zero(mechanism_.num_u()), q = guess_;
-      const double most = kPi * random();
+      const double most = kPi * UnitNumber(generator);
       const auto draw = [&](int column) {
-        d[column] = (guesses_.guessed()[column] ? most : kPi) * (2.0 * random() - 1.0);
+        d[column] = (guesses_.guessed()[column] ? most : kPi) * (2.0 * UnitNumber(generator) - 1.0);
       };
       const bool has_best = least < std::numeric_limits<double>::infinity();
       if (start > 0 && start % 2 == 0 && has_best && !loops.empty()) {

@@ -1,9 +1,9 @@
-#include "mechanism/start/conflict.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <set>
+
+#include "mechanism/start/closure.h"
 
 namespace loopbench {
 
@@ -119,17 +119,6 @@ class Conflict {
            (one ? ": residual " : ": residuals ") + Listed(residuals);
   }
 
-  /// Joints from a body to Ground, along the tree.
-  std::set<int> PathToGround(int body) const {
-    std::set<int> path;
-    while (body != kGround) {
-      const TreeStep& step = mechanism_.tree()[mechanism_.step_of_body(body)];
-      path.insert(step.joint);
-      body = step.parent;
-    }
-    return path;
-  }
-
   /// Lists the fixed and prescribed joints of the loops, which may need a change.
   std::string Given() const {
     std::set<int> joints;  // of the description, in its order
@@ -142,11 +131,11 @@ class Conflict {
       }
       const Joint<Space, double>& joint = mechanism_.joints()[one.joint];
       joints.insert(joint.description);
-      const std::set<int> to = PathToGround(joint.to), from = PathToGround(joint.from);
-      for (const auto& [path, other] : {std::pair{&to, &from}, std::pair{&from, &to}}) {
-        for (const int index : *path) {
-          const int described = mechanism_.joints()[index].description;
-          if (!other->contains(index) && described >= 0) joints.insert(described);
+      const auto ways = WaysOfLoop(mechanism_, one.joint);
+      for (const std::vector<TreeStep>& way : {ways.first, ways.second}) {
+        for (const TreeStep& step : way) {
+          const int described = mechanism_.joints()[step.joint].description;
+          if (described >= 0) joints.insert(described);
         }
       }
     }
@@ -155,7 +144,7 @@ class Conflict {
     for (const int j : joints) {
       const std::string name = '"' + description_.joints[j].name + '"';
       if (!description_.joints[j].motions.empty()) prescribed.push_back(name);
-      if (std::ranges::find(initial.held, j) != initial.held.end()) held.push_back(name);
+      if (initial.IsHeld(j)) held.push_back(name);
       if (std::ranges::find(initial.speeds, j, &JointValues::joint) != initial.speeds.end()) {
         given.push_back(name);
       }

@@ -1,9 +1,9 @@
-#include "mechanism/start/guesses.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "mechanism/start/closure.h"
 
 namespace loopbench {
 
@@ -54,23 +54,19 @@ Guesses<Space>::Guesses(const MechanismDescription& description,
     };
     if (joint.in_tree()) {
       if (!is_held_[values.joint]) SetColumns(joint, &guessed_);
-      for (int i = 0, u = joint.u_offset; i < joint.kind->num_u; ++i) {
-        if (mechanism.DriveOf(joint, i) < 0) weights_[u++] = weight(i);
-      }
+      mechanism.ForEachFree(joint, joint.kind->num_u,
+                            [&](int i, int free) { weights_[joint.u_offset + free] = weight(i); });
       continue;
     }
     if (joint.num_u() == 0) continue;  // prescribed
     CutJoints& cut = is_held_[values.joint] ? held_ : loose_;
     cut.values.push_back({values.joint, values.values.data()});
-    for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
-      if (mechanism.DriveOf(joint, i) >= 0) continue;
-      if (IsGiven(*joint.kind, values.values.data(), i)) {
-        cut.free.push_back({values.joint, free});
-        cut.weights.conservativeResize(cut.weights.size() + 1);
-        cut.weights[cut.weights.size() - 1] = weight(i);
-      }
-      ++free;
-    }
+    mechanism.ForEachFree(joint, joint.kind->num_u, [&](int i, int free) {
+      if (!IsGiven(*joint.kind, values.values.data(), i)) return;
+      cut.free.push_back({values.joint, free});
+      cut.weights.conservativeResize(cut.weights.size() + 1);
+      cut.weights[cut.weights.size() - 1] = weight(i);
+    });
   }
 }
 
@@ -82,28 +78,19 @@ void Guesses<Space>::SetColumns(const Joint<Space, double>& joint,
   }
 }
 
-/// Excludes a helix: its shift determines its turn.
-template <class Space>
-bool Guesses<Space>::IsAngle(const Joint<Space, double>& joint, int coordinate) const {
-  return !joint.kind->has_quaternion() && joint.kind->parameter == 0.0 &&
-         joint.kind->axes[coordinate] < Space::kRot;
-}
-
 template <class Space>
 VectorX<double> Guesses<Space>::Apart(const VectorX<double>& q) const {
   VectorX<double> apart(mechanism_.num_u());
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
     double at[7] = {}, guess[7] = {};
-    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
-      if (mechanism_.DriveOf(joint, i) >= 0) continue;
-      at[i] = q[next];
-      guess[i] = guess_[next++];
-    }
+    mechanism_.ForEachFree(joint, joint.kind->num_q, [&](int i, int free) {
+      at[i] = q[joint.q_offset + free];
+      guess[i] = guess_[joint.q_offset + free];
+    });
     const std::array<double, 6> all = Difference<Space>(*joint.kind, at, guess);
-    for (int i = 0, next = joint.u_offset; i < joint.kind->num_u; ++i) {
-      if (mechanism_.DriveOf(joint, i) < 0) apart[next++] = all[i];
-    }
+    mechanism_.ForEachFree(joint, joint.kind->num_u,
+                           [&](int i, int free) { apart[joint.u_offset + free] = all[i]; });
   }
   return apart.cwiseQuotient(units_.columns);
 }
@@ -124,18 +111,15 @@ VectorX<double> Guesses<Space>::Apart(const CutJoints& cut,
   Eigen::Index row = 0;
   for (const auto& [index, values] : cut.values) {
     const Joint<Space, double>& joint = mechanism_.joints()[index];
-    const auto& poses = kinematics.poses();
-    const Pose<Space, double> X_WF = Compose(poses[joint.from], joint.X_PF),
-                              X_WM = Compose(poses[joint.to], joint.X_QM);
     double at[7] = {};
-    joint.kind->coordinates(Compose(Inverse(X_WF), X_WM), at, joint.kind->parameter);
+    joint.kind->coordinates(kinematics.MeasuredPose(joint), at, joint.kind->parameter);
     std::array<double, 6> all = Difference<Space>(*joint.kind, at, values);
-    for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
-      if (mechanism_.DriveOf(joint, i) >= 0) continue;
-      if (IsAngle(joint, i)) all[i] = std::remainder(all[i], kTurn);
-      const double unit = units_.Of(kinematics.joints()[index].H(free++));
-      if (IsGiven(*joint.kind, values, i)) apart[row++] = all[i] / unit;
-    }
+    mechanism_.ForEachFree(joint, joint.kind->num_u,
+                           [&, index = index, given = values](int i, int free) {
+                             if (joint.kind->IsAngle(i)) all[i] = std::remainder(all[i], kTurn);
+                             const double unit = units_.Of(kinematics.joints()[index].H(free));
+                             if (IsGiven(*joint.kind, given, i)) apart[row++] = all[i] / unit;
+                           });
   }
   return apart;
 }
@@ -171,18 +155,16 @@ std::vector<MissedGuess> Guesses<Space>::Missed(const Kinematics<Space, double>&
     if (is_held_[values.joint]) continue;
     const int shift = joint.kind->num_q - joint.kind->num_u;
     Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-    for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
-      if (mechanism_.DriveOf(joint, i) >= 0) continue;
+    mechanism_.ForEachFree(joint, joint.kind->num_u, [&](int i, int free) {
       const Direction<Space, double>& H = kinematics.joints()[values.joint].H(free);
       const double by =
           units_.Of(H) * (joint.in_tree() ? apart[joint.u_offset + free] : cut[row++]);
-      ++free;
       if (shift > 0 && i < 3) {
         turn[i] = by;
       } else if (std::abs(by) > kFarGuess * (H.angular.isZero() ? link : 1.0)) {
         missed.push_back({values.joint, i + shift, values.values[i + shift], by});
       }
-    }
+    });
     if (turn.norm() > kFarGuess) missed.push_back({values.joint, -1, 0.0, turn.norm()});
   }
   return missed;
@@ -193,13 +175,10 @@ VectorX<double> Guesses<Space>::Unwound(VectorX<double> q) const {
   const VectorX<double> apart = Apart(q);
   for (const TreeStep& step : mechanism_.tree()) {
     const Joint<Space, double>& joint = mechanism_.joints()[step.joint];
-    for (int i = 0, free = 0; i < joint.kind->num_u; ++i) {
-      if (mechanism_.DriveOf(joint, i) >= 0) continue;
-      if (IsAngle(joint, i)) {
-        q[joint.q_offset + free] -= kTurn * std::round(apart[joint.u_offset + free] / kTurn);
-      }
-      ++free;
-    }
+    mechanism_.ForEachFree(joint, joint.kind->num_u, [&](int i, int free) {
+      if (!joint.kind->IsAngle(i)) return;
+      q[joint.q_offset + free] -= kTurn * std::round(apart[joint.u_offset + free] / kTurn);
+    });
   }
   return q;
 }
@@ -214,9 +193,9 @@ VectorX<double> GuessedPositions(const MechanismDescription& description,
   }
   for (const JointValues& values : description.initial.coordinates) {
     const Joint<Space, double>& joint = mechanism.joints()[values.joint];
-    for (int i = 0, next = joint.q_offset; joint.in_tree() && i < joint.kind->num_q; ++i) {
-      if (mechanism.DriveOf(joint, i) < 0) q[next++] = values.values[i];
-    }
+    if (!joint.in_tree()) continue;
+    mechanism.ForEachFree(joint, joint.kind->num_q,
+                          [&](int i, int free) { q[joint.q_offset + free] = values.values[i]; });
   }
   return q;
 }
@@ -228,33 +207,23 @@ std::vector<JointValues> TreeValues(const Mechanism<Space, double>& mechanism,
   for (const TreeStep& step : mechanism.tree()) {
     const Joint<Space, double>& joint = mechanism.joints()[step.joint];
     if (joint.description < 0 || joint.num_q() == 0) continue;
-    JointValues values{joint.description, {}};
-    for (int i = 0, next = joint.q_offset; i < joint.kind->num_q; ++i) {
-      values.values.push_back(mechanism.DriveOf(joint, i) < 0 ? q[next++] : 0.0);
-    }
-    list.push_back(std::move(values));
+    std::vector<double> values(joint.kind->num_q, 0.0);
+    mechanism.ForEachFree(joint, joint.kind->num_q,
+                          [&](int i, int free) { values[i] = q[joint.q_offset + free]; });
+    list.push_back({joint.description, std::move(values)});
   }
   return list;
 }
 
-namespace {
-
-template <class Space>
-std::vector<MissedGuess> MissedIn(const MechanismDescription& description,
-                                  const VectorX<double>& q) {
-  const Mechanism<Space, double> mechanism(Unreleased(description), Coordinates::kJoint);
-  Kinematics<Space, double> kinematics(mechanism);
-  kinematics.UpdatePosition(q);
-  const AssemblyUnits<Space> units(kinematics);
-  return Guesses<Space>(description, mechanism, units).Missed(kinematics);
-}
-
-}  // namespace
-
 std::vector<MissedGuess> FindMissedGuesses(const MechanismDescription& description,
                                            const VectorX<double>& q) {
-  return description.space == SpaceKind::kPlanar ? MissedIn<Planar>(description, q)
-                                                 : MissedIn<Spatial>(description, q);
+  return ForSpace(description.space, [&]<class Space>(Space) {
+    const Mechanism<Space, double> mechanism(Unreleased(description), Coordinates::kJoint);
+    Kinematics<Space, double> kinematics(mechanism);
+    kinematics.UpdatePosition(q);
+    const AssemblyUnits<Space> units(kinematics);
+    return Guesses<Space>(description, mechanism, units).Missed(kinematics);
+  });
 }
 
 #define LOOPBENCH_INSTANTIATE(Space)                                            \

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "mechanism/algebra/decompositions.h"
-#include "mechanism/model/dense_memory.h"
+#include "mechanism/algebra/dense_memory.h"
 
 namespace loopbench {
 

@@ -1,17 +1,16 @@
-#include "mechanism/start/mobility.h"
-
 #include <algorithm>
 #include <vector>
 
 #include "mechanism/algebra/decompositions.h"
 #include "mechanism/algebra/factors.h"
 #include "mechanism/algebra/symmetric_eigen.h"
-#include "mechanism/description/parts.h"
+#include "mechanism/description/topology.h"
 #include "mechanism/loops/excursion.h"
 #include "mechanism/loops/joint_response.h"
 #include "mechanism/loops/scaled_loops.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/assembly.h"
+#include "mechanism/start/closure.h"
 
 namespace loopbench {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mechanism/start/guesses.h"
+#include "mechanism/start/closure.h"
 
 namespace loopbench {
 
@@ -59,74 +59,65 @@ void Measure(const Kinematics<Space, double>& kinematics, JointValues* guess) {
   double q[7] = {};
   joint.kind->coordinates(kinematics.MeasuredPose(joint), q, joint.kind->parameter);
   for (std::size_t i = 0; i < guess->values.size(); ++i) {
-    const bool is_angle = !joint.kind->has_quaternion() && joint.kind->parameter == 0.0 &&
-                          joint.kind->axes[i] < Space::kRot;
     double& value = guess->values[i];
-    value = is_angle ? value + std::remainder(q[i] - value, kTurn) : q[i];
+    value = joint.kind->IsAngle(static_cast<int>(i)) ? value + std::remainder(q[i] - value, kTurn)
+                                                     : q[i];
   }
-}
-
-template <class Space>
-std::string Resolve(MechanismDescription* description) {
-  const MechanismDescription whole = WithTargets(Unreleased(*description));
-  const Mechanism<Space, double> mechanism(whole, Coordinates::kJoint);
-  for (std::size_t j = description->joints.size(); j < whole.joints.size(); ++j) {
-    if (!mechanism.joints()[j].in_tree()) continue;
-    return "no joint connects body \"" + whole.bodies[whole.joints[j].to.body].name +
-           "\" to ground, not even a free one";
-  }
-  const Start<double> start = Assemble<Space>(whole, mechanism);
-  if (start.outcome == Outcome::kInconsistentStart) return start.message;
-  Kinematics<Space, double> kinematics(mechanism);
-  kinematics.UpdatePosition(start.q);
-  InitialDescription& initial = description->initial;
-  for (JointValues& values : TreeValues(mechanism, start.q)) {
-    const auto given = std::ranges::find(initial.coordinates, values.joint, &JointValues::joint);
-    if (given == initial.coordinates.end()) {
-      initial.coordinates.push_back(std::move(values));
-    } else {
-      given->values = std::move(values.values);
-    }
-  }
-  for (JointValues& values : initial.coordinates) {
-    const bool is_held = std::ranges::find(initial.held, values.joint) != initial.held.end();
-    if (!is_held && !mechanism.joints()[values.joint].in_tree()) Measure(kinematics, &values);
-  }
-  return "";
-}
-
-template <class Space>
-std::vector<MissedPose> Missed(const MechanismDescription& description, const VectorX<double>& q) {
-  const MechanismDescription whole = WithTargets(description);
-  const Mechanism<Space, double> mechanism(whole, Coordinates::kJoint);
-  Kinematics<Space, double> kinematics(mechanism);
-  kinematics.UpdatePosition(q);
-  std::vector<MissedPose> missed;
-  for (std::size_t i = 0; i < description.initial.poses.size(); ++i) {
-    const PoseTarget& target = description.initial.poses[i];
-    const Pose<Space, double> apart =
-        kinematics.MeasuredPose(mechanism.joints()[description.joints.size() + i]);
-    const double turn = RotationVector(apart).norm();
-    const MissedPose by{&target, target.at ? apart.p.norm() : 0.0,
-                        target.rotation ? std::abs(std::remainder(turn, kTurn)) : 0.0};
-    if (by.turn > kMissed || by.shift > kMissed * 2.0 * mechanism.length()) missed.push_back(by);
-  }
-  return missed;
 }
 
 }  // namespace
 
 std::string ResolvePoses(MechanismDescription* description) {
   if (description->initial.poses.empty()) return "";
-  return description->space == SpaceKind::kPlanar ? Resolve<Planar>(description)
-                                                  : Resolve<Spatial>(description);
+  return ForSpace(description->space, [&]<class Space>(Space) -> std::string {
+    const MechanismDescription whole = WithTargets(Unreleased(*description));
+    const Mechanism<Space, double> mechanism(whole, Coordinates::kJoint);
+    for (std::size_t j = description->joints.size(); j < whole.joints.size(); ++j) {
+      if (!mechanism.joints()[j].in_tree()) continue;
+      return "no joint connects body \"" + whole.bodies[whole.joints[j].to.body].name +
+             "\" to ground, not even a free one";
+    }
+    const Start<double> start = Assemble<Space>(whole, mechanism);
+    if (start.outcome == Outcome::kInconsistentStart) return start.message;
+    Kinematics<Space, double> kinematics(mechanism);
+    kinematics.UpdatePosition(start.q);
+    InitialDescription& initial = description->initial;
+    for (JointValues& values : TreeValues(mechanism, start.q)) {
+      const auto given = std::ranges::find(initial.coordinates, values.joint, &JointValues::joint);
+      if (given == initial.coordinates.end()) {
+        initial.coordinates.push_back(std::move(values));
+      } else {
+        given->values = std::move(values.values);
+      }
+    }
+    for (JointValues& values : initial.coordinates) {
+      const bool in_tree = mechanism.joints()[values.joint].in_tree();
+      if (!in_tree && !initial.IsHeld(values.joint)) Measure(kinematics, &values);
+    }
+    return "";
+  });
 }
 
 std::vector<MissedPose> FindMissedPoses(const MechanismDescription& description,
                                         const VectorX<double>& q) {
   if (description.initial.poses.empty()) return {};
-  return description.space == SpaceKind::kPlanar ? Missed<Planar>(description, q)
-                                                 : Missed<Spatial>(description, q);
+  return ForSpace(description.space, [&]<class Space>(Space) {
+    const MechanismDescription whole = WithTargets(description);
+    const Mechanism<Space, double> mechanism(whole, Coordinates::kJoint);
+    Kinematics<Space, double> kinematics(mechanism);
+    kinematics.UpdatePosition(q);
+    std::vector<MissedPose> missed;
+    for (std::size_t i = 0; i < description.initial.poses.size(); ++i) {
+      const PoseTarget& target = description.initial.poses[i];
+      const Pose<Space, double> apart =
+          kinematics.MeasuredPose(mechanism.joints()[description.joints.size() + i]);
+      const double turn = RotationVector(apart).norm();
+      const MissedPose by{&target, target.at ? apart.p.norm() : 0.0,
+                          target.rotation ? std::abs(std::remainder(turn, kTurn)) : 0.0};
+      if (by.turn > kMissed || by.shift > kMissed * 2.0 * mechanism.length()) missed.push_back(by);
+    }
+    return missed;
+  });
 }
 
 }  // namespace loopbench

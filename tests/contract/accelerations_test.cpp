@@ -30,6 +30,50 @@ void HoldInSpace(const MechanismDescription& description, std::uint64_t seed, Fa
   }
 }
 
+/// Sizes and seeds of samples.
+using Draws = std::vector<std::pair<int, std::uint64_t>>;
+
+Draws Each(const std::vector<int>& sizes, std::uint64_t seeds) {
+  Draws draws;
+  for (int n : sizes) {
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) draws.emplace_back(n, seed);
+  }
+  return draws;
+}
+
+/// Different seeds for every size from 1 on.
+Draws EachOfItsOwn(int sizes, int draws) {
+  Draws all;
+  for (int n = 1; n <= sizes; ++n) {
+    for (int k = 1; k <= draws; ++k) all.emplace_back(n, 100 * n + k);
+  }
+  return all;
+}
+
+Draws With(Draws draws, int n) {
+  draws.emplace_back(n, 1);
+  return draws;
+}
+
+/// Holds a family of `draw(size, space, seed)` in this space.
+template <class Space>
+void Hold(const std::string& name, const Draws& draws, const auto& draw, bool as_published = true,
+          double share = kShare) {
+  Family family(name, share);
+  const SpaceKind space = Space::kRot == 1 ? kPlane : kSpace;
+  for (const auto& [n, seed] : draws) {
+    family.Hold(Sample<Space>(draw(n, space, seed), seed), as_published);
+  }
+  family.Finish();
+}
+
+/// Compares planar mechanisms with the same ones in space.
+void HoldInSpace(const std::string& name, const Draws& draws, const auto& draw) {
+  Family family(name, kShare);
+  for (const auto& [n, seed] : draws) HoldInSpace(draw(n, kPlane, seed), seed, family);
+  family.Finish();
+}
+
 TEST(AccelerationsTest, PaperScenesAgreeWithTheOracle) {
   Family plane("paper problems", kShare), space("paper problems in space", kShare);
   for (const char* name : {"square-four-bar", "square-seven-bar", "four-bar", "seven-bar",
@@ -50,168 +94,82 @@ TEST(AccelerationsTest, PaperScenesAgreeWithTheOracle) {
   space.Finish();
 }
 
-TEST(AccelerationsTest, ClosedChainsInThePlaneAgreeWithTheOracle) {
-  Family family("closed chains, plane", kShare);
-  for (int n : {3, 4, 5, 7, 10, 20, 50}) {
-    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-      family.Hold(Sample<Planar>(RandomChain(n, kPlane, seed), seed), true);
-    }
-  }
-  family.Hold(Sample<Planar>(RandomChain(200, kPlane, 1), 1), true);
-  family.Finish();
-}
-
-TEST(AccelerationsTest, ClosedChainsInSpaceAgreeWithTheOracle) {
-  Family family("closed chains, space", kShare);
-  for (int n : {7, 8, 9, 12, 20, 50}) {
-    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-      family.Hold(Sample<Spatial>(RandomChain(n, kSpace, seed), seed), true);
-    }
-  }
-  family.Hold(Sample<Spatial>(RandomChain(200, kSpace, 1), 1), true);
-  family.Finish();
+TEST(AccelerationsTest, ClosedChainsAgreeWithTheOracle) {
+  Hold<Planar>("closed chains, plane", With(Each({3, 4, 5, 7, 10, 20, 50}, 6), 200), RandomChain);
+  Hold<Spatial>("closed chains, space", With(Each({7, 8, 9, 12, 20, 50}, 6), 200), RandomChain);
 }
 
 TEST(AccelerationsTest, SphericalChainsAgreeWithTheOracle) {
   Family family("spherical chains, space", kShare);
-  for (int n : {3, 4, 5, 6, 8}) {
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      const Sample<Spatial> sample(SphericalChain(n, seed), seed);
-      EXPECT_EQ(sample.answer().rank, 2) << "of 5 rows, three are redundant";
-      family.Hold(sample, false);
-    }
+  for (const auto& [n, seed] : Each({3, 4, 5, 6, 8}, 4)) {
+    const Sample<Spatial> sample(SphericalChain(n, seed), seed);
+    EXPECT_EQ(sample.answer().rank, 2) << "of 5 rows, three are redundant";
+    family.Hold(sample, false);
   }
   family.Finish();
 }
 
-TEST(AccelerationsTest, PlanarChainsInSpaceAgreeWithTheOracleWhereRankIsRevealed) {
-  Family family("planar chains in space", kShare);
-  for (int n : {3, 4, 5, 8, 20}) {
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      HoldInSpace(RandomChain(n, kPlane, seed), seed, family);
-    }
-  }
-  family.Finish();
+TEST(AccelerationsTest, PlanarOnesInSpaceAgreeWithTheOracleWhereRankIsRevealed) {
+  HoldInSpace("planar chains in space", Each({3, 4, 5, 8, 20}, 4), RandomChain);
+  HoldInSpace("planar ladders in space", EachOfItsOwn(4, 6), RandomLadder);
+  HoldInSpace("planar graphs in space", EachOfItsOwn(6, 3), RandomGraph);
 }
 
 TEST(AccelerationsTest, TreesAgreeWithTheOracle) {
-  Family plane("trees, plane", kShare), space("trees, space", kShare);
-  for (int n : {2, 5, 12, 40}) {
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      plane.Hold(Sample<Planar>(RandomTree(n, kPlane, seed), seed), true);
-      space.Hold(Sample<Spatial>(RandomTree(n, kSpace, seed), seed), true);
-    }
-  }
-  space.Hold(Sample<Spatial>(RandomTree(120, kSpace, 1), 1), true);
-  plane.Finish();
-  space.Finish();
+  Hold<Planar>("trees, plane", Each({2, 5, 12, 40}, 4), RandomTree);
+  Hold<Spatial>("trees, space", With(Each({2, 5, 12, 40}, 4), 120), RandomTree);
 }
 
 TEST(AccelerationsTest, LaddersAgreeWithTheOracle) {
-  Family plane("ladders, plane", kShare), space("ladders, space", kShare),
-      flat("planar ladders in space", kShare);
-  for (int n = 1; n <= 4; ++n) {
-    for (int k = 1; k <= 6; ++k) {
-      const std::uint64_t seed = 100 * n + k;  // other draws for every size
-      const MechanismDescription ladder = RandomLadder(n, kPlane, seed);
-      plane.Hold(Sample<Planar>(ladder, seed), true);
-      HoldInSpace(ladder, seed, flat);
-      space.Hold(Sample<Spatial>(RandomLadder(n, kSpace, seed), seed), true);
-    }
-  }
-  plane.Hold(Sample<Planar>(RandomLadder(40, kPlane, 1), 1), true);
-  plane.Finish();
-  space.Finish();
-  flat.Finish();
+  Hold<Planar>("ladders, plane", With(EachOfItsOwn(4, 6), 40), RandomLadder);
+  Hold<Spatial>("ladders, space", EachOfItsOwn(4, 6), RandomLadder);
 }
 
-/// Seeds for graphs of every size: other draws for every number of loops.
-std::vector<std::pair<int, std::uint64_t>> GraphSeeds(int draws) {
-  std::vector<std::pair<int, std::uint64_t>> seeds;
-  for (int loops = 1; loops <= 6; ++loops) {
-    for (int k = 1; k <= draws; ++k) seeds.emplace_back(loops, 100 * loops + k);
-  }
-  return seeds;
-}
-
-TEST(AccelerationsTest, PlanarGraphsAgreeWithTheOracle) {
-  Family family("graphs, plane", kShare);
-  for (const auto& [loops, seed] : GraphSeeds(5)) {
-    family.Hold(Sample<Planar>(RandomGraph(loops, kPlane, seed), seed), true);
-  }
-  family.Finish();
-}
-
-TEST(AccelerationsTest, SpatialGraphsAgreeWithTheOracle) {
-  Family family("graphs, space", kShare);
-  for (const auto& [loops, seed] : GraphSeeds(3)) {
-    family.Hold(Sample<Spatial>(RandomGraph(loops, kSpace, seed), seed), true);
-  }
-  family.Finish();
+TEST(AccelerationsTest, GraphsAgreeWithTheOracle) {
+  Hold<Planar>("graphs, plane", EachOfItsOwn(6, 5), RandomGraph);
+  Hold<Spatial>("graphs, space", EachOfItsOwn(6, 3), RandomGraph);
 }
 
 TEST(AccelerationsTest, GraphsOfEveryJointAgreeWithTheOracle) {
-  Family plane("every joint, plane", kShare), space("every joint, space", kShare);
-  for (const auto& [loops, seed] : GraphSeeds(4)) {
-    plane.Hold(Sample<Planar>(MixedGraph(loops, kPlane, seed), seed), true);
-    space.Hold(Sample<Spatial>(MixedGraph(loops, kSpace, seed), seed), true);
-  }
-  plane.Finish();
-  space.Finish();
+  const auto draw = [](int loops, SpaceKind space, std::uint64_t seed) {
+    return MixedGraph(loops, space, seed);
+  };
+  Hold<Planar>("every joint, plane", EachOfItsOwn(6, 4), draw);
+  Hold<Spatial>("every joint, space", EachOfItsOwn(6, 4), draw);
 }
 
 /// Kinds that random graphs got later, too: draws of their own.
 TEST(AccelerationsTest, GraphsOfAllKindsInSpaceAgreeWithTheOracle) {
-  Family space("all kinds, space", kShare);
-  for (const auto& [loops, seed] : GraphSeeds(4)) {
-    const int motions = static_cast<int>(seed) % 3;
-    space.Hold(Sample<Spatial>(MixedGraph(loops, kSpace, seed, motions, DrawnKinds::kAll), seed),
-               true);
-  }
-  space.Finish();
+  const auto draw = [](int loops, SpaceKind space, std::uint64_t seed) {
+    return MixedGraph(loops, space, seed, static_cast<int>(seed) % 3, DrawnKinds::kAll);
+  };
+  Hold<Spatial>("all kinds, space", EachOfItsOwn(6, 4), draw);
 }
 
 TEST(AccelerationsTest, DrivenGraphsOfEveryJointAgreeWithTheOracle) {
-  Family plane("driven, plane", kShare), space("driven, space", kShare);
-  for (const auto& [loops, seed] : GraphSeeds(4)) {
-    const int motions = 1 + static_cast<int>(seed) % 4;
-    plane.Hold(Sample<Planar>(MixedGraph(loops, kPlane, seed, motions), seed), true);
-    space.Hold(Sample<Spatial>(MixedGraph(loops, kSpace, seed, motions), seed), true);
-  }
-  plane.Finish();
-  space.Finish();
+  const auto draw = [](int loops, SpaceKind space, std::uint64_t seed) {
+    return MixedGraph(loops, space, seed, 1 + static_cast<int>(seed) % 4);
+  };
+  Hold<Planar>("driven, plane", EachOfItsOwn(6, 4), draw);
+  Hold<Spatial>("driven, space", EachOfItsOwn(6, 4), draw);
 }
 
-TEST(AccelerationsTest, PlanarGraphsInSpaceAgreeWithTheOracleWhereRankIsRevealed) {
-  Family family("planar graphs in space", kShare);
-  for (const auto& [loops, seed] : GraphSeeds(3)) {
-    HoldInSpace(RandomGraph(loops, kPlane, seed), seed, family);
-  }
-  family.Finish();
-}
-
+/// No condition on rcond: an early closure may be ill-conditioned where all of them are not.
 TEST(AccelerationsTest, OverconstrainedGraphsAgreeWithTheOracleWhereRankIsRevealed) {
-  // no condition on rcond: an early closure may be ill-conditioned where all of them are not
-  Family plane("redundant graphs, plane", 0.0), space("redundant graphs, space", 0.0);
-  for (int loops = 2; loops <= 6; ++loops) {
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      plane.Hold(Sample<Planar>(RedundantGraph(3 * loops, loops, kPlane, seed), seed), false);
-      space.Hold(Sample<Spatial>(RedundantGraph(7 * loops, loops, kSpace, seed), seed), false);
-    }
-  }
-  plane.Finish();
-  space.Finish();
+  const auto draw = [](int loops, SpaceKind space, std::uint64_t seed) {
+    return RedundantGraph((space == kPlane ? 3 : 7) * loops, loops, space, seed);
+  };
+  Hold<Planar>("redundant graphs, plane", Each({2, 3, 4, 5, 6}, 4), draw, false, 0.0);
+  Hold<Spatial>("redundant graphs, space", Each({2, 3, 4, 5, 6}, 4), draw, false, 0.0);
 }
 
+/// Loops of the same links: rcond is 1e-2 to 1e-6.
 TEST(AccelerationsTest, GraphsWithTightLoopsKeepTheBound) {
-  Family plane("tight graphs, plane", 0.0), space("tight graphs, space", 0.0);
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    plane.Hold(Sample<Planar>(TightGraph(30, 6, kPlane, seed), seed), true);
-    space.Hold(Sample<Spatial>(TightGraph(45, 4, kSpace, seed), seed), true);
-  }
-  // loops of the same links: rcond is 1e-2 to 1e-6
-  plane.Finish();
-  space.Finish();
+  const auto draw = [](int n, SpaceKind space, std::uint64_t seed) {
+    return TightGraph(n, space == kPlane ? 6 : 4, space, seed);
+  };
+  Hold<Planar>("tight graphs, plane", Each({30}, 6), draw, true, 0.0);
+  Hold<Spatial>("tight graphs, space", Each({45}, 6), draw, true, 0.0);
 }
 
 }  // namespace

@@ -21,8 +21,6 @@ using Bits = std::vector<double>;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr int kMaxShown = 3;  ///< violations of one promise
-/// One with every kind of joint, one with drives, two without either.
-constexpr std::uint64_t kSeeds[] = {1, 2, 3, 4};
 
 /// Violations so far, the first of each promise in words.
 class Findings {
@@ -236,6 +234,10 @@ class Inspection {
     ExpectBelow(static_cast<double>(Largest(u() - ToReal(state_.u))),
                 projected ? Bound() * static_cast<double>(Largest(ToReal(state_.u))) : 0.0,
                 "speeds");
+    Bits again(y_.size());
+    own_->ToState(own_->q(), own_->u(), again);
+    again.resize(static_cast<std::size_t>(mechanism_.num_q()));
+    Expect(SameBits(again, y_), "speeds", "the state of the same positions has others");
   }
 
   /// From speeds that do not satisfy the loops.
@@ -258,7 +260,9 @@ class Inspection {
     for (std::size_t i = 0; i < off.size(); ++i) {
       off[i] += 1e-4 * std::sin(2.0 * static_cast<double>(i + 1));
     }
-    own_->BeginStep(0.0, std::span<double>(off));
+    const bool changed = own_->BeginStep(0.0, std::span<double>(off));
+    const auto& correction = own_->level().correction();
+    Expect(changed && correction.shift + correction.rotation > 0.0, "projection", "has no effect");
     own_->FromState(0.0, std::span<const double>(off));
     // rows of lengths and speeds of some metres, through as many bodies
     const double scale = 1.0 + static_cast<double>(q().norm() + u().norm());
@@ -266,6 +270,12 @@ class Inspection {
                 "projection");
     ExpectBelow(static_cast<double>(Largest(oracle_.ClosureRates(q(), u()))),
                 Bound() * scale * scale, "projection");
+    Bits again = off;
+    own_->BeginStep(0.0, std::span<double>(again));
+    double moved = 0.0;
+    for (std::size_t i = 0; i < off.size(); ++i)
+      moved = std::max(moved, std::abs(again[i] - off[i]));
+    ExpectBelow(moved, Bound() * scale, "projection");
   }
 
   void CheckEndings() {
@@ -274,7 +284,7 @@ class Inspection {
     const auto first_speed = static_cast<std::size_t>(mechanism_.num_q());
     for (const double bad :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-      for (const std::size_t i : {std::size_t{0}, first_speed, y_.size() - 1}) {
+      for (const std::size_t i : {std::size_t{0}, first_speed - 1, first_speed, y_.size() - 1}) {
         Bits y = y_;
         y[i] = bad;
         const Outcome outcome = Derivative(y);
@@ -298,19 +308,17 @@ class Inspection {
 };
 
 template <class Space>
-void Inspect(const harness::FormulationRow& row, Findings& findings) {
-  const SpaceKind space = Space::kRot == 1 ? SpaceKind::kPlanar : SpaceKind::kSpatial;
-  for (const std::uint64_t seed : kSeeds) {
-    const Sample<Space> sample(CoupledLoops(space, seed), seed);
-    for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-      Truth<Space> truth(sample, set);
-      for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity,
-                                      Enforcement::kPosition, Enforcement::kBaumgarte}) {
-        if (!row.Has(level)) continue;
-        for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
-          const FormulationOptions options{.enforcement = level, .solver = solver};
-          Inspection<Space>(row.name, options, truth, findings).Run();
-        }
+void Inspect(const harness::FormulationRow& row, const MechanismDescription& description,
+             std::uint64_t seed, Findings& findings) {
+  const Sample<Space> sample(description, seed);
+  for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
+    Truth<Space> truth(sample, set);
+    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity,
+                                    Enforcement::kPosition, Enforcement::kBaumgarte}) {
+      if (!row.Has(level)) continue;
+      for (const SolverKind solver : {SolverKind::kRankRevealing, SolverKind::kAsPublished}) {
+        const FormulationOptions options{.enforcement = level, .solver = solver};
+        Inspection<Space>(row.name, options, truth, findings).Run();
       }
     }
   }
@@ -318,14 +326,20 @@ void Inspect(const harness::FormulationRow& row, Findings& findings) {
 
 }  // namespace
 
-std::vector<std::string> Check(const std::string& formulation) {
+std::vector<std::string> Check(const std::string& formulation,
+                               const std::vector<std::uint64_t>& seeds, bool all_kinds) {
   const harness::FormulationRow* row = harness::FindFormulation(formulation);
   if (row == nullptr) {
     throw std::invalid_argument(fmt::format("no formulation \"{}\" is registered", formulation));
   }
   Findings findings;
-  Inspect<Planar>(*row, findings);
-  Inspect<Spatial>(*row, findings);
+  for (const std::uint64_t seed : seeds) {
+    Inspect<Planar>(*row, CoupledLoops(SpaceKind::kPlanar, seed), seed, findings);
+  }
+  for (const std::uint64_t seed : seeds) {
+    Inspect<Spatial>(*row, CoupledLoops(SpaceKind::kSpatial, seed), seed, findings);
+    if (all_kinds) Inspect<Spatial>(*row, LoopOfAllKinds(seed), seed, findings);
+  }
   return findings.Sentences();
 }
 

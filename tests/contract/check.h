@@ -3,6 +3,7 @@
 // needs no test framework.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,11 @@ namespace loopbench::contract {
 ///   endings           a state with NaN or infinity ends as non-finite or singular, and leaves
 ///                     nothing behind
 ///
+/// Each seed gives other mechanisms; `all_kinds` adds loops in space through joints of all kinds.
 /// Returns a sentence for each violation, the first few of each promise; none when all is kept.
 /// Some seconds. Throws std::invalid_argument for a name that is not registered.
-std::vector<std::string> Check(const std::string& formulation);
+std::vector<std::string> Check(const std::string& formulation,
+                               const std::vector<std::uint64_t>& seeds = {1, 2, 3, 4},
+                               bool all_kinds = false);
 
 }  // namespace loopbench::contract

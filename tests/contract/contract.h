@@ -57,6 +57,13 @@ inline std::vector<Case> AllCases() {
   return cases;
 }
 
+/// All cases for which `is_meant` is true.
+inline std::vector<Case> CasesThat(const auto& is_meant) {
+  std::vector<Case> cases = AllCases();
+  std::erase_if(cases, [&](const Case& c) { return !is_meant(c); });
+  return cases;
+}
+
 /// A formulation on a sample, started.
 template <class Space>
 struct Bench {

@@ -9,16 +9,10 @@ namespace {
 
 constexpr BaumgarteGains kGains{3.0, 4.0};  // different, so that neither stands in for the other
 
-std::vector<Case> BaumgarteCases() {
-  std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kBaumgarte; });
-  for (Case& c : cases) c.gains = kGains;
-  return cases;
-}
-
-std::vector<Case> CasesWithoutGains() {
-  std::vector<Case> cases = BaumgarteCases();
-  for (Case& c : cases) c.gains.reset();
+std::vector<Case> BaumgarteCases(std::optional<BaumgarteGains> gains) {
+  std::vector<Case> cases =
+      CasesThat([](const Case& c) { return c.enforcement == Enforcement::kBaumgarte; });
+  for (Case& c : cases) c.gains = gains;
   return cases;
 }
 
@@ -127,9 +121,9 @@ TEST_P(BaumgarteGainsTest, FollowTheLongestStep) {
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(Baumgarte, BaumgarteContractTest, ::testing::ValuesIn(BaumgarteCases()),
-                         NameOf);
-INSTANTIATE_TEST_SUITE_P(Baumgarte, BaumgarteGainsTest, ::testing::ValuesIn(CasesWithoutGains()),
+INSTANTIATE_TEST_SUITE_P(Baumgarte, BaumgarteContractTest,
+                         ::testing::ValuesIn(BaumgarteCases(kGains)), NameOf);
+INSTANTIATE_TEST_SUITE_P(Baumgarte, BaumgarteGainsTest, ::testing::ValuesIn(BaumgarteCases({})),
                          NameOf);
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What the levels velocity and position owe on top of the contract: states on the constraints.
+// What level position owes on top of the contract.
 #include <cmath>
 
 #include "tests/contract/contract.h"
@@ -6,73 +6,12 @@
 namespace loopbench::testing {
 namespace {
 
-std::vector<Case> VelocityCases() {
-  std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kVelocity; });
-  return cases;
-}
+bool IsAtPosition(const Case& c) { return c.enforcement == Enforcement::kPosition; }
 
-std::vector<Case> PositionCases() {
-  std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [](const Case& c) { return c.enforcement != Enforcement::kPosition; });
-  return cases;
-}
+bool HasImpulses(const Case& c) { return IsAtPosition(c) && c.formulation != "reduction"; }
 
-std::vector<Case> ImpulseCases() {
-  std::vector<Case> cases = PositionCases();
-  std::erase_if(cases, [](const Case& c) { return std::string(c.formulation) == "reduction"; });
-  return cases;
-}
-
-class VelocityContractTest : public ContractTest {};
 class PositionContractTest : public ContractTest {};
 class ImpulseContractTest : public ContractTest {};
-
-TEST_P(VelocityContractTest, SpeedsSatisfyTheLoops) {
-  Run(Description(6), 6, [&](auto bench) {
-    std::vector<double> off = bench.y;
-    for (std::size_t i = bench.mechanism.num_q(); i < off.size(); ++i) off[i] += 0.1;
-    ASSERT_EQ(bench.Examine(off), Outcome::kFinished);
-    Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-    const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-    const RealMatrix J = oracle.Form(q, u).J;
-    const Real at_rest = oracle.ClosureRates(q, 0 * u).template lpNorm<Eigen::Infinity>();
-    const Real scale =
-        at_rest + J.cwiseAbs().rowwise().sum().maxCoeff() * u.template lpNorm<Eigen::Infinity>();
-    EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(), bench.Bound() * scale);
-  });
-}
-
-/// Seeds 6 and 10 have prescribed motions.
-TEST_P(PositionContractTest, AcceptedStepsAreProjectedToTheConstraints) {
-  const auto hold = [&](const MechanismDescription& description, std::uint64_t seed) {
-    Run(description, seed, [&](auto bench) {
-      for (std::size_t i = 0; i < bench.y.size(); ++i) {
-        bench.y[i] += 1e-4 * std::sin(2.0 * static_cast<double>(i + 1));
-      }
-      ASSERT_TRUE(bench.formulation->BeginStep(0.0, std::span<double>(bench.y)));
-      const auto& correction = bench.formulation->level().correction();
-      EXPECT_GT(correction.shift + correction.rotation, 0.0);
-      Oracle oracle(bench.sample.description(), LayoutOf(bench.mechanism));
-      const RealVector q = ToReal(bench.formulation->q()), u = ToReal(bench.formulation->u());
-      // rows of lengths and speeds of some metres, through as many bodies
-      const double scale = 1.0 + static_cast<double>(q.norm() + u.norm());
-      EXPECT_LE(oracle.ClosureMismatches(q).template lpNorm<Eigen::Infinity>(),
-                bench.Bound() * scale);
-      EXPECT_LE(oracle.ClosureRates(q, u).template lpNorm<Eigen::Infinity>(),
-                bench.Bound() * scale * scale);
-      // once more: nothing is left to do
-      const std::vector<double> first = bench.y;
-      bench.formulation->BeginStep(0.0, std::span<double>(bench.y));
-      for (std::size_t i = 0; i < first.size(); ++i) {
-        EXPECT_NEAR(bench.y[i], first[i], bench.Bound() * scale);
-      }
-    });
-  };
-  for (std::uint64_t seed : {5, 6, 8, 10}) hold(Description(seed), seed);
-  if (GetParam().space == SpaceKind::kPlanar) return;
-  for (std::uint64_t seed : {1, 2, 3}) hold(LoopOfAllKinds(seed), seed);
-}
 
 /// The last stage of a step, its projection and the next evaluation share what belongs to the same
 /// positions, and nothing comes out differently for it.
@@ -126,12 +65,10 @@ TEST_P(ImpulseContractTest, SpeedsChangeByImpulsesOfConstraints) {
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(PositionLevel, PositionContractTest, ::testing::ValuesIn(PositionCases()),
-                         NameOf);
-INSTANTIATE_TEST_SUITE_P(PositionLevel, ImpulseContractTest, ::testing::ValuesIn(ImpulseCases()),
-                         NameOf);
-INSTANTIATE_TEST_SUITE_P(VelocityLevel, VelocityContractTest, ::testing::ValuesIn(VelocityCases()),
-                         NameOf);
+INSTANTIATE_TEST_SUITE_P(PositionLevel, PositionContractTest,
+                         ::testing::ValuesIn(CasesThat(IsAtPosition)), NameOf);
+INSTANTIATE_TEST_SUITE_P(PositionLevel, ImpulseContractTest,
+                         ::testing::ValuesIn(CasesThat(HasImpulses)), NameOf);
 
 }  // namespace
 }  // namespace loopbench::testing

@@ -9,6 +9,22 @@ namespace loopbench::testing {
 
 namespace {
 
+/// A bar that hangs from the tip of a body.
+int Append(Builder& b, JointType type, int parent) {
+  const int body = b.AddBody(1.0);
+  const Eigen::Vector3d at = b.Tip();
+  b.AddJoint(type, parent, at, body, b.random.Vector(0.2, b.spatial), b.random.Uniform(-2.0, 2.0));
+  return body;
+}
+
+/// A body on a joint within `size` of both centres.
+void HangAnywhere(Builder& b, JointType type, int parent, double size) {
+  const Eigen::Vector3d at_parent = b.random.Vector(size, b.spatial);
+  const int body = b.AddBody(1.0);
+  b.AddJoint(type, parent, at_parent, body, b.random.Vector(size, b.spatial),
+             b.random.Uniform(-2.0, 2.0));
+}
+
 /// A branch of n bars from a body; the last bar.
 int Grow(Builder& b, int root, int n) {
   for (int i = 0; i < n; ++i) {
@@ -38,10 +54,7 @@ MechanismDescription DrawGraph(int n, int loops, SpaceKind space, std::uint64_t 
     const JointType type = draw < 0.65   ? JointType::kRevolute
                            : draw < 0.95 ? JointType::kPrismatic
                                          : JointType::kWeld;
-    const Eigen::Vector3d at_parent = b.random.Vector(0.7, b.spatial);
-    const int body = b.AddBody(1.0);
-    b.AddJoint(type, parent, at_parent, body, b.random.Vector(0.7, b.spatial),
-               b.random.Uniform(-2.0, 2.0));
+    HangAnywhere(b, type, parent, 0.7);
   }
   for (int tries = 0, closed = 0; tries < 1000 && closed < loops; ++tries) {
     const int to = 1 + b.random.Below(n), from = b.random.Below(n + 1);
@@ -109,10 +122,7 @@ MechanismDescription RandomTree(int n, SpaceKind space, std::uint64_t seed) {
                            : draw < 0.95 ? JointType::kWeld
                                          : JointType::kFree;
     const int parent = b.random.Below(i);
-    const Eigen::Vector3d at_parent = b.random.Vector(1.0, b.spatial);
-    const int body = b.AddBody(1.0);
-    b.AddJoint(type, parent, at_parent, body, b.random.Vector(1.0, b.spatial),
-               b.random.Uniform(-2.0, 2.0));
+    HangAnywhere(b, type, parent, 1.0);
   }
   b.AddBody(1.0);
   return b.Finish();
@@ -149,12 +159,8 @@ MechanismDescription MixedGraph(int loops, SpaceKind space, std::uint64_t seed, 
     for (int freedom = 0; freedom < least_freedom;) {
       const JointType type = any();
       if (type == JointType::kRod) continue;  // not in a tree
-      const int body = b.AddBody(1.0);
-      const Eigen::Vector3d at = b.Tip();
-      b.AddJoint(type, root, at, body, b.random.Vector(0.2, b.spatial),
-                 b.random.Uniform(-2.0, 2.0));
+      root = Append(b, type, root);
       freedom += NumValues(type, space, true);
-      root = body;
     }
     return root;
   };
@@ -194,10 +200,7 @@ MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind sp
     JointType type = AnyJoint(b, kinds);
     while (type == JointType::kRod) type = AnyJoint(b, kinds);  // not in a tree
     const int parent = b.random.Chance(0.6) ? i - 1 : b.random.Below(i);
-    const Eigen::Vector3d at_parent = b.random.Vector(0.7, b.spatial);
-    const int body = b.AddBody(1.0);
-    b.AddJoint(type, parent, at_parent, body, b.random.Vector(0.7, b.spatial),
-               b.random.Uniform(-2.0, 2.0));
+    HangAnywhere(b, type, parent, 0.7);
   }
   for (int k = 0; k < closures; ++k) {
     const int to = 1 + b.random.Below(n), from = (to + 1 + b.random.Below(n)) % (n + 1);
@@ -230,6 +233,41 @@ MechanismDescription RandomLadder(int n, SpaceKind space, std::uint64_t seed) {
       b.Close(JointType::kRevolute, crank, coupler, tip(), 0.0);
     }
     last = crank;
+  }
+  return b.Finish();
+}
+
+MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed) {
+  Builder b("every-kind-" + std::to_string(n), space, seed);
+  std::vector<JointType> kinds;
+  for (int k = 0; k < std::ssize(AllJointTraits()); ++k) {
+    const auto type = static_cast<JointType>(k);
+    if (type == JointType::kFree || type == JointType::kRod) continue;
+    if (b.spatial || TraitsOf(type).in_plane) kinds.push_back(type);
+  }
+  int last = 0;
+  for (int i = 0; i < n; ++i) last = Append(b, kinds[i % kinds.size()], last);
+  b.Close(JointType::kRevolute, 0, last, b.Tip(), 0.0);
+  b.Close(JointType::kRod, n / 2 - 4, n / 2 + 4, b.Tip(), 0.0);
+  Append(b, JointType::kFree, last);
+  return b.Finish();
+}
+
+MechanismDescription NestedLoops(int loops, SpaceKind space, std::uint64_t seed) {
+  Builder b("nested-" + std::to_string(loops), space, seed);
+  const int half = b.spatial ? 9 : 3;
+  int from_left = 0, from_right = 0;
+  for (int i = 0; i < loops; ++i) {
+    int left = from_left, right = from_right;
+    for (int k = 0; k < half; ++k) {
+      left = Append(b, JointType::kRevolute, left);
+      right = Append(b, JointType::kRevolute, right);
+      if (k == half / 2) {
+        from_left = left;
+        from_right = right;
+      }
+    }
+    b.Close(JointType::kRevolute, left, right, b.Tip(), b.random.Uniform(-1.0, 1.0));
   }
   return b.Finish();
 }

@@ -78,6 +78,16 @@ MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint
 MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind space,
                                   std::uint64_t seed, DrawnKinds kinds = DrawnKinds::kUpToHelical);
 
+/// Chain of n bodies through all kinds of joints in turn, those that the space has, closed to
+/// Ground by a revolute joint at its end; one more body floats beyond the last on a free joint.
+MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed);
+
+/// Loops inside loops: the first is closed on Ground, each further one has its ends on the two
+/// branches of the one before, half way along, and is made of two new branches of revolute joints
+/// that meet at their tips. A loop shares bodies with the one around and the one inside. It has
+/// 6 new bodies in the plane, 18 in space.
+MechanismDescription NestedLoops(int loops, SpaceKind space, std::uint64_t seed);
+
 /// A state of a mechanism: (q, u) in its own coordinates, rounded to double.
 struct State {
   VectorX<double> q, u;

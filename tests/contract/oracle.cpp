@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 
-#include "tests/contract/oracle_geometry.h"
+#include "tests/contract/oracle_parts.h"
 
 namespace loopbench::testing {
 

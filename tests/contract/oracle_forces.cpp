@@ -1,6 +1,6 @@
 // Forces of the oracle: every point of application and every distance is a jet along the curve, so
 // that velocities are differentiated positions.
-#include "tests/contract/oracle_geometry.h"
+#include "tests/contract/oracle_parts.h"
 #include "tests/contract/time_oracle.h"
 
 namespace loopbench::testing {

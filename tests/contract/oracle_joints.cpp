@@ -1,8 +1,8 @@
 // Kinds of joints: their transforms and what is zero while they hold.
-#include "tests/contract/oracle_joints.h"
-
 #include <array>
 #include <cmath>
+
+#include "tests/contract/oracle_parts.h"
 
 namespace loopbench::testing {
 

@@ -2,7 +2,7 @@
 #include <Eigen/Geometry>
 #include <optional>
 
-#include "tests/contract/oracle_joints.h"
+#include "tests/contract/oracle_parts.h"
 #include "tests/contract/time_oracle.h"
 
 namespace loopbench::testing {

@@ -47,9 +47,8 @@ class WholeMatrix final : public ConstraintSolver<Space, S> {
 
 /// Multipliers of the project are the other side: the same mathematics, level by level.
 std::vector<Case> LagrangeCases() {
-  std::vector<Case> cases = AllCases();
-  std::erase_if(cases, [](const Case& c) {
-    return std::string(c.formulation) != "lagrange" || c.solver == SolverKind::kRankRevealing;
+  std::vector<Case> cases = CasesThat([](const Case& c) {
+    return c.formulation == "lagrange" && c.solver == SolverKind::kAsPublished;
   });
   for (Case& c : cases) {
     if (c.enforcement == Enforcement::kBaumgarte) c.gains = BaumgarteGains{3.0, 4.0};

@@ -29,4 +29,14 @@ inline VectorX<double> RandomNumbers(Random& random, Eigen::Index count) {
   return numbers;
 }
 
+/// Coordinates of a ladder whose cranks are at `angle`.
+inline VectorX<double> LadderAt(const Mechanism<Planar, double>& mechanism, double angle) {
+  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
+  for (const TreeStep& step : mechanism.tree()) {
+    const bool is_crank = step.parent == kGround;
+    q[mechanism.joints()[step.joint].q_offset] = is_crank ? angle : -angle;
+  }
+  return q;
+}
+
 }  // namespace loopbench::testing

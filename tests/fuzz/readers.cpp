@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -50,23 +51,27 @@ void CheckMessage(const std::string& message) {
   }
 }
 
+/// Returns true if the reader accepts its input.
 template <class Refusal, class Read>
-void Call(Read read) {
+bool Call(Read read) {
   try {
     read();
+    return true;
   } catch (const Refusal& refusal) {
     CheckMessage(refusal.what());
+    return false;
   }
 }
 
 /// `bytes` as a file, for readers that take its path.
 template <class Refusal, class Read>
-void CallOnFile(std::string_view bytes, std::string_view extension, Read read) {
+bool CallOnFile(std::string_view bytes, std::string_view extension, Read read) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / fmt::format("fuzzed-{}{}", ::getpid(), extension);
   std::ofstream(file, std::ios::binary) << bytes;
-  Call<Refusal>([&] { read(file); });
+  const bool is_accepted = Call<Refusal>([&] { read(file); });
   std::filesystem::remove(file);
+  return is_accepted;
 }
 
 void ReadStore(const std::filesystem::path& file) {
@@ -75,45 +80,70 @@ void ReadStore(const std::filesystem::path& file) {
   for (const std::string& warning : warnings) CheckMessage(warning);
 }
 
+/// Times are finite, and messages name the file.
+void ReadMeasurement(std::string_view bytes) {
+  try {
+    for (const harness::Record& record : harness::ParseBenchmarkJson(bytes, "b.json")) {
+      for (const double time : record.Numbers("series.cpu_ns")) {
+        if (!(time >= 0.0) || std::isinf(time)) throw std::logic_error("a time that is none");
+      }
+    }
+  } catch (const harness::ConfigError& refusal) {
+    if (std::string_view(refusal.what()).starts_with("b.json:")) throw;
+    throw std::logic_error(std::string("no file in ") + refusal.what());
+  }
+}
+
 }  // namespace
 
-void CallReader(std::string_view kind, std::string_view bytes) {
+bool CallReader(std::string_view kind, std::string_view bytes) {
   using harness::ConfigError;
   if (kind == "mechanism") {
-    Call<ConfigError>([bytes] { harness::ParseMechanism(bytes, "m.json"); });
-  } else if (kind == "experiment") {
-    Call<ConfigError>(
+    return Call<ConfigError>([bytes] { harness::ParseMechanism(bytes, "m.json"); });
+  }
+  if (kind == "experiment") {
+    return Call<ConfigError>(
         [bytes] { harness::ParseExperiments(bytes, "configs/experiments/paper/fuzz.json"); });
-  } else if (kind == "claim") {
-    Call<ConfigError>([bytes] { harness::ParseClaims(bytes, "claims.json"); });
-  } else if (kind == "map") {
-    Call<ConfigError>([bytes] { harness::ParseMapRules(bytes, "map.json"); });
-  } else if (kind == "benchmark") {
-    Call<ConfigError>([bytes] { harness::ParseBenchmarks(bytes, "configs/benchmarks/fuzz.json"); });
-  } else if (kind == "measurement") {
-    Call<std::runtime_error>([bytes] { harness::ParseBenchmarkJson(bytes, "b.json"); });
-  } else if (kind == "record") {
-    Call<std::runtime_error>([bytes] { harness::FromJsonLine(bytes); });
+  }
+  if (kind == "claim") {
+    return Call<ConfigError>([bytes] { harness::ParseClaims(bytes, "claims.json"); });
+  }
+  if (kind == "map") {
+    return Call<ConfigError>([bytes] { harness::ParseMapRules(bytes, "map.json"); });
+  }
+  if (kind == "benchmark") {
+    return Call<ConfigError>(
+        [bytes] { harness::ParseBenchmarks(bytes, "configs/benchmarks/fuzz.json"); });
+  }
+  if (kind == "measurement") {
+    return Call<ConfigError>([bytes] { ReadMeasurement(bytes); });
+  }
+  if (kind == "record") {
     harness::IsTornRecord(bytes);
-  } else if (kind == "store") {
-    CallOnFile<std::runtime_error>(bytes, ".jsonl", ReadStore);
-  } else if (kind == "import") {
-    Call<ConfigError>([bytes] { harness::ImportText(bytes, "m.xml"); });
-  } else if (kind == "sidecar") {
-    CallOnFile<ConfigError>(bytes, ".json", [](const std::filesystem::path& file) {
+    return Call<std::runtime_error>([bytes] { harness::FromJsonLine(bytes); });
+  }
+  if (kind == "store") {
+    return CallOnFile<std::runtime_error>(bytes, ".jsonl", ReadStore);
+  }
+  if (kind == "import") {
+    return Call<ConfigError>([bytes] { harness::ImportText(bytes, "m.xml"); });
+  }
+  if (kind == "sidecar") {
+    return CallOnFile<ConfigError>(bytes, ".json", [](const std::filesystem::path& file) {
       harness::ImportOptions options;
       options.sidecar = file;
       harness::ImportMechanism("configs/imports/furuta.sdf", options);
     });
-  } else if (kind == "series") {
-    CallOnFile<ConfigError>(bytes, ".json", [](const std::filesystem::path& file) {
+  }
+  if (kind == "series") {
+    return CallOnFile<ConfigError>(bytes, ".json", [](const std::filesystem::path& file) {
       harness::ReadPublishedSeries(file);
     });
-  } else if (kind == "trajectory") {
-    CallOnFile<std::runtime_error>(bytes, ".csv", harness::ReadTrajectory);
-  } else {
-    throw std::logic_error("no reader of this kind");
   }
+  if (kind == "trajectory") {
+    return CallOnFile<std::runtime_error>(bytes, ".csv", harness::ReadTrajectory);
+  }
+  throw std::logic_error("no reader of this kind");
 }
 
 }  // namespace loopbench::fuzz

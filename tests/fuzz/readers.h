@@ -17,7 +17,8 @@ inline constexpr std::array<std::string_view, 12> kKinds = {
     "mechanism", "experiment", "claim",  "map",     "benchmark", "measurement",
     "record",    "store",      "import", "sidecar", "series",    "trajectory"};
 
-/// Throws std::logic_error when a message is not fit to be shown, and for an unknown kind.
-void CallReader(std::string_view kind, std::string_view bytes);
+/// Returns true if the reader accepts the bytes. Throws std::logic_error for a message that is not
+/// fit to be shown, and for an unknown kind.
+bool CallReader(std::string_view kind, std::string_view bytes);
 
 }  // namespace loopbench::fuzz

@@ -13,7 +13,7 @@
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/generate/generated.h"
-#include "harness/generate/print_c.h"
+#include "harness/generate/record.h"
 #include "harness/run/run.h"
 #include "harness/run/timing.h"
 #include "mechanism/algebra/lanes.h"

@@ -9,6 +9,7 @@
 
 #include "harness/base/text.h"
 #include "harness/judge/judge.h"
+#include "tests/harness/records.h"
 
 namespace loopbench::harness {
 namespace claims_test {
@@ -16,27 +17,16 @@ namespace claims_test {
 const std::filesystem::path kClaimsFile =
     std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "configs/experiments/paper/claims.json";
 
-testing::AssertionResult Contains(const std::string& text, const std::string& part) {
-  return testing::IsSubstring("part", "text", part, text);
-}
-
 Record RunOf(const std::string& mechanism, const std::string& measure, double value,
              const std::string& outcome = "finished") {
-  Record record;
-  record.Set("mechanism", mechanism);
-  record.Set("outcome", outcome);
-  record.Set(measure, value);
-  return record;
+  return RecordOf("mechanism", mechanism, "outcome", outcome, measure, value);
 }
 
 Check DriftCheck(const std::string& mechanism) {
   Check check;
   check.label = mechanism + " problem";
   check.select = {{"mechanism", {mechanism}}};
-  check.demand.measure = "drift";
-  check.statistic = Statistic::kMax;
-  check.demand.relation = Relation::kAtMost;
-  check.demand.number = 1e-12;
+  check.demand = {.measure = "drift", .relation = Relation::kAtMost, .number = 1e-12};
   return check;
 }
 
@@ -69,7 +59,7 @@ TEST(Claims, AMissingConditionIsNeverSilentlyTrue) {
   const ClaimResult half = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1e-14)});
   EXPECT_EQ(half.verdict, Verdict::kOnlyUnder);
   EXPECT_EQ(half.text, "partially reproduced: square problem. Not measured: general problem");
-  EXPECT_TRUE(Contains(half.checks[1].reason, "no record of mechanism=general"));
+  ExpectWords(half.checks[1].reason, {"no record of mechanism=general"});
   const ClaimResult bad = Evaluate(rule, std::vector<Record>{RunOf("square", "drift", 1.0)});
   EXPECT_EQ(bad.text, "not reproduced. Not measured: general problem");
 }
@@ -82,11 +72,8 @@ TEST(Claims, AFailedRunFailsTheCheckAndAMissingValueLeavesItUndecided) {
   CheckResult result = Evaluate(check, records);
   EXPECT_EQ(result.state, CheckState::kFails);
   EXPECT_EQ(result.reason, "1 of 2 runs did not finish");
-  Record without;
-  without.Set("mechanism", std::string("square"));
-  without.Set("outcome", std::string("finished"));
-  Record null = without;
-  null.Set("drift", Value());
+  Record without = RecordOf("mechanism", "square", "outcome", "finished");
+  Record null = Changed(without, "drift", Value());
   for (const Record& other :
        {RunOf("square", "drift", std::numeric_limits<double>::quiet_NaN()),
         RunOf("square", "drift", std::numeric_limits<double>::infinity()), null, without}) {
@@ -116,23 +103,20 @@ TEST(Claims, AFailedRunFailsTheCheckAndAMissingValueLeavesItUndecided) {
 }
 
 TEST(Claims, ARunThatFailedBeforeItsFirstMeasureStillFailsTheCheck) {
-  Record crashed;
-  crashed.Set("mechanism", std::string("square"));
-  crashed.Set("outcome", std::string("inconsistent-start"));
-  EXPECT_EQ(Evaluate(DriftCheck("square"), std::vector<Record>{crashed}).state, CheckState::kFails);
+  const Record crashed = RecordOf("mechanism", "square", "outcome", "inconsistent-start");
+  EXPECT_EQ(Evaluate(DriftCheck("square"), std::vector{crashed}).state, CheckState::kFails);
 }
 
 TEST(Claims, RecordsOfAnotherKindDoNotCount) {
-  const std::vector<Record> records = {RunOf("square", "rhs_ns_median", 100.0)};
-  EXPECT_EQ(Evaluate(DriftCheck("square"), records).state, CheckState::kNotMeasured);
+  EXPECT_EQ(
+      Evaluate(DriftCheck("square"), std::vector{RunOf("square", "rhs_ns_median", 100.0)}).state,
+      CheckState::kNotMeasured);
 }
 
 TEST(Claims, OutcomesAreExaminedWhereTheCheckAsksForThem) {
   Check check = DriftCheck("square");
-  check.demand.measure = "outcome";
   check.statistic = Statistic::kAll;
-  check.demand.relation = Relation::kIsNot;
-  check.demand.word = "singular";
+  check.demand = {.measure = "outcome", .relation = Relation::kIsNot, .word = "singular"};
   std::vector<Record> records = {RunOf("square", "drift", 1.0),
                                  RunOf("square", "drift", 1.0, "time-limit")};
   CheckResult result = Evaluate(check, records);
@@ -147,8 +131,7 @@ TEST(Claims, OutcomesAreExaminedWhereTheCheckAsksForThem) {
 TEST(Claims, AnExpectedFailureHoldsForFailedRunsAndForBadNumbers) {
   Check check = DriftCheck("square");
   check.statistic = Statistic::kAll;
-  check.demand.relation = Relation::kAtLeast;
-  check.demand.number = 0.1;
+  check.demand = {.measure = "drift", .relation = Relation::kAtLeast, .number = 0.1};
   check.failed_runs_hold = true;
   std::vector<Record> records = {RunOf("square", "drift", 0.0, "singular")};
   EXPECT_EQ(Evaluate(check, records).state, CheckState::kHolds);
@@ -162,9 +145,8 @@ TEST(Claims, AnExpectedFailureHoldsForFailedRunsAndForBadNumbers) {
 TEST(Claims, AMeanWithinItsToleranceMustAlsoBeResolved) {
   Check check = DriftCheck("square");
   check.statistic = Statistic::kMean;
-  check.demand.relation = Relation::kWithin;
-  check.demand.number = 2.0;
-  check.demand.tolerance = 0.15;
+  check.demand = {
+      .measure = "drift", .relation = Relation::kWithin, .number = 2.0, .tolerance = 0.15};
   check.require = {{"growth_resolved", {"true"}}};
   std::vector<Record> records = {RunOf("square", "drift", 1.8), RunOf("square", "drift", 2.1)};
   for (Record& record : records) record.Set("growth_resolved", true);
@@ -220,15 +202,15 @@ TEST(Claims, FlaggedRunsAndUnknownRequiredKeysAreNamed) {
 TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
   Check check = DriftCheck("ladder-1000");
   check.relative_to = {{"mechanism", {"ladder-100"}}};
-  check.demand.measure = "rhs_ns_median";
-  check.demand.number = 12.0;
+  check.demand = {.measure = "rhs_ns_median", .number = 12.0};
   const auto state = [&](double slower, double ratio, double calibration) {
     std::vector<Record> records = {RunOf("ladder-100", "rhs_ns_median", 1e5 * slower),
                                    RunOf("ladder-1000", "rhs_ns_median", 1e5 * ratio)};
     records[0].Set("calibration_ns", 7000.0 * calibration);
     records[1].Set("calibration_ns", 7000.0);
     const CheckResult result = Evaluate(check, records);
-    EXPECT_EQ(result.state == CheckState::kNotMeasured, Contains(result.reason, "calibration_ns"));
+    EXPECT_EQ(result.state == CheckState::kNotMeasured,
+              result.reason.find("calibration_ns") != std::string::npos);
     return result.state;
   };
   EXPECT_EQ(state(1.0, 11.0, 1.0), CheckState::kHolds);
@@ -238,9 +220,8 @@ TEST(Claims, AMachineOfTwoSpeedsDecidesNoRatioOfTimes) {
   EXPECT_EQ(state(1.5, 11.0, 1.5), CheckState::kHolds) << "at any of the two speeds";
   EXPECT_EQ(state(1.5, 30.0, 1.5), CheckState::kFails);
   EXPECT_EQ(state(1.0, 11.0, std::numeric_limits<double>::quiet_NaN()), CheckState::kHolds);
-  check.demand.relation = Relation::kWithin;
-  check.demand.number = 10.0;
-  check.demand.tolerance = 1.0;
+  check.demand = {
+      .measure = "rhs_ns_median", .relation = Relation::kWithin, .number = 10.0, .tolerance = 1.0};
   EXPECT_EQ(state(1.0, 10.0, 1.0), CheckState::kHolds);
   EXPECT_EQ(state(1.2, 12.0, 1.2), CheckState::kNotMeasured) << "what holds between both ends";
 }
@@ -249,15 +230,13 @@ TEST(ClaimsReport, EveryCheckShowsNumbersThresholdAndRows) {
   const std::vector<ClaimResult> results = {
       Evaluate(TwoProblems(), std::vector<Record>{RunOf("square", "drift", 1e-14)})};
   const std::string markdown = ClaimsMarkdown(results, {"command: loopbench run"});
-  EXPECT_TRUE(Contains(markdown, "| two | section 4.1 | Drift is small. | partially reproduced |"));
-  EXPECT_TRUE(Contains(markdown,
-                       "| square problem | holds | 1e-14 (1e-14 .. 1e-14) | max drift <= 1e-12 "
-                       "| 1 |  |"));
-  EXPECT_TRUE(
-      Contains(markdown, "| general problem | not measured |  | max drift <= 1e-12 | 0 | "));
-  EXPECT_TRUE(Contains(markdown, "\n\ncommand: loopbench run\n"));
-  EXPECT_TRUE(Contains(
-      markdown, "**Verdict: partially reproduced: square problem. Not measured: general problem"));
+  ExpectWords(markdown,
+              {"| two | section 4.1 | Drift is small. | partially reproduced |",
+               "| square problem | holds | 1e-14 (1e-14 .. 1e-14) | max drift <= 1e-12 "
+               "| 1 |  |",
+               "| general problem | not measured |  | max drift <= 1e-12 | 0 | ",
+               "\n\ncommand: loopbench run\n",
+               "**Verdict: partially reproduced: square problem. Not measured: general problem"});
 }
 
 TEST(ClaimsReader, NoClaimsAreAMistake) {
@@ -270,19 +249,13 @@ TEST(ClaimsReader, MistakesAreReportedTogetherWithTheirPlaces) {
      "compare": "<=", "threshold": "small", "tolerance": 1},
     {"label": "x", "select": {}, "measure": "m", "statistic": "max", "compare": "is",
      "word": "finished", "treshold": 1}]}]})";
-  std::string message;
-  try {
-    ParseClaims(text, "rules.json");
-  } catch (const ConfigError& error) {
-    message = error.what();
-  }
-  EXPECT_TRUE(Contains(message, "/claims/0/checks/0/select/rtol/1: found"));
-  EXPECT_TRUE(Contains(message, "/checks/0/statistic: found \"maximum\""));
-  EXPECT_TRUE(Contains(message, "/checks/0/threshold: found \"small\", expected a number"));
-  EXPECT_TRUE(Contains(message, "/checks/0/tolerance: found 1, expected no \"tolerance\""));
-  EXPECT_TRUE(Contains(message, "/checks/1/treshold: found unknown key"));
-  EXPECT_TRUE(Contains(message, "/checks/1/statistic: found \"max\", expected \"all\" or \"any\""));
-  EXPECT_TRUE(Contains(message, "/checks/1/label: found \"x\", expected each name once"));
+  ExpectWords(MessageOf([&] { ParseClaims(text, "rules.json"); }),
+              {"/claims/0/checks/0/select/rtol/1: found", "/checks/0/statistic: found \"maximum\"",
+               "/checks/0/threshold: found \"small\", expected a number",
+               "/checks/0/tolerance: found 1, expected no \"tolerance\"",
+               "/checks/1/treshold: found unknown key",
+               "/checks/1/statistic: found \"max\", expected \"all\" or \"any\"",
+               "/checks/1/label: found \"x\", expected each name once"});
 }
 
 TEST(ClaimsReader, TheSelectionOfARuleJoinsThatOfEveryCheck) {
@@ -301,9 +274,7 @@ TEST(ClaimsReader, TheSelectionOfARuleJoinsThatOfEveryCheck) {
 
 // A record that the check selects, with the same value everywhere.
 Record Planted(const Selection& selection, const Check& check, double value) {
-  Record record;
-  record.Set("outcome", std::string("finished"));
-  record.Set("growth_resolved", true);
+  Record record = RecordOf("outcome", "finished", "growth_resolved", true);
   for (const auto& [key, values, op] : selection) record.Set(key, values.front());
   if (check.demand.measure != "outcome") record.Set(check.demand.measure, value);
   return record;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -37,6 +38,40 @@ inline constexpr const char* kTinyClaims = R"({"claims": [{
   "wording": {"reproduced": "It is.", "not_reproduced": "It is not.", "partially_reproduced": "In part."}
 }]})";
 
+/// Returns a text with its first `from` replaced.
+inline std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t place = text.find(from);
+  if (place == std::string::npos) throw std::runtime_error("no <" + from + "> in " + text);
+  return text.replace(place, from.size(), to);
+}
+
+/// Returns kTinyExperiment with further sections.
+inline std::string TinyWith(const std::string& sections) {
+  return Replaced(kTinyExperiment, "\"timing\"", sections + ", \"timing\"");
+}
+
+inline std::size_t CountOf(const std::string& text, const std::string& word) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; ++at) ++count;
+  return count;
+}
+
+inline void ExpectEnding(const Ending& ending, int code, const std::vector<std::string>& words) {
+  EXPECT_EQ(ending.code, code) << ending.text;
+  ExpectWords(ending.text, words);
+}
+
+/// Returns the names in a folder, in order; none if it is missing.
+inline std::vector<std::string> NamesIn(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code missing;
+  for (const auto& entry : fs::directory_iterator(folder, missing)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
 /// A folder with a mechanism, an experiment and claims; the program runs in it.
 class CommandLineTest : public testing::Test {
  protected:
@@ -58,10 +93,7 @@ class CommandLineTest : public testing::Test {
 
   /// Writes four-bar.json with its first `from` replaced.
   void EditMechanism(const std::string& from, const std::string& to) const {
-    std::string text = mechanism_;
-    const std::size_t place = text.find(from);
-    ASSERT_NE(place, std::string::npos) << from;
-    Write("four-bar.json", text.replace(place, from.size(), to));
+    Write("four-bar.json", Replaced(mechanism_, from, to));
   }
 
   Ending Call(const std::string& arguments, const std::string& before = "") const {
@@ -78,26 +110,15 @@ class CommandLineTest : public testing::Test {
     return ending;
   }
 
+  /// Calls the program; checks its exit code and words of its output.
+  void Expect(const std::string& arguments, int code, const std::vector<std::string>& words = {},
+              const std::string& before = "") const {
+    SCOPED_TRACE(before + " " + arguments);
+    ExpectEnding(Call(arguments, before), code, words);
+  }
+
   fs::path folder_;
   std::string mechanism_;
 };
-
-/// The message of the std::runtime_error that `action` throws.
-inline std::string ErrorOf(const auto& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-inline void ExpectEnding(const Ending& ending, int code, const std::vector<std::string>& words) {
-  EXPECT_EQ(ending.code, code) << ending.text;
-  for (const std::string& word : words) {
-    EXPECT_NE(ending.text.find(word), std::string::npos) << "no <" << word << "> in\n"
-                                                         << ending.text;
-  }
-}
 
 }  // namespace loopbench::harness

@@ -1,8 +1,4 @@
 // History through the program: a folder or a branch, steps, pages, and as the base of a comparison.
-#include <gtest/gtest.h>
-
-#include <string>
-
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -21,7 +17,7 @@ class CommandLineHistory : public CommandLineTest {
                 "export HOME='" + folder_.string() + "' GIT_CONFIG_NOSYSTEM=1; " + command + " &&");
   }
   void Run(const std::string& name, const std::string& more = "") const {
-    ExpectEnding(Call("run tiny.json --no-timing --out " + name + " " + more), 0, {});
+    Expect("run tiny.json --no-timing --out " + name + " " + more, 0);
   }
   void Commit(const std::string& message) const {
     const Ending ending = Shell(
@@ -33,9 +29,9 @@ class CommandLineHistory : public CommandLineTest {
 };
 
 TEST_F(CommandLineHistory, OfAFolder) {
-  ExpectEnding(Call("history show --store past"), 2, {"past/history.jsonl", "history add"});
-  ExpectEnding(Call("history add first --store past --commit a --date tomorrow"), 2, {"tomorrow"});
-  ExpectEnding(Call("history add first --store past"), 2, {"no such commit"});
+  Expect("history show --store past", 2, {"past/history.jsonl", "history add"});
+  Expect("history add first --store past --commit a --date tomorrow", 2, {"tomorrow"});
+  Expect("history add first --store past", 2, {"no such commit"});
   EXPECT_FALSE(fs::exists(folder_ / "past"));
   for (int day = 10; day < 20; ++day) {
     if (day == 16) {
@@ -43,67 +39,57 @@ TEST_F(CommandLineHistory, OfAFolder) {
       Run("first", "--set /problems/0/mechanism/bodies/0/mass=1.5");
     }
     const std::string name = std::to_string(day);
-    ExpectEnding(
-        Call("history add first --store past --commit c" + name + " --date 2026-01-" + name), 0,
-        {"added 2 records of commit c" + name});
+    Expect("history add first --store past --commit c" + name + " --date 2026-01-" + name, 0,
+           {"added 2 records of commit c" + name});
   }
-  ExpectEnding(Call("history add first --store past --commit c19 --date 2026-01-19"), 2,
-               {"found commit c19", "--replace"});
+  Expect("history add first --store past --commit c19 --date 2026-01-19", 2,
+         {"found commit c19", "--replace"});
   const Ending shown = Call("history show --store past --measure drift_position_max --json");
   EXPECT_EQ(shown.code, 0);
-  std::size_t steps = 0;  // one for each of the two cases, and none elsewhere
-  for (std::size_t at = 0; (at = shown.text.find("\"confidence\"", at)) != std::string::npos;
-       ++at) {
-    ++steps;
-  }
-  EXPECT_EQ(steps, 2u) << shown.text;
-  ExpectEnding(Call("history show --store past --measure drift_position"), 0, {"c16", "c19"});
-  ExpectEnding(Call("history show --store past --measure nothing"), 2, {"\"nothing\""});
-  ExpectEnding(Call("history report --store past --title '<b>'"), 0, {"past/history.html"});
-  EXPECT_NE(ReadFile(folder_ / "past/history.html").find("&lt;b&gt;"), std::string::npos);
-  ExpectEnding(Call("history show"), 2, {"--store"});
+  // one for each of the two cases, and none elsewhere
+  EXPECT_EQ(CountOf(shown.text, "\"confidence\""), 2u) << shown.text;
+  Expect("history show --store past --measure drift_position", 0, {"c16", "c19"});
+  Expect("history show --store past --measure nothing", 2, {"\"nothing\""});
+  Expect("history report --store past --title '<b>'", 0, {"past/history.html"});
+  ExpectWords(ReadFile(folder_ / "past/history.html"), {"&lt;b&gt;"});
+  Expect("history show", 2, {"--store"});
   for (const fs::directory_entry& file : fs::directory_iterator(folder_ / "past/results")) {
     fs::resize_file(file.path(), 0);
   }
-  ExpectEnding(Call("history report --store past"), 2, {"past/results/", "found no record"});
+  Expect("history report --store past", 2, {"past/results/", "found no record"});
 }
 
 TEST_F(CommandLineHistory, OfABranchAndAsABase) {
   Commit("one");
-  ExpectEnding(Call("history add first --branch measured"), 0, {"added 2 records"});
+  Expect("history add first --branch measured", 0, {"added 2 records"});
   EXPECT_EQ(Shell("test -z \"$(git status --porcelain tiny.json four-bar.json)\"").code, 0);
   EXPECT_EQ(Shell("git show measured:history.jsonl").code, 0);
-  ExpectEnding(Call("compare --branch measured first"), 0, {"NO CHANGE"});
+  Expect("compare --branch measured first", 0, {"NO CHANGE"});
   EditMechanism("\"mass\": 1.0", "\"mass\": 1.1");
   Commit("heavier");
   Run("second");
   // another mechanism is no worse one: it cannot be compared
-  ExpectEnding(Call("compare --branch measured second --markdown s.md --junit s.xml"), 2,
-               {"INCONCLUSIVE"});
-  EXPECT_NE(ReadFile(folder_ / "s.xml").find("<failure"), std::string::npos);
-  EXPECT_NE(ReadFile(folder_ / "s.md").find("ran another mechanism"), std::string::npos);
-  ExpectEnding(Call("history add second --branch measured"), 0, {});
-  ExpectEnding(Call("compare --branch measured second"), 0, {"NO CHANGE"});
-  ExpectEnding(Call("history mark HEAD bad --branch measured"), 2, {"found 0 commits"});
+  Expect("compare --branch measured second --markdown s.md --junit s.xml", 2, {"INCONCLUSIVE"});
+  ExpectWords(ReadFile(folder_ / "s.xml"), {"<failure"});
+  ExpectWords(ReadFile(folder_ / "s.md"), {"ran another mechanism"});
+  Expect("history add second --branch measured", 0);
+  Expect("compare --branch measured second", 0, {"NO CHANGE"});
+  Expect("history mark HEAD bad --branch measured", 2, {"found 0 commits"});
   EXPECT_EQ(Shell("git log --format=%s measured | wc -l | grep -qx 2").code, 0);
   // no work tree of the branch is left
   EXPECT_EQ(Shell("git worktree list | wc -l | grep -qx 1").code, 0);
 }
 
-TEST_F(CommandLineHistory, CompareNeedsACommit) {
-  fs::create_directory(folder_ / "past");
+TEST_F(CommandLineHistory, CompareNeedsOneBaseWithACommit) {
   Write("past/history.jsonl", "");
-  ExpectEnding(Call("compare first --history past"), 2, {"past: found no commit"});
-  ExpectEnding(Call("history add first --store past --commit a --date 2026-01-01"), 0, {});
-  ExpectEnding(Call("history mark a bad --store past"), 0, {});
-  ExpectEnding(Call("compare first --history past"), 2, {"past: found every commit marked bad"});
-}
-
-TEST_F(CommandLineHistory, CompareNeedsOneBase) {
-  ExpectEnding(Call("compare first"), 2, {"--history"});
-  ExpectEnding(Call("compare first first --history past"), 2, {"NEW alone"});
-  ExpectEnding(Call("compare first --branch nothing-here"), 2,
-               {"found no branch \"nothing-here\"", "history add begins one"});
+  Expect("compare first --history past", 2, {"past: found no commit"});
+  Expect("history add first --store past --commit a --date 2026-01-01", 0);
+  Expect("history mark a bad --store past", 0);
+  Expect("compare first --history past", 2, {"past: found every commit marked bad"});
+  Expect("compare first", 2, {"--history"});
+  Expect("compare first first --history past", 2, {"NEW alone"});
+  Expect("compare first --branch nothing-here", 2,
+         {"found no branch \"nothing-here\"", "history add begins one"});
 }
 
 }  // namespace cli_history_test

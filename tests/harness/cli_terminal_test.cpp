@@ -1,12 +1,6 @@
 // What a person sees on a terminal: tables as wide as it is, colours, progress, Ctrl-C.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <fstream>
-#include <iterator>
-#include <stdexcept>
 
-#include "harness/base/store.h"
 #include "tests/harness/cli_fixture.h"
 #include "tests/harness/pseudo_terminal.h"
 
@@ -52,7 +46,7 @@ class CliTerminalTest : public CommandLineTest {
 
 TEST_F(CliTerminalTest, TablesAreAsWideAsTheTerminalAndNameWhatIsLeftOut) {
   const std::string piped = (Call("run tiny.json --out out"), Call("table out").text);
-  EXPECT_EQ(piped.find("left out"), std::string::npos) << piped;
+  ExpectNone(piped, {"left out"});
   const std::size_t whole = TableLines(piped).at(1).size();
   ASSERT_GT(whole, 80u);  // or this tests nothing
   for (const int columns : {24, 40, 60, 80, 100}) {
@@ -86,28 +80,23 @@ TEST_F(CliTerminalTest, TablesOfChildProcessesFitTheTerminal) {
     EXPECT_LE(TableLines(See(command, 50).text).at(kRule).size(), 50u) << command;
     const TerminalEnding wide = See(command + " --wide", 50);
     EXPECT_EQ(wide.code, 0) << wide.text;
-    EXPECT_EQ(wide.text.find("left out"), std::string::npos) << wide.text;
+    ExpectNone(wide.text, {"left out"});
     EXPECT_GT(TableLines(wide.text).at(kRule).size(), 50u) << wide.text;  // or this tests nothing
   }
 }
 
 TEST_F(CliTerminalTest, ColourIsForTerminalsWithoutNoColorAndNeverInFiles) {
-  Write("short.json",
-        R"({"name": "short", "problems": [{"mechanism": "four-bar.json", "horizon": 1}],
-    "methods": [{"formulation": "odca", "enforcement": "acceleration"}], "tolerances": [1e-6],
-    "limits": {"steps": 3}, "timing": {"repeats": 0}})");
+  Write("short.json", TinyWith(R"("limits": {"steps": 3})"));
   const TerminalEnding seen = See("run short.json --out out 2>&-", 120);
-  EXPECT_NE(seen.text.find("\033[31mstep-limit"), std::string::npos) << seen.text;
+  ExpectWords(seen.text, {"\033[31mstep-limit"});
   for (const std::string& plain :
        {See("table out", 120, "NO_COLOR=1").text, See("table out", 120, "TERM=dumb").text,
         See("table out | cat", 120).text, Call("table out").text,
         ReadFile(folder_ / "out/drift.md"), ReadFile(folder_ / "out/drift.csv")}) {
     EXPECT_EQ(plain.find('\033'), std::string::npos) << plain;
-    EXPECT_NE(plain.find("step-limit"), std::string::npos) << plain;
+    ExpectWords(plain, {"step-limit"});
   }
-  Write("claims.json", kTinyClaims);
-  EXPECT_NE(See("check-claims out --claims claims.json", 120).text.find("\033["),
-            std::string::npos);
+  ExpectWords(See("check-claims out --claims claims.json", 120).text, {"\033["});
 }
 
 TEST_F(CliTerminalTest, HostileNamesNeitherActNorMoveColumns) {
@@ -116,14 +105,14 @@ TEST_F(CliTerminalTest, HostileNamesNeitherActNorMoveColumns) {
   Write("two.json", R"({"name": "two", "problems": [{"mechanism": "four-bar.json", "horizon": 0.1},
     {"mechanism": "four-bar.json", "name": "plain", "horizon": 0.1}], "tolerances": [1e-6],
     "methods": [{"formulation": "odca", "enforcement": "acceleration"}], "timing": {"repeats": 0}})");
-  ExpectEnding(Call("run two.json --out out"), 0, {});
+  Expect("run two.json --out out", 0);
   for (const int columns : {30, 50, 80, 200}) {
     const TerminalEnding seen = See("table out --columns mechanism,steps", columns, "NO_COLOR=1");
     EXPECT_EQ(seen.code, 0);
     for (const char c : seen.text) {
       EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << seen.text;
     }
-    EXPECT_NE(seen.text.find("a\\n\\x1b[31m\\tb"), std::string::npos) << seen.text;
+    ExpectWords(seen.text, {"a\\n\\x1b[31m\\tb"});
     const std::vector<std::string> lines = TableLines(seen.text);
     ASSERT_GE(lines.size(), 4u);
     std::size_t ends = 0;  // numbers end where the rule does
@@ -157,13 +146,9 @@ TEST_F(CliTerminalTest, CtrlCKeepsWhatIsDoneAndSaysHowToGoOn) {
   const TerminalEnding seen =
       See("run long.json --out 'o ut' --jobs 2 --filter 'rtol<1'", 100, "exec", press);
   EXPECT_EQ(seen.code, 130) << seen.text;
-  const std::size_t first = seen.text.find("accuracy 0/4");
-  ASSERT_NE(first, std::string::npos) << seen.text;
-  EXPECT_NE(seen.text.find("now four-bar", first), std::string::npos) << seen.text;
-  EXPECT_NE(seen.text.find("s left", first), std::string::npos) << seen.text;
-  EXPECT_NE(seen.text.find("3 records kept in o ut/results.jsonl, 3 of them of this run"),
-            std::string::npos)
-      << seen.text;
+  ExpectWords(seen.text,
+              {"accuracy 0/4", "3 records kept in o ut/results.jsonl, 3 of them of this run"});
+  ExpectWords(seen.text.substr(seen.text.find("accuracy 0/4")), {"now four-bar", "s left"});
   std::vector<std::string> warnings;
   EXPECT_EQ(ReadRecords(store, &warnings).size(), 3u);
   EXPECT_TRUE(warnings.empty());
@@ -173,8 +158,7 @@ TEST_F(CliTerminalTest, CtrlCKeepsWhatIsDoneAndSaysHowToGoOn) {
   const std::string command = seen.text.substr(begin, seen.text.find('\n', begin) - begin);
   const TerminalEnding again = OnTerminal("cd '" + folder_.string() + "' && " + command, 100);
   EXPECT_EQ(again.code, 0) << command << "\n" << again.text;
-  EXPECT_NE(again.text.find("ran 1 case (1 not finished), 3 reused"), std::string::npos)
-      << again.text;
+  ExpectWords(again.text, {"ran 1 case (1 not finished), 3 reused"});
   EXPECT_EQ(ReadRecords(store).size(), 4u);
 }
 
@@ -190,8 +174,96 @@ TEST_F(CliTerminalTest, EveryLineOfProgressFitsTheTerminal) {
     }
   }
   EXPECT_GT(lines, 2u);
-  EXPECT_EQ(Call("run tiny.json --out other").text.find("elapsed"), std::string::npos);
+  ExpectNone(Call("run tiny.json --out other").text, {"elapsed"});
 }
+
+// Standard streams that are closed, full or without a reader: an exit code and a reason, never a
+// signal, and never a line in a store.
+
+class Streams : public CommandLineTest {
+ protected:
+  /// Runs a shell script in the test's folder, with the program as $L; its last command decides.
+  Ending Shell(const std::string& script) const {
+    return Call("", "( L='" LOOPBENCH_BINARY "'; " + script + " ) 2>&1; exit $?;");
+  }
+};
+
+TEST(Printing, GoesThroughOnePlace) {
+  int files = 0;
+  for (const auto& entry :
+       fs::recursive_directory_iterator(fs::path(LOOPBENCH_SOURCE_DIR) / "harness")) {
+    const fs::path& path = entry.path();
+    if (path.extension() != ".cpp" && path.extension() != ".h") continue;
+    if (path.stem() == "terminal") continue;
+    ++files;
+    const std::string text = ReadFile(path);
+    for (const char* way : {"fmt::print", "std::cout", "std::cerr", "std::printf", "fprintf",
+                            "std::puts", "fputs", "stdout,", "stderr,"}) {
+      EXPECT_EQ(text.find(way), std::string::npos)
+          << path << " prints with " << way << "; use Print or PrintError of harness/base/text.h";
+    }
+  }
+  EXPECT_GT(files, 100);
+}
+
+TEST_F(Streams, ClosedOnesKeepMessagesOutOfTheStore) {
+  const Ending run =
+      Shell("( exec >&- 2>&-; \"$L\" run tiny.json --out out ); code=$?; exit $code");
+  EXPECT_EQ(run.code, 2) << run.text;  // the tables could not be printed
+  ASSERT_EQ(ReadRecords(folder_ / "out").size(), 2u);
+  Expect("run tiny.json --out out", 0, {"ran 0 cases, 2 reused"});
+  ExpectEnding(Shell("\"$L\" list tiny.json 2>&1 <&- >&-"), 2, {"cannot write to standard output"});
+}
+
+TEST_F(Streams, FullOnesAreAnError) {
+  ASSERT_EQ(Call("run tiny.json --out out").code, 0);
+  for (const char* command : {"table out", "list tiny.json", "--help", "--version",
+                              "run tiny.json --out out", "check-claims out --claims claims.json"}) {
+    SCOPED_TRACE(command);
+    ExpectEnding(Shell(std::string("\"$L\" ") + command + " 2>&1 >/dev/full"), 2,
+                 {"cannot write to standard output"});
+  }
+  ExpectEnding(Shell("\"$L\" table out 2>&1 >/dev/full"), 2, {"No space left on device"});
+  // the gate's answer is not lost with its words
+  {
+    ResultStore worse(folder_ / "worse");
+    for (Record record : ReadRecords(folder_ / "out")) {
+      record.Set("drift_position_max", 1.0);
+      worse.Append(record);
+    }
+  }
+  EXPECT_EQ(Shell("\"$L\" compare out worse >/dev/full").code, 1);
+}
+
+TEST_F(Streams, ErrorsThatCannotBePrintedKeepTheirExitCode) {
+  EXPECT_EQ(Shell("\"$L\" list absent.json 2>/dev/full").code, 2);
+  EXPECT_EQ(Shell("\"$L\" list absent.json 2>&-").code, 2);
+  EXPECT_EQ(Shell("\"$L\" run tiny.json --out out 2>/dev/full >/dev/null").code, 0);
+  ExpectEnding(Shell("ulimit -f 1; \"$L\" run tiny.json --out beyond 2>&1 >/dev/null | cat"), 0,
+               {"cannot write", "results.jsonl", "File too large"});
+}
+
+TEST_F(Streams, APipeWithoutReaderEndsTheOutputAndNotTheWork) {
+  // the reader has gone before the program begins
+  const std::string unread =
+      "{ sleep 0.5; \"$L\" run tiny.json --out out; echo $? >code; } | true; cat code";
+  const Ending ending = Shell(unread);
+  EXPECT_EQ(ending.text.substr(ending.text.find('\n') + 1), "2\n") << ending.text;
+  ExpectNone(ending.text, {"cannot write"});
+  EXPECT_TRUE(fs::exists(folder_ / "out/drift.md"));
+}
+
+#ifdef LOOPBENCH_BENCH_BINARY
+
+TEST_F(Streams, OfTheBenchmarkProgramAreHeldToTheSame) {
+  const std::string bench = "'" LOOPBENCH_BENCH_BINARY "' ";
+  ExpectEnding(Shell(bench + "--help 2>&1 >/dev/full"), 2, {"cannot write to standard output"});
+  ExpectEnding(Shell(bench + "--benchmark_list_tests 2>&1 >/dev/full"), 2,
+               {"cannot write to standard output"});
+  EXPECT_EQ(Shell(bench + "--families none.json 2>/dev/full").code, 2);
+}
+
+#endif
 
 }  // namespace cli_terminal_test
 }  // namespace loopbench::harness

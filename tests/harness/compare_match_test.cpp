@@ -8,22 +8,16 @@
 
 #include "harness/judge/judge.h"
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 
 namespace loopbench::harness {
 namespace compare_match_test {
 
 Record OneRun(const std::string& formulation, double rtol, double drift) {
-  Record record;
-  record.Set("kind", std::string("accuracy"));
-  record.Set("mechanism", std::string("feeder"));
-  record.Set("formulation", formulation);
-  record.Set("rtol", rtol);
-  record.Set("case_id", formulation + std::to_string(rtol));
-  record.Set("config_hash", std::string("c0"));
-  record.Set("outcome", std::string("finished"));
-  record.Set("steps", std::int64_t{100});
-  record.Set("state_hash", std::to_string(drift));
-  record.Set("drift_position_max", drift);
+  Record record = RecordOf("kind", "accuracy", "mechanism", "feeder", "formulation", formulation,
+                           "rtol", rtol, "case_id", formulation + std::to_string(rtol),
+                           "config_hash", "c0", "outcome", "finished", "steps", 100, "state_hash",
+                           std::to_string(drift), "drift_position_max", drift);
   for (const char* key : {"machine", "compiler", "flags", "libm"}) {
     record.Set(key, std::string("x"));
   }
@@ -68,8 +62,7 @@ TEST(CompareMatch, ChoosesNoneOfSeveralAndMixesNoKinds) {
               {OneRun("odca", 1e-8, 1e-7), OneRun("lagrange", 1e-8, 1e-7)}, options);
   EXPECT_EQ(report.ambiguous, std::vector<std::string>{"accuracy feeder"});
   EXPECT_EQ(report.ExitCode(options), 2);
-  Record timing = OneRun("odca", 1e-8, 1e-7);
-  timing.Set("kind", std::string("timing"));
+  Record timing = Changed(OneRun("odca", 1e-8, 1e-7), "kind", "timing");
   const ComparisonReport kinds = Compare({OneRun("odca", 1e-8, 1e-7)}, {timing}, options);
   EXPECT_EQ(kinds.only_base.size(), 1u);
   EXPECT_EQ(kinds.only_fresh.size(), 1u);
@@ -98,7 +91,7 @@ TEST_F(MatchCommands, AnotherMassIsComparedAndNamed) {
                0,
                {"although they ran with other settings", "accuracy four-bar odca: config_hash "});
   const std::string summary = ReadFile(folder_ / "s.md");
-  EXPECT_NE(summary.find("- accuracy four-bar odca: config_hash "), std::string::npos) << summary;
+  ExpectWords(summary, {"- accuracy four-bar odca: config_hash "});
   ExpectEnding(Call("compare base new --match mechnism"), 2,
                {"--match: found \"mechnism\"", "did you mean \"mechanism\""});
   ExpectEnding(Call("compare base new --match mechanism"), 2, {"more than once"});

@@ -9,19 +9,14 @@
 #include "harness/base/text.h"
 #include "harness/judge/tables.h"
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 
 namespace loopbench::harness {
 namespace conditions_test {
 
 Record Row() {
-  Record row;
-  row.Set("mechanism", std::string("four-bar"));
-  row.Set("rtol", 1e-6);
-  row.Set("steps", std::int64_t{100});
-  row.Set("absent", Value());
-  row.Set("nan", NAN);
-  row.Set("flag", true);
-  return row;
+  return RecordOf("mechanism", "four-bar", "rtol", 1e-6, "steps", 100, "absent", Value(), "nan",
+                  NAN, "flag", true);
 }
 
 bool Meets(const std::string& condition) { return Matches(Row(), {ParseCondition(condition)}); }
@@ -61,18 +56,12 @@ TEST(Conditions, SeveralMakeARange) {
 }
 
 std::string Refusal(const std::string& condition) {
-  try {
-    ParseCondition(condition);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return MessageOf<std::exception>([&] { ParseCondition(condition); });
 }
 
 TEST(Conditions, SayWhatIsWrongWithThem) {
   for (const char* wrong : {"", "a", "=1", "<1", "a=", "a<", "a<=", "a!1", "!a=1", "a!"}) {
-    EXPECT_NE(Refusal(wrong).find("expected key=value"), std::string::npos)
-        << "<" << wrong << ">: " << Refusal(wrong);
+    ExpectWords(Refusal(wrong), {"expected key=value"});
   }
   EXPECT_EQ(Refusal("rtol<small"),
             "filter 'rtol<small': found \"small\", expected a number behind <");

@@ -6,11 +6,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "harness/base/text.h"
+#include "harness/config/benchmarks.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
 #include "harness/config/published_series.h"
@@ -24,31 +24,10 @@ namespace fs = std::filesystem;
 
 const fs::path kBroken = kRoot / "tests/broken";
 
-std::vector<fs::path> BrokenFiles(const std::string& kind) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(kBroken / kind)) {
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-std::string ReadAll(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
 /// The reader's message, file names as seen from tests/broken; "" when the file is accepted.
 template <class Read>
-std::string MessageOf(Read read) {
-  std::string message;
-  try {
-    read();
-  } catch (const ConfigError& error) {
-    message = error.what();
-  }
+std::string ShortMessageOf(Read read) {
+  std::string message = MessageOf(read);
   for (const std::string& folder : {kBroken.string() + "/", kRoot.string() + "/"}) {
     for (std::size_t at = message.find(folder); at != std::string::npos;
          at = message.find(folder, at)) {
@@ -58,35 +37,37 @@ std::string MessageOf(Read read) {
   return message;
 }
 
-std::string MessageOf(const fs::path& path) {
-  return MessageOf([&path] {
+std::string MessageOfFile(const fs::path& path) {
+  return ShortMessageOf([&path] {
     const fs::path kind = path.parent_path().filename();
     if (kind == "mechanisms") ReadMechanism(path);
     if (kind == "experiments") ReadExperiments(path);
     if (kind == "claims") ReadClaims(path);
     if (kind == "maps") ReadMapRules(path);
     if (kind == "series") ReadPublishedSeries(path);
+    if (kind == "benchmarks") ReadBenchmarks(path);
   });
 }
 
 class Corpus : public testing::TestWithParam<std::string> {};
 
 TEST_P(Corpus, IsRefusedWithTheExpectedMessages) {
-  const std::vector<fs::path> files = BrokenFiles(GetParam());
+  const std::vector<fs::path> files = JsonFilesIn(kBroken / GetParam());
   // with LOOPBENCH_RENEW_EXPECTED set the messages are written, to be read before they are
   // committed
   const bool renew = std::getenv("LOOPBENCH_RENEW_EXPECTED") != nullptr;
   for (const fs::path& file : files) {
-    const std::string message = MessageOf(file);
+    const std::string message = MessageOfFile(file);
     EXPECT_NE(message, "") << file << " is accepted";
     fs::path beside = file;
     beside.replace_extension(".expected");
     if (renew && !message.empty()) std::ofstream(beside, std::ios::binary) << message << '\n';
-    EXPECT_EQ(message + '\n', ReadAll(beside)) << file;
+    EXPECT_EQ(message + '\n', ReadFile(beside)) << file;
   }
 }
 
-const std::vector<std::string> kKinds = {"mechanisms", "experiments", "claims", "maps", "series"};
+const std::vector<std::string> kKinds = {"mechanisms", "experiments", "claims",
+                                         "maps",       "series",      "benchmarks"};
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Corpus, testing::ValuesIn(kKinds),
                          [](const auto& kind) { return kind.param; });
@@ -94,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Corpus, testing::ValuesIn(kKinds),
 TEST(CorpusSize, IsAtLeastAHundredFilesAndNoMessageIsLeftOver) {
   std::size_t json = 0;
   for (const std::string& kind : kKinds) {
-    json += BrokenFiles(kind).size();
+    json += JsonFilesIn(kBroken / kind).size();
     for (const auto& entry : fs::directory_iterator(kBroken / kind)) {
       fs::path file = entry.path();
       EXPECT_TRUE(fs::exists(file.replace_extension(".json"))) << entry.path();
@@ -104,13 +85,12 @@ TEST(CorpusSize, IsAtLeastAHundredFilesAndNoMessageIsLeftOver) {
 }
 
 std::string MechanismMessage(const std::string& text) {
-  return MessageOf([&text] { ParseMechanism(text, "m.json"); });
+  return ShortMessageOf([&text] { ParseMechanism(text, "m.json"); });
 }
 
 std::string Repeated(const std::string& piece, std::size_t count) {
   std::string text;
-  text.reserve(piece.size() * count);
-  for (std::size_t i = 0; i < count; ++i) text += piece;
+  while (count-- > 0) text += piece;
   return text;
 }
 
@@ -118,10 +98,10 @@ TEST(HugeInput, HundredMegabytesAreRefusedBeforeTheyAreRead) {
   const fs::path path = fs::path(testing::TempDir()) / "loopbench-huge.json";
   std::ofstream(path, std::ios::binary).put(' ');
   fs::resize_file(path, 100u << 20);  // sparse: takes no room
-  EXPECT_EQ(MessageOf([&path] { ReadMechanism(path); }),
-            path.string() + ": cannot be read: found more than 16 MiB, expected at most 16 MiB");
-  EXPECT_EQ(MessageOf([&path] { ReadExperiments(path); }),
-            path.string() + ": cannot be read: found more than 16 MiB, expected at most 16 MiB");
+  const std::string message =
+      path.string() + ": cannot be read: found more than 16 MiB, expected at most 16 MiB";
+  EXPECT_EQ(ShortMessageOf([&path] { ReadMechanism(path); }), message);
+  EXPECT_EQ(ShortMessageOf([&path] { ReadExperiments(path); }), message);
   fs::remove(path);
 }
 
@@ -178,6 +158,28 @@ TEST(HugeInput, LongTokensAreCutInMessages) {
     EXPECT_LT(end - at, 600u);
     at = end + 1;
   }
+}
+
+TEST(UnreadableFiles, AreNamed) {
+  EXPECT_EQ(ShortMessageOf([] { ReadMechanism("/nowhere/m.json"); }),
+            "/nowhere/m.json: cannot be read: no such file");
+  EXPECT_EQ(ShortMessageOf([] { ReadMechanism(kConfigs); }),
+            "configs: cannot be read: it is a folder");
+}
+
+TEST(NearestSpelling, FindsTypingErrorsAndNothingFar) {
+  const std::vector<std::string> words = {"revolute", "prismatic", "A", "bar1"};
+  EXPECT_EQ(NearestSpelling("revolut", words), "revolute");
+  EXPECT_EQ(NearestSpelling("PRISMATIC", words), "prismatic");
+  EXPECT_EQ(NearestSpelling("abr1", words), "bar1");
+  EXPECT_EQ(NearestSpelling("weld", words), "");
+  EXPECT_EQ(NearestSpelling("B", words), "");
+}
+
+TEST(EditDistance, CountsASwapOfNeighboursOnce) {
+  EXPECT_EQ(EditDistance("abcd", "abdc"), 1);
+  EXPECT_EQ(EditDistance("kitten", "sitting"), 3);
+  EXPECT_EQ(EditDistance("", "abc"), 3);
 }
 
 }  // namespace config_corpus_test

@@ -12,21 +12,13 @@
 #include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/config/mechanism_reader.h"
+#include "harness/judge/judge.h"
 #include "tests/harness/places.h"
 
 namespace loopbench::harness {
 namespace config_test {
 
 namespace fs = std::filesystem;
-
-std::vector<fs::path> JsonFilesIn(const fs::path& folder) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
 
 MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
@@ -129,16 +121,13 @@ TEST(MechanismReader, FillsEveryFieldOfEveryForce) {
 
 /// "" or the complaint about a body in space with this inertia.
 std::string InertiaError(const std::string& inertia, const std::string& space = "spatial") {
-  try {
+  return MessageOf([&] {
     ParseMechanism(R"({"name": "m", "space": ")" + space + R"(", "gravity": [0, 0],
       "bodies": [{"name": "a", "mass": 1, "inertia": )" +
                        inertia + R"(}],
       "joints": [{"name": "F", "type": "free", "from": {"body": "ground"}, "to": {"body": "a"}}]})",
                    "m.json");
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  });
 }
 
 TEST(MechanismReader, TakesInertiasOfBodiesOnly) {
@@ -218,6 +207,12 @@ TEST(ShippedExperiments, AllReadAndExpand) {
   int count = 0;
   for (const fs::path& file : JsonFilesIn(kConfigs / "experiments")) {
     const FileKind kind = KindOfFile(file);
+    if (kind == FileKind::kMap) {
+      EXPECT_FALSE(ReadMapRules(file).groups.empty()) << file;
+    }
+    if (kind == FileKind::kClaims) {
+      EXPECT_FALSE(ReadClaims(file).empty()) << file;
+    }
     if (kind == FileKind::kClaims || kind == FileKind::kMap || kind == FileKind::kMechanism)
       continue;
     for (const Experiment& experiment : ReadExperiments(file)) {

@@ -7,6 +7,7 @@
 
 #include "harness/base/text.h"
 #include "harness/figures/figures.h"
+#include "tests/harness/records.h"
 
 namespace loopbench::harness {
 namespace distinct_points_test {
@@ -14,13 +15,9 @@ namespace distinct_points_test {
 constexpr std::size_t kMost = 1000;
 
 Record Point(double x, double y, const std::string& formulation = "odca") {
-  Record record;
-  record.Set("kind", std::string("accuracy"));
-  record.Set("formulation", formulation);
-  record.Set("outcome", std::string("finished"));
-  record.Set("steps", x);
-  record.Set("energy_error_max", y);
-  record.Set("drift_position_max", 1.0);  // nobody asks for it
+  Record record =
+      RecordOf("kind", "accuracy", "formulation", formulation, "outcome", "finished", "steps", x,
+               "energy_error_max", y, "drift_position_max", 1.0);  // nobody asks for it
   record.Set("mass", 2.0);
   return record;
 }
@@ -67,9 +64,8 @@ TEST(DistinctPoints, StandForAllOthersOnEitherAxis) {
 TEST(DistinctPoints, LoseNoCurveNoFailureAndNoWarning) {
   DistinctPoints points(Wanted(), kMost);
   for (int i = 0; i < 5000; ++i) points.Add(Point(i, i));
-  Record failed = Point(2500.0, 2500.0), flagged = failed;
-  failed.Set("outcome", std::string("step-limit"));
-  flagged.Set("warnings", std::string("energy"));
+  const Record failed = Changed(Point(2500.0, 2500.0), "outcome", "step-limit"),
+               flagged = Changed(Point(2500.0, 2500.0), "warnings", "energy");
   for (int times = 0; times < 3; ++times) {
     for (const Record& one : {failed, flagged, Point(2500.0, 2500.0, "lagrange")}) points.Add(one);
   }
@@ -84,8 +80,7 @@ TEST(DistinctPoints, LoseNoCurveNoFailureAndNoWarning) {
 
 TEST(DistinctPoints, RefuseWhatCannotBeThinned) {
   DistinctPoints points(Wanted(), 10);
-  Record series = Point(1.0, 1.0);
-  series.Set("energy_error_max", std::vector<double>{1.0, 2.0});
+  Record series = Changed(Point(1.0, 1.0), "energy_error_max", std::vector<double>{1.0, 2.0});
   EXPECT_THROW(points.Add(series), ConfigError);
   const auto add_curves = [&points] {
     for (int i = 0; i < 12; ++i) points.Add(Point(1.0, 1.0, "method " + std::to_string(i)));

@@ -1,16 +1,10 @@
 // Documents: their commands print the output that they show, and reference pages are complete.
-#include <algorithm>
 #include <regex>
 #include <set>
-#include <sstream>
-#include <string>
-#include <vector>
 
-#include "harness/base/record.h"
 #include "harness/judge/analysis.h"
 #include "harness/judge/judge.h"
 #include "tests/harness/cli_fixture.h"
-#include "tests/harness/places.h"
 
 namespace loopbench::harness {
 namespace documents_test {
@@ -103,10 +97,9 @@ INSTANTIATE_TEST_SUITE_P(Documents, ShownOutput,
                                          "docs/operation-counts.md", "docs/generated-code.md"));
 
 TEST_F(DocumentsTest, AMissingFileIsSaidWithTheFolderItWasLookedForIn) {
-  ExpectEnding(Call("check-claims out --claims configs/claims.json"), 2, {"out"});
-  ExpectEnding(
-      Call("check configs/claims.json"), 2,
-      {"configs/claims.json: cannot be read: no such file, seen from " + folder_.string()});
+  Expect("check-claims out --claims configs/claims.json", 2, {"out"});
+  Expect("check configs/claims.json", 2,
+         {"configs/claims.json: cannot be read: no such file, seen from " + folder_.string()});
 }
 
 TEST(Documents, EveryOutcomeAndWarningHasASection) {

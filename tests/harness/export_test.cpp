@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "harness/config/mechanism_reader.h"
-#include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/export_names.h"
 #include "harness/exchange/import.h"
+#include "harness/exchange/model.h"
 #include "mechanism/description/library.h"
 #include "mechanism/simplify/restart.h"
 #include "tests/harness/cli_fixture.h"

@@ -1,10 +1,6 @@
 // What kind a file is of: its top-level keys decide, and nothing that stands inside.
 #include "harness/base/file_kind.h"
 
-#include <gtest/gtest.h>
-
-#include "harness/base/text.h"
-#include "harness/config/experiment_reader.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
@@ -16,13 +12,8 @@ class FileKindTest : public CommandLineTest {
     Write("file.json", text);
     return KindOfFile(folder_ / "file.json");
   }
-  std::string MessageOf(const std::string& text) const {
-    try {
-      KindOf(text);
-    } catch (const ConfigError& error) {
-      return error.what();
-    }
-    return "";
+  std::string MessageOfText(const std::string& text) const {
+    return MessageOf([&] { KindOf(text); });
   }
 };
 
@@ -33,22 +24,20 @@ TEST_F(FileKindTest, NamesInsideDecideNothing) {
       text.replace(at, 4, name);
     }
     EXPECT_EQ(KindOf(text), FileKind::kMechanism) << name;
-    ExpectEnding(Call("check file.json"), 0, {"mechanism \"four-bar\", 3 bodies, 4 joints"});
-    ExpectEnding(Call("explain file.json"), 0, {name});
+    Expect("check file.json", 0, {"mechanism \"four-bar\", 3 bodies, 4 joints"});
+    Expect("explain file.json", 0, {name});
   }
-  std::string experiment = kTinyExperiment;
-  experiment.replace(experiment.find("two cases"), 9, "claims\\\", \\\"rows\\\": \\\"groups");
-  EXPECT_EQ(KindOf(experiment), FileKind::kExperiment);
+  EXPECT_EQ(KindOf(Replaced(kTinyExperiment, "two cases", "claims\\\", \\\"rows\\\": \\\"groups")),
+            FileKind::kExperiment);
 }
 
 TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
   for (const char* folder : {"mechanisms", "experiments", "benchmarks", "references"}) {
-    for (const auto& entry : fs::recursive_directory_iterator(kConfigs / folder)) {
-      const std::string name = entry.path().filename().string();
-      if (entry.path().extension() != ".json" || name.find("states") != std::string::npos) continue;
+    for (const fs::path& file : JsonFilesIn(kConfigs / folder)) {
+      const std::string path = file.string(), name = file.filename().string();
+      if (name.find("states") != std::string::npos) continue;
       // experiments/models/ has models and for each of them a folder with its ladder,
       // experiments/overconstrained/ the linkages of one experiment and its claims
-      const std::string path = entry.path().string();
       const bool is_model =
           (path.find("/experiments/models/") != path.npos &&
            name.find("-models.json") == name.npos) ||
@@ -60,7 +49,7 @@ TEST_F(FileKindTest, EveryShippedFileIsOfTheKindOfItsFolder) {
                                 : name == "claims.json"               ? FileKind::kClaims
                                 : name.find("map.json") != name.npos  ? FileKind::kMap
                                                                       : FileKind::kExperiment;
-      EXPECT_EQ(KindOfFile(entry.path()), expected) << entry.path();
+      EXPECT_EQ(KindOfFile(file), expected) << file;
     }
   }
 }
@@ -75,38 +64,32 @@ TEST_F(FileKindTest, AMisspeltKeyLeavesTheKindAsItIs) {
 }
 
 TEST_F(FileKindTest, ABrokenFileIsAnsweredWithItsFault) {
-  const std::string message = MessageOf("{\"name\": \"m\",\n \"problems\": [1,]}");
-  EXPECT_NE(message.find("file.json:2:"), std::string::npos) << message;
-  EXPECT_NE(message.find("remove the comma"), std::string::npos) << message;
-  ExpectEnding(Call("check file.json"), 2, {"remove the comma"});
-  ExpectEnding(Call("explain file.json"), 2, {"remove the comma"});
-  EXPECT_NE(MessageOf("[1, 2]").find("found [1,2], expected an object: a mechanism"),
-            std::string::npos);
+  const std::string message = MessageOfText("{\"name\": \"m\",\n \"problems\": [1,]}");
+  ExpectWords(message, {"file.json:2:", "remove the comma"});
+  Expect("check file.json", 2, {"remove the comma"});
+  Expect("explain file.json", 2, {"remove the comma"});
+  ExpectWords(MessageOfText("[1, 2]"), {"found [1,2], expected an object: a mechanism"});
 }
 
 TEST_F(FileKindTest, AnAmbiguousFileIsAnsweredWithWhatWasFound) {
-  EXPECT_EQ(MessageOf(R"({"name": "x", "bodies": [], "problems": []})"),
+  EXPECT_EQ(MessageOfText(R"({"name": "x", "bodies": [], "problems": []})"),
             (folder_ / "file.json").string() +
                 ":1: (top level): found keys of a mechanism (\"name\", \"bodies\") and an "
                 "experiment (\"name\", \"problems\"), expected those of one kind: a mechanism "
                 "(\"bodies\", \"joints\") or an experiment (\"problems\", \"methods\")");
   for (const char* text :
        {"{}", "{\"benchmarks\": []}", "{\"name\": \"x\"}", "{\"title\": \"x\"}"}) {
-    EXPECT_NE(MessageOf(text).find("found no key that identifies the file type"), std::string::npos)
-        << text;
+    ExpectWords(MessageOfText(text), {"found no key that identifies the file type"});
   }
 }
 
 TEST_F(FileKindTest, AFileOfAnotherKindIsNamed) {
-  ExpectEnding(Call("run four-bar.json --out out"), 2,
-               {"found a mechanism (it has \"bodies\"), expected an experiment"});
-  ExpectEnding(Call("list claims.json"), 2,
-               {"found claims (it has \"claims\"), expected an experiment"});
-  ExpectEnding(Call("run tiny.json --no-timing --out out"), 0, {"results in out"});
-  ExpectEnding(Call("check-claims out --claims tiny.json"), 2,
-               {"found an experiment (it has \"problems\"), expected claims"});
-  ExpectEnding(Call("robustness out --rules claims.json"), 2,
-               {"found claims (it has \"claims\"), expected a robustness map"});
+  Expect("run four-bar.json --out out", 2,
+         {"found a mechanism (it has \"bodies\"), expected an experiment"});
+  Expect("list claims.json", 2, {"found claims (it has \"claims\"), expected an experiment"});
+  Expect("run tiny.json --no-timing --out out", 0, {"results in out"});
+  Expect("check-claims out --claims tiny.json", 2,
+         {"found an experiment (it has \"problems\"), expected claims"});
 }
 
 }  // namespace file_kind_test

@@ -12,22 +12,26 @@
 
 #include "harness/base/text.h"
 #include "harness/figures/figures.h"
+#include "tests/harness/cli_fixture.h"
+#include "tests/harness/in_child.h"
 
 namespace loopbench::harness {
 namespace free_figure_test {
 
 Record RunOf(const std::string& formulation, double rtol, double drift) {
+  const std::pair<const char*, Value> items[] = {
+      {"kind", "accuracy"},
+      {"mechanism", "four-bar"},
+      {"formulation", formulation},
+      {"rtol", rtol},
+      {"horizon", 10.0},
+      {"steps", 100},
+      {"outcome", "finished"},
+      {"drift_position_max", drift},
+      {"series.drift_t", std::vector{0.0, 0.1, 10.0}},
+      {"series.drift", std::vector{0.0, drift / 2, drift}}};
   Record record;
-  record.Set("kind", std::string("accuracy"));
-  record.Set("mechanism", std::string("four-bar"));
-  record.Set("formulation", formulation);
-  record.Set("rtol", rtol);
-  record.Set("horizon", 10.0);
-  record.Set("steps", std::int64_t{100});
-  record.Set("outcome", std::string("finished"));
-  record.Set("drift_position_max", drift);
-  record.Set("series.drift_t", std::vector<double>{0.0, 0.1, 10.0});
-  record.Set("series.drift", std::vector<double>{0.0, drift / 2, drift});
+  for (const auto& [key, value] : items) record.Set(key, value);
   return record;
 }
 
@@ -36,21 +40,20 @@ std::vector<Record> Runs() {
           RunOf("lagrange", 1e-6, 2e-4), RunOf("lagrange", 1e-8, 2e-6)};
 }
 
-FreeFigure DriftOverTolerance() {
-  return {.x = "rtol", .y = "drift_position_max", .group = "formulation", .log = ""};
+FreeFigure DriftOverTolerance(const std::string& log = "") {
+  return {.x = "rtol", .y = "drift_position_max", .group = "formulation", .log = log};
+}
+
+Figure FigureOf(const std::vector<Record>& runs, const FreeFigure& wanted = DriftOverTolerance()) {
+  return MakeFreeFigure(runs, wanted).figure;
 }
 
 std::string Refusal(const std::vector<Record>& records, const FreeFigure& wanted) {
-  try {
-    MakeFreeFigure(records, wanted);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return MessageOf<std::runtime_error>([&] { MakeFreeFigure(records, wanted); });
 }
 
 TEST(FreeFigure, HasOneCurvePerGroupInOrderOfXWithKeysAndUnits) {
-  const Figure figure = MakeFreeFigure(Runs(), DriftOverTolerance()).figure;
+  const Figure figure = FigureOf(Runs());
   EXPECT_EQ(figure.title, "drift_position_max over rtol: four-bar, horizon 10 s");
   EXPECT_EQ(figure.x_label, "rtol");
   EXPECT_EQ(figure.y_label, "drift, position [m]");
@@ -65,22 +68,20 @@ TEST(FreeFigure, HasOneCurvePerGroupInOrderOfXWithKeysAndUnits) {
 }
 
 TEST(FreeFigure, AxesAreLogarithmicWhenTheySpanTwoDecadesOrWhenAsked) {
-  FreeFigure wanted = DriftOverTolerance();
-  EXPECT_TRUE(MakeFreeFigure(Runs(), wanted).figure.log_x);
-  EXPECT_TRUE(MakeFreeFigure(Runs(), wanted).figure.log_y);
   const std::vector<Record> near = {RunOf("odca", 1e-6, 1.0), RunOf("odca", 2e-6, 99.0)};
-  EXPECT_FALSE(MakeFreeFigure(near, wanted).figure.log_y);
   const std::vector<Record> signs = {RunOf("odca", 1e-6, -1.0), RunOf("odca", 2e-6, 1e6)};
-  EXPECT_FALSE(MakeFreeFigure(signs, wanted).figure.log_y);
-  wanted.log = "y";
-  EXPECT_FALSE(MakeFreeFigure(Runs(), wanted).figure.log_x);
-  EXPECT_TRUE(MakeFreeFigure(near, wanted).figure.log_y);
-  EXPECT_NE(Refusal({RunOf("odca", 1e-6, -1.0)}, wanted)
-                .find("--log y: no value of "
-                      "drift_position_max is positive"),
-            std::string::npos);
-  wanted.log = "none";
-  EXPECT_FALSE(MakeFreeFigure(Runs(), wanted).figure.log_y);
+  const auto scales = [](const std::vector<Record>& runs, const std::string& log) {
+    const Figure figure = FigureOf(runs, DriftOverTolerance(log));
+    return std::pair(figure.log_x, figure.log_y);
+  };
+  EXPECT_EQ(scales(Runs(), ""), std::pair(true, true));
+  EXPECT_FALSE(scales(near, "").second);
+  EXPECT_FALSE(scales(signs, "").second);
+  EXPECT_FALSE(scales(Runs(), "y").first);
+  EXPECT_TRUE(scales(near, "y").second);
+  EXPECT_FALSE(scales(Runs(), "none").second);
+  ExpectPart(Refusal({RunOf("odca", 1e-6, -1.0)}, DriftOverTolerance("y")),
+             "--log y: no value of drift_position_max is positive");
 }
 
 /// Drift of exactly zero: no line leads over it, and a curve without points is not in the legend.
@@ -88,9 +89,7 @@ TEST(FreeFigure, PointsThatALogarithmicAxisCannotShowAreGapsAndCounted) {
   std::vector<Record> runs = Runs();
   runs[2].Set("drift_position_max", 0.0);  // odca between two others
   runs.push_back(RunOf("reduction", 1e-6, 0.0));
-  FreeFigure wanted = DriftOverTolerance();
-  wanted.log = "xy";
-  const FreeFigureResult result = MakeFreeFigure(runs, wanted);
+  const FreeFigureResult result = MakeFreeFigure(runs, DriftOverTolerance("xy"));
   ASSERT_EQ(result.figure.curves.size(), 3u);  // lagrange, odca below and above
   EXPECT_EQ(result.figure.curves[1].label, "odca");
   EXPECT_EQ(result.figure.curves[1].x, std::vector<double>{1e-10});
@@ -103,9 +102,9 @@ TEST(FreeFigure, PointsThatALogarithmicAxisCannotShowAreGapsAndCounted) {
 
 TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   std::vector<Record> runs = Runs();
-  runs[1].Set("outcome", std::string("singular"));  // with a drift
+  runs[1].Set("outcome", "singular");  // with a drift
   Record never = RunOf("odca", 1e-12, 0.0);
-  never.Set("outcome", std::string("inconsistent-start"));
+  never.Set("outcome", "inconsistent-start");
   never.Set("drift_position_max", Value());
   runs.push_back(never);
   const FreeFigureResult result = MakeFreeFigure(runs, DriftOverTolerance());
@@ -115,17 +114,17 @@ TEST(FreeFigure, FailedRunsAreCrossesWithOrWithoutAValue) {
   EXPECT_EQ(odca.crosses[0].first, 1e-12);
   EXPECT_TRUE(std::isnan(odca.crosses[0].second));
   EXPECT_EQ(odca.crosses[1], (std::pair{1e-10, 1e-8}));
-  ASSERT_EQ(result.remarks.size(), 1u);
-  EXPECT_EQ(result.remarks[0], "2 of 6 runs failed and are drawn as crosses");
+  EXPECT_EQ(result.remarks,
+            std::vector<std::string>{"2 of 6 runs failed and are drawn as crosses"});
   const std::string script = GnuplotScript(result.figure).commands;
-  EXPECT_NE(script.find("at first 1e-12, graph 0.03 point pt 2"), std::string::npos) << script;
-  EXPECT_NE(script.find("at first 1e-10, first 1e-08 point pt 2"), std::string::npos) << script;
-  EXPECT_NE(script.find("failed run"), std::string::npos);
+  ExpectPart(script, "at first 1e-12, graph 0.03 point pt 2");
+  ExpectPart(script, "at first 1e-10, first 1e-08 point pt 2");
+  ExpectPart(script, "failed run");
 }
 
 TEST(FreeFigure, FlaggedRunsAreHollowAndCounted) {
   std::vector<Record> runs = Runs();
-  runs[1].Set("warnings", std::string("energy"));
+  runs[1].Set("warnings", "energy");
   for (Record& run : runs) {
     if (run.Find("warnings") == nullptr) run.Set("warnings", std::string());
   }
@@ -133,7 +132,7 @@ TEST(FreeFigure, FlaggedRunsAreHollowAndCounted) {
   EXPECT_TRUE(values.figure.curves[0].hollow.empty());  // lagrange
   EXPECT_EQ(values.figure.curves[1].hollow,
             (std::vector<std::pair<double, double>>{{1e-10, 1e-8}}));
-  EXPECT_NE(GnuplotScript(values.figure).commands.find("$c1h with points pt"), std::string::npos);
+  ExpectPart(GnuplotScript(values.figure).commands, "$c1h with points pt");
   ASSERT_EQ(values.remarks.size(), 1u);
   EXPECT_EQ(values.remarks[0].find("1 of 5 runs finished with warnings"), 0u) << values.remarks[0];
   const FreeFigureResult series = MakeFreeFigure(
@@ -160,18 +159,18 @@ TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
     }
   }
   const std::vector<std::string> names = {"lagrange = odca", "reduction"};
-  const Figure joined = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  const Figure joined = FigureOf(runs);
   EXPECT_EQ(LabelsDrawn(joined), names);
   EXPECT_EQ(MergedCurves(joined, FigureSize::kTwoColumn)[0].style.color, "#000000");
-  EXPECT_NE(GnuplotScript(joined).commands.find("\"lagrange = odca\""), std::string::npos);
+  ExpectPart(GnuplotScript(joined).commands, "\"lagrange = odca\"");
   // flagged runs keep their hollow marks, failed ones their crosses, in the colour of each
-  runs[0].Set("warnings", std::string("energy"));
-  runs[4].Set("warnings", std::string("energy"));
+  runs[0].Set("warnings", "energy");
+  runs[4].Set("warnings", "energy");
   for (const std::size_t failed : {2u, 5u}) {
-    runs[failed].Set("outcome", std::string("singular"));
+    runs[failed].Set("outcome", "singular");
     runs[failed].Set("drift_position_max", Value());
   }
-  const Figure marked = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  const Figure marked = FigureOf(runs);
   EXPECT_EQ(LabelsDrawn(marked), names);
   const std::vector<Curve> drawn = MergedCurves(marked, FigureSize::kTwoColumn);
   EXPECT_EQ(drawn[0].hollow.size(), 2u);
@@ -184,26 +183,21 @@ TEST(FreeFigure, CurvesThatCoincideAreOneBlackCurveWithBothNames) {
             (std::vector<std::string>{marked.curves[0].style.color, marked.curves[1].style.color}));
   // clouds of points too
   for (const std::size_t again : {1u, 4u}) runs.push_back(runs[again]);
-  const Figure cloud = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  const Figure cloud = FigureOf(runs);
   ASSERT_FALSE(cloud.curves[0].line);
   EXPECT_EQ(LabelsDrawn(cloud), names);
   runs.back().Set("drift_position_max", 1e-4);
-  EXPECT_EQ(LabelsDrawn(MakeFreeFigure(runs, DriftOverTolerance()).figure).size(), 3u);
+  EXPECT_EQ(LabelsDrawn(FigureOf(runs)).size(), 3u);
 }
 
-TEST(FreeFigure, AnEmptyTitleIsNone) {
+TEST(FreeFigure, LabelsReplaceTextsOfAxesAndCurvesAndATitleTheTitle) {
   FreeFigure wanted = DriftOverTolerance();
-  const double titled = GnuplotScript(MakeFreeFigure(Runs(), wanted).figure).height;
+  const double titled = GnuplotScript(FigureOf(Runs())).height;
   wanted.title = "";
-  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  wanted.labels = {"rtol=relative tolerance", "odca=O-DCA", "drift_position_max="};
+  const Figure figure = FigureOf(Runs(), wanted);
   EXPECT_EQ(figure.title, "");
   EXPECT_LT(GnuplotScript(figure).height, titled) << "nor does it take a line";
-}
-
-TEST(FreeFigure, LabelsReplaceTextsOfAxesAndCurves) {
-  FreeFigure wanted = DriftOverTolerance();
-  wanted.labels = {"rtol=relative tolerance", "odca=O-DCA", "drift_position_max="};
-  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
   EXPECT_EQ(figure.x_label, "relative tolerance");
   EXPECT_EQ(figure.y_label, "");
   EXPECT_EQ(figure.curves[0].label, "lagrange");
@@ -225,8 +219,7 @@ TEST(FreeFigure, PointsThatShareAnXAreNotJoinedAndTheRemarkSaysWhatIsMixed) {
   EXPECT_FALSE(result.figure.curves[0].line);
   EXPECT_EQ(result.figure.curves[0].label, "");
   ASSERT_EQ(result.remarks.size(), 1u);
-  EXPECT_TRUE(result.remarks[0].starts_with("curves mix values of formulation;"))
-      << result.remarks[0];
+  ExpectPart(result.remarks[0], "curves mix values of formulation;");
 }
 
 // Levels differ by the dashes of their lines.
@@ -257,20 +250,20 @@ TEST(FreeFigure, TextsOnTheHorizontalAxisAreNamedTicks) {
   FreeFigure wanted = DriftOverTolerance();
   wanted.x = "formulation";
   wanted.group = "rtol";
-  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  const Figure figure = FigureOf(Runs(), wanted);
   EXPECT_EQ(figure.x_ticks, (std::vector<std::string>{"lagrange", "odca"}));
   ASSERT_EQ(figure.curves.size(), 3u);
   EXPECT_EQ(figure.curves[0].label, "10⁻¹⁰");
   EXPECT_EQ(figure.curves[0].x, (std::vector<double>{2}));
   EXPECT_FALSE(figure.log_x);
-  EXPECT_NE(GnuplotScript(figure).commands.find("(\"lagrange\" 1, \"odca\" 2)"), std::string::npos);
+  ExpectPart(GnuplotScript(figure).commands, "(\"lagrange\" 1, \"odca\" 2)");
 }
 
 TEST(FreeFigure, TwoSeriesGiveACurvePerRecordAndALabelPerGroup) {
   FreeFigure wanted = DriftOverTolerance();
   wanted.x = "series.drift_t";
   wanted.y = "series.drift";
-  const Figure figure = MakeFreeFigure(Runs(), wanted).figure;
+  const Figure figure = FigureOf(Runs(), wanted);
   EXPECT_EQ(figure.x_label, "time [s]");
   ASSERT_EQ(figure.curves.size(), 5u);
   EXPECT_EQ(figure.curves[0].label, "lagrange");
@@ -280,50 +273,49 @@ TEST(FreeFigure, TwoSeriesGiveACurvePerRecordAndALabelPerGroup) {
 }
 
 TEST(FreeFigure, MistakesAreNamed) {
-  FreeFigure wanted = DriftOverTolerance();
-  wanted.y = "drift_position_mx";
-  EXPECT_TRUE(
-      Refusal(Runs(), wanted)
-          .starts_with("--y: found \"drift_position_mx\", which no record has (did you mean "
-                       "\"drift_position_max\"?)"));
-  wanted.y = "outcome";
-  EXPECT_EQ(Refusal(Runs(), wanted), "--y outcome: found \"finished\", expected numbers");
-  wanted.y = "series.drift";
-  EXPECT_NE(Refusal(Runs(), wanted).find("expected two series or two values"), std::string::npos);
-  wanted.y = "correction_max";
-  EXPECT_EQ(Refusal(Runs(), wanted), "no record has values of both rtol and correction_max");
+  const std::pair<const char*, const char*> rows[] = {
+      {"drift_position_mx",
+       "--y: found \"drift_position_mx\", which no record has (did you mean "
+       "\"drift_position_max\"?)"},
+      {"outcome", "--y outcome: found \"finished\", expected numbers"},
+      {"series.drift", "expected two series or two values"},
+      {"correction_max", "no record has values of both rtol and correction_max"}};
+  for (const auto& [y, refusal] : rows) {
+    FreeFigure wanted = DriftOverTolerance();
+    wanted.y = y;
+    ExpectPart(Refusal(Runs(), wanted), refusal);
+  }
 }
 
 TEST(FreeFigure, ValuesThatDifferByRoundOffOrNotAtAllCanBeDrawn) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "loopbench-flat-figure.svg";
+  const TemporaryFolder folder("loopbench-flat-figure");
   for (const double difference : {0.0, 1e-15, 1e-9}) {
     for (const double level : {0.0, 1.0, -5e-8}) {
       const std::vector<Record> runs = {
           RunOf("odca", 1e-6, level),
           RunOf("odca", 1e-6 * (1 + difference), level * (1 + difference))};
-      const Figure figure = MakeFreeFigure(runs, DriftOverTolerance()).figure;
-      EXPECT_EQ(WriteFigure(file, figure), std::nullopt) << difference << " at " << level;
+      const Figure figure = FigureOf(runs);
+      EXPECT_EQ(WriteFigure(folder.path() / "flat.svg", figure), std::nullopt)
+          << difference << " at " << level;
     }
   }
-  std::filesystem::remove(file);
 }
 
 TEST(FreeFigure, SvgHasTheSameBytesEachTimeAndPdfIsOne) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "loopbench-free-figure";
-  std::filesystem::remove_all(folder);
+  const TemporaryFolder temporary("loopbench-free-figure");
+  const std::filesystem::path folder = temporary.path();
   std::vector<Record> runs = Runs();
-  runs[1].Set("outcome", std::string("singular"));
-  const Figure figure = MakeFreeFigure(runs, DriftOverTolerance()).figure;
+  runs[1].Set("outcome", "singular");
+  const Figure figure = FigureOf(runs);
   EXPECT_EQ(WriteFigure(folder / "a.svg", figure), std::nullopt);
   EXPECT_EQ(WriteFigure(folder / "b.svg", figure), std::nullopt);
   const std::string svg = ReadFile(folder / "a.svg");
   EXPECT_EQ(svg, ReadFile(folder / "b.svg"));
   for (const char* part : {"drift, position [m]", "curves by formulation", "failed run"}) {
-    EXPECT_NE(svg.find(part), std::string::npos) << part;
+    ExpectPart(svg, part);
   }
   EXPECT_EQ(WriteFigure(folder / "a.pdf", figure), std::nullopt);
   EXPECT_TRUE(ReadFile(folder / "a.pdf").starts_with("%PDF-"));
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace free_figure_test

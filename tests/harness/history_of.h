@@ -11,6 +11,7 @@
 #include "harness/base/record.h"
 #include "harness/base/text.h"
 #include "harness/history/history.h"
+#include "tests/harness/records.h"
 
 namespace loopbench::harness {
 namespace history_test {
@@ -19,12 +20,8 @@ namespace fs = std::filesystem;
 
 inline Record Measured(const std::string& mechanism, double drift, std::int64_t steps,
                        const std::vector<double>& times = {}) {
-  Record record;
-  record.Set("kind", std::string("accuracy"));
-  record.Set("mechanism", mechanism);
-  record.Set("outcome", std::string("finished"));
-  record.Set("steps", steps);
-  record.Set("drift_position_max", drift);
+  Record record = RecordOf("kind", "accuracy", "mechanism", mechanism, "outcome", "finished",
+                           "steps", steps, "drift_position_max", drift);
   if (!times.empty()) record.Set("series.wall_s", times);
   record.Set("series.t", std::vector<double>{0.0, 1.0});
   record.Set("warnings", std::string());
@@ -55,12 +52,9 @@ class HistoryOf : public testing::Test {
                         replaces);
   }
   std::string Refusal(const HistoryEntry& entry, const std::vector<Record>& records) {
-    try {
-      AddToHistory(folder_, entry, records, false);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "taken";
+    const std::string message =
+        MessageOf<std::exception>([&] { AddToHistory(folder_, entry, records, false); });
+    return message.empty() ? "taken" : message;
   }
 
   fs::path folder_;

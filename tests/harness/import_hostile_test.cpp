@@ -1,5 +1,6 @@
 // Files that nobody meant: cut off, changed byte by byte, huge, deep, with entities. Each is read
 // or refused with a message, and never anything else.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <ctime>
@@ -19,10 +20,12 @@ namespace import_hostile_test {
 
 namespace fs = std::filesystem;
 
+const std::string kBodyStart = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>";
+
 /// Reads, writes, or refuses; a message is one of ours: it names the file and is not endless.
 void ReadOrRefuse(const std::string& text) {
   try {
-    const Imported imported = ImportText(text, "file.xml");
+    const Imported imported = ImportOf(text);
     MechanismText(imported.description, imported.observe);
   } catch (const ConfigError& error) {
     const std::string message = error.what();
@@ -118,9 +121,10 @@ TEST(ImportHostile, NumbersThatAreNoneAreRefusedOrHarmless) {
   for (const std::string& text : Files()) {
     for (std::size_t at = text.find("-->"); at < text.size(); ++at) {
       const bool starts = std::isdigit(static_cast<unsigned char>(text[at])) != 0 &&
-                          (text[at - 1] == '"' || text[at - 1] == ' ' || text[at - 1] == '>');
+                          (text[at - 1] == '"' || text[at - 1] == '\'' || text[at - 1] == ' ' ||
+                           text[at - 1] == '>');
       if (!starts || at % 3 != 0) continue;
-      const std::size_t end = text.find_first_of(" \"<", at);
+      const std::size_t end = text.find_first_of(" \"'<", at);
       for (const char* number : {"nan", "1e999", "1e300", "-1e300", "0"}) {
         ReadOrRefuse(text.substr(0, at) + number + text.substr(end));
       }
@@ -135,29 +139,27 @@ std::string Repeated(const std::string& text, int times) {
 }
 
 TEST(ImportHostile, DeepFilesAreRefusedByDepthOrRead) {
-  const std::string open =
-      "<body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
+  const std::string open = "<body><joint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>";
   const auto nested = [&](int depth) {
     return "<mujoco><worldbody>" + Repeated(open, depth) + Repeated("</body>", depth) +
            "</worldbody></mujoco>";
   };
-  EXPECT_EQ(ImportText(nested(90), "file.xml").description.bodies.size(), 91u);
+  EXPECT_EQ(ImportOf(nested(90)).description.bodies.size(), 91u);
   ExpectRefusal(nested(100000), {"file.xml:", "elements within each other"});
-  ExpectRefusal("<sdf version=\"1.9\">" + Repeated("<model name=\"m\">", 100000),
+  ExpectRefusal("<sdf version='1.9'>" + Repeated("<model name='m'>", 100000),
                 {"elements within each other"});
 }
 
 TEST(ImportHostile, ManyFramesInARowAreResolved) {
-  std::string frames = "<frame name=\"f0\"/>";
+  std::string frames = "<frame name='f0'/>";
   for (int i = 1; i < 3000; ++i) {
     const std::string before = std::to_string(i - 1);
-    frames += "<frame name=\"f" + std::to_string(i) + "\" attached_to=\"f" + before +
-              "\"><pose>1 0 0 0 0 0</pose></frame>";
+    frames += "<frame name='f" + std::to_string(i) + "' attached_to='f" + before +
+              "'><pose>1 0 0 0 0 0</pose></frame>";
   }
   const Imported imported =
-      ImportText("<sdf version=\"1.9\"><model name=\"m\">" + frames +
-                     "<link name=\"a\"><pose relative_to=\"f2999\"/></link></model></sdf>",
-                 "file.xml");
+      ImportOf("<sdf version='1.9'><model name='m'>" + frames +
+               "<link name='a'><pose relative_to='f2999'/></link></model></sdf>");
   EXPECT_NEAR(imported.description.initial.coordinates[0].values[4], 2999.0, 1e-9);
 }
 
@@ -174,53 +176,41 @@ void ExpectProportional(int parts, const std::function<std::string(int)>& text) 
 }
 
 TEST(ImportHostile, ManyPartsTakeTimeInProportion) {
-  const auto repeat = [](int times, auto&& part) {
+  // {0} is the number of the part, {1} the next one
+  const auto repeat = [](int times, const std::string& part) {
     std::string all;
-    for (int i = 0; i < times; ++i) all += part(std::to_string(i), std::to_string(i + 1));
+    for (int i = 0; i < times; ++i) all += fmt::format(fmt::runtime(part), i, i + 1);
     return all;
   };
-  const std::string inertial = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
-  const auto mujoco = [&](const std::string& in_body, const std::string& in_joint = "",
-                          const std::string& rest = "") {
-    return "<mujoco><worldbody><site name=\"s\"/><body><joint " + in_joint + "/>" + inertial +
-           in_body + "</body></worldbody>" + rest + "</mujoco>";
+  const std::string body = "<body>" + kBodyStart + "<joint/>";
+  const auto mujoco = [&](const std::string& in_body, const std::string& rest = "") {
+    return "<mujoco><worldbody><site name='s'/>" + body + in_body + "</body></worldbody>" + rest +
+           "</mujoco>";
   };
-  ExpectProportional(20000, [&](int parts) {
-    return mujoco(repeat(
-        parts, [](const std::string& i, const auto&) { return "<site name=\"s" + i + "\"/>"; }));
-  });
+  const auto sdf = [](const std::string& inside) {
+    return "<sdf version='1.9'><model name='m'>" + inside + "</model></sdf>";
+  };
+  ExpectProportional(20000,
+                     [&](int parts) { return mujoco(repeat(parts, "<site name='s{0}'/>")); });
   ExpectProportional(4000, [&](int parts) {
-    return "<sdf version=\"1.9\"><model name=\"m\">" +
-           repeat(parts,
-                  [](const std::string& i, const std::string& next) {
-                    return "<link name=\"l" + i + "\"><pose relative_to=\"l" + next +
-                           "\">0 0 1 0 0 0</pose></link>";
-                  }) +
-           "<link name=\"l" + std::to_string(parts) + "\"/></model></sdf>";
+    return sdf(
+        repeat(parts, "<link name='l{0}'><pose relative_to='l{1}'>0 0 1 0 0 0</pose></link>") +
+        fmt::format("<link name='l{}'/>", parts));
   });
   // joints on frames that are attached to each other
   ExpectProportional(4000, [&](int parts) {
-    return "<sdf version=\"1.9\"><model name=\"m\"><link name=\"a\"/><frame name=\"f0\"/>" +
-           repeat(parts,
-                  [](const std::string& i, const std::string& next) {
-                    return "<frame name=\"f" + next + "\" attached_to=\"f" + i +
-                           "\"/><link name=\"l" + i + "\"/><joint name=\"j" + i +
-                           "\" type=\"ball\"><parent>f" + next + "</parent><child>l" + i +
-                           "</child></joint>";
-                  }) +
-           "</model></sdf>";
+    return sdf(
+        "<link name='a'/><frame name='f0'/>" +
+        repeat(parts,
+               "<frame name='f{1}' attached_to='f{0}'/><link name='l{0}'/><joint name='j{0}' "
+               "type='ball'><parent>f{1}</parent><child>l{0}</child></joint>"));
   });
   // springs, each in a section of its own
   ExpectProportional(4000, [&](int parts) {
-    return mujoco(repeat(parts,
-                         [&](const std::string& i, const auto&) {
-                           return "<body>" + inertial + "<joint/><site name=\"s" + i +
-                                  "\"/></body>";
-                         }),
-                  "", repeat(parts, [](const std::string& i, const auto&) {
-                    return "<tendon><spatial stiffness=\"1\"><site site=\"s\"/><site site=\"s" + i +
-                           "\"/></spatial></tendon>";
-                  }));
+    return mujoco(repeat(parts, body + "<site name='s{0}'/></body>"),
+                  repeat(parts,
+                         "<tendon><spatial stiffness='1'><site site='s'/><site site='s{0}'/>"
+                         "</spatial></tendon>"));
   });
 }
 
@@ -228,30 +218,29 @@ TEST(ImportHostile, ManyAttributesAndDefaultsAreRefused) {
   std::string attributes;
   for (int i = 0; i < 1000; ++i) attributes += " a" + std::to_string(i) + "='\"'";
   const auto joint = [&](const std::string& inside) {
-    return "<!-- a=\"\" -->\n<mujoco><worldbody><body><joint" + inside + "/>" +
-           "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/></body></worldbody></mujoco>";
+    return "<!-- a='' -->\n<mujoco><worldbody><body><joint" + inside + "/>" +
+           "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></worldbody></mujoco>";
   };
   EXPECT_EQ(Refusal(joint(attributes)), "");
-  ExpectRefusal(joint(attributes + " b=\"\""), {"file.xml:2", "1001 attributes", "at most 1000"});
+  ExpectRefusal(joint(attributes + " b=''"), {"file.xml:2", "1001 attributes", "at most 1000"});
   const auto defaults = [](int count) {
     return "<mujoco><default>" + Repeated("<joint/>", count) +
-           "</default><worldbody><body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 "
-           "1 1\"/>"
-           "</body></worldbody></mujoco>";
+           "</default><worldbody><body><joint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 "
+           "1'/></body></worldbody></mujoco>";
   };
   EXPECT_EQ(Refusal(defaults(100)), "");
   ExpectRefusal(defaults(101), {"<joint>", "more than 100 defaults"});
 }
 
 TEST(ImportHostile, EntitiesAndDocumentTypesAreRefused) {
-  ExpectRefusal("<!DOCTYPE mujoco SYSTEM \"file:///etc/passwd\"><mujoco/>", {"document type"});
-  EXPECT_NE(
-      Refusal("<!DOCTYPE m [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;\">]><mujoco>&b;</mujoco>"), "");
+  ExpectRefusal("<!DOCTYPE mujoco SYSTEM 'file:///etc/passwd'><mujoco/>", {"document type"});
+  EXPECT_NE(Refusal("<!DOCTYPE m [<!ENTITY a 'aaaa'><!ENTITY b '&a;&a;'>]><mujoco>&b;</mujoco>"),
+            "");
   ExpectRefusal("", {"file.xml:1", "well-formed XML"});
   ExpectRefusal("   ", {"file.xml:1"});
   ExpectRefusal("<mujoco><worldbody></mujoco>", {"file.xml:1", "fault of syntax"});
   ExpectRefusal("<mujoco/>\n<mujoco/>", {"file.xml:2: found a second root element, expected one"});
-  ExpectRefusal("<mujoco>\n<option a=\"\" a=\"\"/></mujoco>",
+  ExpectRefusal("<mujoco>\n<option a='' a=''/></mujoco>",
                 {"file.xml:2: found an attribute twice, or without a value in quotes"});
   ExpectRefusal("<mujoco>\xff</mujoco>", {"file.xml:1"});
   ExpectRefusal(std::string("<mujoco>\0</mujoco>", 18), {"file.xml:1"});
@@ -259,18 +248,17 @@ TEST(ImportHostile, EntitiesAndDocumentTypesAreRefused) {
 
 TEST(ImportHostile, NamesOfAnyLettersAreTextEverywhere) {
   const std::string robot =
-      "<robot name=\"&lt;b&gt;&#10;&quot;x&quot;\"><link name=\"world\"/>"
-      "<link name=\"&lt;script&gt;&#27;[31m&apos;&quot;\"><inertial><mass value=\"1\"/>"
-      "<inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>"
-      "<joint name=\"..&#10;/ \" type=\"continuous\"><parent link=\"world\"/>"
-      "<child link=\"&lt;script&gt;&#27;[31m&apos;&quot;\"/></joint></robot>";
-  const Imported imported = ImportText(robot, "file.xml");
+      "<robot name='&lt;b&gt;&#10;&quot;x&quot;'><link name='world'/><link "
+      "name='&lt;script&gt;&#27;[31m&apos;&quot;'><inertial><mass value='1'/><inertia ixx='1' "
+      "iyy='1' izz='1'/></inertial></link><joint name='..&#10;/ ' type='continuous'><parent "
+      "link='world'/><child link='&lt;script&gt;&#27;[31m&apos;&quot;'/></joint></robot>";
+  const Imported imported = ImportOf(robot);
   EXPECT_EQ(imported.description.name, "<b>\n\"x\"");
   EXPECT_EQ(imported.description.bodies[1].name, "<script>\x1b[31m'\"");
   EXPECT_NE(MechanismText(imported.description, imported.observe).find("\\u001b"),
             std::string::npos);
   // a reference to half a character is no text
-  ExpectRefusal("<robot name=\"&#xD800;\"><link name=\"a\"/></robot>", {"UTF-8"});
+  ExpectRefusal("<robot name='&#xD800;'><link name='a'/></robot>", {"UTF-8"});
 }
 
 TEST(ImportHostile, HugeFilesAreRefusedUnread) {
@@ -281,13 +269,11 @@ TEST(ImportHostile, HugeFilesAreRefusedUnread) {
 }
 
 TEST(ImportHostile, ManyThingsWithoutNamesHaveShortOnes) {
-  const std::string body =
-      "<body><joint/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
+  const std::string body = "<body><joint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>";
   const Imported imported =
-      ImportText("<mujoco><worldbody>" + body + "</body>" + body + "</body></worldbody><equality>" +
-                     Repeated("<connect body1=\"body1\" body2=\"body2\" anchor=\"0 0 0\"/>", 3000) +
-                     "</equality></mujoco>",
-                 "file.xml");
+      ImportOf("<mujoco><worldbody>" + body + "</body>" + body + "</body></worldbody><equality>" +
+               Repeated("<connect body1='body1' body2='body2' anchor='0 0 0'/>", 3000) +
+               "</equality></mujoco>");
   std::set<std::string> names;
   for (const JointDescription& joint : imported.description.joints) {
     names.insert(joint.name);
@@ -296,75 +282,48 @@ TEST(ImportHostile, ManyThingsWithoutNamesHaveShortOnes) {
   EXPECT_EQ(names.size(), 3002u);
 }
 
-/// A folder "model" with the main file, beside a file that is not below it.
-class ImportIncludes : public testing::Test {
+/// Beside the folder "model" is a file that is not below it.
+class ImportIncludes : public ModelFolder {
  protected:
   ImportIncludes() {
-    fs::remove_all(top_);
-    fs::create_directories(top_ / "model" / "parts");
-    fs::create_directories(top_ / "model-2");
-    for (const char* secret : {"secret.xml", "model-2/secret.xml"}) {
-      WriteFileAtomically(top_ / secret, "<x><worldbody/></x>");
-    }
-  }
-  ~ImportIncludes() override { fs::remove_all(top_); }
-
-  void Write(const std::string& name, const std::string& text) const {
-    WriteFileAtomically(top_ / "model" / name, text);
-  }
-  Imported Read() const { return ImportMechanism(top_ / "model" / "main.xml"); }
-  void ExpectMessage(const std::vector<std::string>& words) const {
-    std::string message;
-    try {
-      Read();
-    } catch (const ConfigError& error) {
-      message = error.what();
-    }
-    for (const std::string& word : words) {
-      EXPECT_NE(message.find(word), std::string::npos) << "no <" << word << "> in " << message;
+    for (const char* secret : {"../secret.xml", "../model-2/secret.xml", "parts/none.txt"}) {
+      Write(secret, "<x><worldbody/></x>");
     }
   }
   /// Expects this message where the main file includes `name` in its second line.
-  void ExpectRefused(const std::string& name, const std::vector<std::string>& words) const {
-    Write("main.xml", "<mujoco>\n<include file=\"" + name + "\"/></mujoco>");
-    std::vector<std::string> all = words;
-    all.push_back("model/main.xml:2: <include> file: found \"" + name + "\", expected ");
-    ExpectMessage(all);
+  void ExpectRefused(const std::string& name, std::vector<std::string> words) const {
+    Write("main.xml", "<mujoco>\n<include file='" + name + "'/></mujoco>");
+    words.push_back("model/main.xml:2: <include> file: found \"" + name + "\", expected ");
+    ExpectMessage(words);
   }
-
-  const fs::path top_ = fs::path(testing::TempDir()) / "loopbench-includes";
 };
-
-const std::string kBodyStart = "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>";
 
 TEST_F(ImportIncludes, ElementsOfIncludedFilesStandInPlace) {
   const auto main = [](const std::string& defaults, const std::string& arm) {
-    return "<mujoco model=\"m\">" + defaults + "<worldbody><body name=\"a\"><joint name=\"j\"/>" +
-           kBodyStart + arm + "<body name=\"z\"><joint/>" + kBodyStart +
+    return "<mujoco model='m'>" + defaults + "<worldbody><body name='a'><joint name='j'/>" +
+           kBodyStart + arm + "<body name='z'><joint/>" + kBodyStart +
            "</body></body></worldbody></mujoco>";
   };
   const auto arm = [](const std::string& tip) {
-    return "<body name=\"b\"><joint name=\"k\"/>" + kBodyStart + tip + "</body><site name=\"s\"/>";
+    return "<body name='b'><joint name='k'/>" + kBodyStart + tip + "</body><site name='s'/>";
   };
-  const std::string defaults = "<default><joint damping=\"2\" axis=\"0 1 0\"/></default>",
-                    tip =
-                        "<body name=\"c\" pos=\"1 0 0\"><joint/>\n" + kBodyStart + "<geom/></body>";
-  Write("main.xml", main("<include file=\"defaults.xml\"/>", "<include file=\"parts/arm.xml\"/>"));
+  const std::string defaults = "<default><joint damping='2' axis='0 1 0'/></default>",
+                    tip = "<body name='c' pos='1 0 0'><joint/>\n" + kBodyStart + "<geom/></body>";
+  Write("main.xml", main("<include file='defaults.xml'/>", "<include file='parts/arm.xml'/>"));
   Write("defaults.xml", "\xEF\xBB\xBF<mujocoinclude>" + defaults + "</mujocoinclude>");
-  Write("parts/arm.xml", "<mujoco>" + arm("<include file=\"tip.xml\"/>") + "</mujoco>");
+  Write("parts/arm.xml", "<mujoco>" + arm("<include file='tip.xml'/>") + "</mujoco>");
   Write("parts/tip.xml", "<x>" + tip + "</x>");  // beside the file that includes it
-  const Imported parts = Read(), whole = ImportText(main(defaults, arm(tip)), "file.xml");
+  const Imported parts = Read(), whole = ImportOf(main(defaults, arm(tip)));
   EXPECT_EQ(MechanismText(parts.description, parts.observe),
             MechanismText(whole.description, whole.observe));
   EXPECT_EQ(parts.description.bodies.size(), 5u);
   ASSERT_EQ(parts.notes.size(), 1u);
-  EXPECT_EQ(parts.notes[0].file, (top_ / "model" / "parts" / "tip.xml").string());
+  EXPECT_EQ(parts.notes[0].file, (model_ / "parts/tip.xml").string());
   EXPECT_EQ(parts.notes[0].line, 2);
   EXPECT_EQ(parts.notes[0].element, "<geom>");
   // messages name the file and the line there
-  Write("parts/tip.xml", "<x>\n<body name=\"c\" pos=\"1 0\"/></x>");
-  ExpectMessage(
-      {"model/parts/tip.xml:2: <body name=\"c\"> pos: found \"1 0\", expected 3 numbers"});
+  Write("parts/tip.xml", "<x>\n<body name='c' pos='1 0'/></x>");
+  ExpectMessage({"model/parts/tip.xml:2: <body name='c'> pos: found '1 0', expected 3 numbers"});
   Write("parts/tip.xml", "<x>\n<body></x>");
   ExpectMessage({"model/parts/tip.xml:2: found a fault of syntax"});
   // names from the folder of the main file come first
@@ -374,58 +333,58 @@ TEST_F(ImportIncludes, ElementsOfIncludedFilesStandInPlace) {
 
 TEST_F(ImportIncludes, FilesBelowTheFolderAreReadAndNoOthers) {
   const std::string expected = "a file below the folder of the main file";
-  fs::create_symlink(top_ / "secret.xml", top_ / "model" / "link.xml");
-  fs::create_directory_symlink(top_, top_ / "model" / "up");
+  fs::create_symlink(folder_.path() / "secret.xml", model_ / "link.xml");
+  fs::create_directory_symlink(folder_.path(), model_ / "up");
   for (const std::string& name :
        {std::string("../secret.xml"), std::string("../model-2/secret.xml"),
         std::string("parts/../../secret.xml"), std::string("link.xml"),
-        std::string("up/secret.xml"), (top_ / "secret.xml").string(), std::string("/dev/zero"),
-        std::string("/etc/passwd")}) {
+        std::string("up/secret.xml"), (folder_.path() / "secret.xml").string(),
+        std::string("/dev/zero"), std::string("/etc/passwd")}) {
     ExpectRefused(name, {expected});
   }
   for (const std::string& name : {std::string("none.xml"), std::string("parts"), std::string("."),
                                   std::string("none/../main.xml"), std::string(5000, 'a')}) {
-    Write("main.xml", "<mujoco>\n<include file=\"" + name + "\"/></mujoco>");
+    Write("main.xml", "<mujoco>\n<include file='" + name + "'/></mujoco>");
     ExpectMessage({"model/main.xml:2: <include> file: found ", "a file that exists"});
   }
   ExpectRefused("", {"a name that is not empty"});
   Write("main.xml", "<mujoco>\n<include/></mujoco>");
-  ExpectMessage({"model/main.xml:2: <include>: found no \"file\"", expected});
+  ExpectMessage({"model/main.xml:2: <include>: found no 'file'", expected});
   // a way out and back, and a link within the folder, stay below it
   Write("world.xml", "<x><worldbody><body><joint/>" + kBodyStart + "</body></worldbody></x>");
-  fs::create_symlink("world.xml", top_ / "model" / "near.xml");
+  fs::create_symlink("world.xml", model_ / "near.xml");
   for (const char* name : {"../model/world.xml", "near.xml", "parts/../world.xml"}) {
-    Write("main.xml", "<mujoco><include file=\"" + std::string(name) + "\"/></mujoco>");
+    Write("main.xml", "<mujoco><include file='" + std::string(name) + "'/></mujoco>");
     EXPECT_EQ(Read().description.bodies.size(), 2u);
   }
 }
 
 TEST_F(ImportIncludes, CyclesBombsAndHugeFilesAreRefused) {
   const auto include = [](const std::string& name, int times = 1) {
-    return "<x>" + Repeated("\n<include file=\"" + name + "\"/>", times) + "</x>";
+    return "<x>" + Repeated("\n<include file='" + name + "'/>", times) + "</x>";
   };
   ExpectRefused("main.xml", {"no cycle of files (main.xml > main.xml)"});
   Write("a.xml", include("parts/b.xml"));
   Write("parts/b.xml", include("main.xml"));
-  Write("main.xml", "<mujoco><include file=\"a.xml\"/></mujoco>");
-  ExpectMessage({"model/parts/b.xml:2: <include> file: found \"main.xml\"",
+  Write("main.xml", "<mujoco><include file='a.xml'/></mujoco>");
+  ExpectMessage({"model/parts/b.xml:2: <include> file: found 'main.xml'",
                  "no cycle of files (main.xml > a.xml > b.xml > main.xml)"});
   // each file twice in the one before
   for (int i = 0; i < 12; ++i) {
     Write("bomb" + std::to_string(i) + ".xml", include("bomb" + std::to_string(i + 1) + ".xml", 2));
   }
   Write("bomb12.xml", "<x/>");
-  Write("main.xml", "<mujoco><include file=\"bomb0.xml\"/></mujoco>");
-  ExpectMessage({"model/bomb11.xml:3: <include> file: found \"bomb12.xml\"", "each file once"});
+  Write("main.xml", "<mujoco><include file='bomb0.xml'/></mujoco>");
+  ExpectMessage({"model/bomb11.xml:3: <include> file: found 'bomb12.xml'", "each file once"});
   for (int i = 0; i < 17; ++i) {
     Write("deep" + std::to_string(i) + ".xml", include("deep" + std::to_string(i + 1) + ".xml"));
   }
-  Write("main.xml", "<mujoco><include file=\"deep0.xml\"/></mujoco>");
-  ExpectMessage({"model/deep15.xml:2: <include> file: found \"deep16.xml\"", "at most 16 nested"});
+  Write("main.xml", "<mujoco><include file='deep0.xml'/></mujoco>");
+  ExpectMessage({"model/deep15.xml:2: <include> file: found 'deep16.xml'", "at most 16 nested"});
   Write("half.xml", "<x>" + std::string(kMaxConfigBytes / 2, ' ') + "</x>");
   Write("half2.xml", "<x>" + std::string(kMaxConfigBytes / 2, ' ') + "</x>");
-  Write("main.xml", "<mujoco><include file=\"half.xml\"/>\n<include file=\"half2.xml\"/></mujoco>");
-  ExpectMessage({"model/main.xml:2: <include> file: found \"half2.xml\"", "16 MiB in all"});
+  Write("main.xml", "<mujoco><include file='half.xml'/>\n<include file='half2.xml'/></mujoco>");
+  ExpectMessage({"model/main.xml:2: <include> file: found 'half2.xml'", "16 MiB in all"});
 }
 
 }  // namespace import_hostile_test

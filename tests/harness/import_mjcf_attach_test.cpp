@@ -9,33 +9,7 @@
 namespace loopbench::harness {
 namespace import_mjcf_attach_test {
 
-namespace fs = std::filesystem;
-
-class ImportMjcfAttach : public testing::Test {
- protected:
-  ImportMjcfAttach() { fs::create_directories(folder_.path() / "model/parts"); }
-
-  void Write(const std::string& name, const std::string& text) const {
-    WriteFileAtomically(folder_.path() / "model" / name, text);
-  }
-  Imported Read() const { return ImportMechanism(folder_.path() / "model/main.xml"); }
-  std::string Message() const {
-    try {
-      Read();
-    } catch (const ConfigError& error) {
-      return error.what();
-    }
-    return "";
-  }
-  void ExpectMessage(const std::vector<std::string>& words) const {
-    const std::string message = Message();
-    for (const std::string& word : words) {
-      EXPECT_NE(message.find(word), std::string::npos) << "no <" << word << "> in " << message;
-    }
-  }
-
-  TemporaryFolder folder_{"loopbench-attach"};
-};
+using ImportMjcfAttach = ModelFolder;
 
 std::string TextOf(const Imported& imported) {
   return MechanismText(imported.description, imported.observe);
@@ -65,46 +39,44 @@ const std::string kDefaults = R"(<default class="arm"><joint axis="0 1 0" dampin
   <default class="soft"><joint axis="1 0 0" stiffness="7"/></default></default>)";
 
 TEST_F(ImportMjcfAttach, IsTheSameAsTheModelWrittenOut) {
-  Write("parts/arm.xml", "<mujoco model=\"arm\"><compiler angle=\"radian\"/>" + kDefaults +
-                             "<worldbody>" + Arm("", "", "class=\"soft\"") + "</worldbody>" +
+  Write("parts/arm.xml", "<mujoco model='arm'><compiler angle='radian'/>" + kDefaults +
+                             "<worldbody>" + Arm("", "", "class='soft'") + "</worldbody>" +
                              ArmParts("") + "</mujoco>");
   // a class of the main model must not reach the arms, which have their own
   const std::string before =
-      "<compiler angle=\"radian\"/><default><joint axis=\"0 0 1\" damping=\"9\"/></default>";
+      "<compiler angle='radian'/><default><joint axis='0 0 1' damping='9'/></default>";
   const auto main = [&](const std::string& left, const std::string& right,
                         const std::string& rest) {
-    return "<mujoco model=\"m\">" + before + "<worldbody><body name=\"cart\">" + kMass +
-           "<joint name=\"c\"/><frame pos=\"1 0 0\">" + left +
-           "</frame></body><body name=\"post\" pos=\"0 3 0\" euler=\"0 0 1\">" + right +
+    return "<mujoco model='m'>" + before + "<worldbody><body name='cart'>" + kMass +
+           "<joint name='c'/><frame pos='1 0 0'>" + left +
+           "</frame></body><body name='post' pos='0 3 0' euler='0 0 1'>" + right +
            "</body></worldbody>" + rest + "</mujoco>";
   };
-  Write("main.xml", main("<attach model=\"arm\" body=\"base\" prefix=\"l_\"/>",
-                         "<attach model=\"arm\" prefix=\"r_\"/>",
-                         "<asset><model name=\"arm\" file=\"parts/arm.xml\"/></asset>"));
-  const std::string hinge = "axis=\"0 1 0\" damping=\"0.5\"",
-                    soft = "axis=\"1 0 0\" damping=\"0.5\" stiffness=\"7\"";
+  Write("main.xml",
+        main("<attach model='arm' body='base' prefix='l_'/>", "<attach model='arm' prefix='r_'/>",
+             "<asset><model name='arm' file='parts/arm.xml'/></asset>"));
+  const std::string hinge = "axis='0 1 0' damping='0.5'",
+                    soft = "axis='1 0 0' damping='0.5' stiffness='7'";
   const auto parts = [](const std::string& p) {
     std::string text = ArmParts(p);
     return text.substr(0, text.find("<keyframe>"));
   };
   const std::string whole =
       main(Arm("l_", hinge, soft), Arm("r_", hinge, soft), parts("l_") + parts("r_"));
-  EXPECT_EQ(TextOf(Read()), TextOf(ImportText(whole, "file.xml")));
+  EXPECT_EQ(TextOf(Read()), TextOf(ImportOf(whole)));
   EXPECT_EQ(Read().description.bodies.size(), 6u);  // the ground and the post are one
 }
 
 TEST_F(ImportMjcfAttach, ModelsAttachModels) {
-  Write("parts/tip.xml", "<mujoco><worldbody><body name=\"tip\">" + kMass +
-                             "<joint name=\"j\"/></body></worldbody></mujoco>");
+  Write("parts/tip.xml", "<mujoco><worldbody><body name='tip'>" + kMass +
+                             "<joint name='j'/></body></worldbody></mujoco>");
   Write("parts/arm.xml",
-        "<mujoco><asset><model name=\"tip\" file=\"tip.xml\"/></asset><worldbody>"
-        "<body name=\"arm\">" +
+        "<mujoco><asset><model name='tip' file='tip.xml'/></asset><worldbody><body name='arm'>" +
             kMass +
-            "<joint name=\"j\"/><attach model=\"tip\" prefix=\"t_\"/></body>"
-            "</worldbody></mujoco>");
+            "<joint name='j'/><attach model='tip' prefix='t_'/></body></worldbody></mujoco>");
   Write("main.xml",
-        "<mujoco><asset><model name=\"arm\" file=\"parts/arm.xml\"/></asset><worldbody>"
-        "<attach model=\"arm\" body=\"world\" prefix=\"a_\"/></worldbody></mujoco>");
+        "<mujoco><asset><model name='arm' file='parts/arm.xml'/></asset><worldbody><attach "
+        "model='arm' body='world' prefix='a_'/></worldbody></mujoco>");
   const Imported imported = Read();
   ASSERT_EQ(imported.description.joints.size(), 2u);
   EXPECT_EQ(imported.description.joints[0].name, "a_j");
@@ -112,25 +84,23 @@ TEST_F(ImportMjcfAttach, ModelsAttachModels) {
   EXPECT_EQ(imported.description.bodies[2].name, "a_t_tip");
   // a frame of the world, with what is in it
   Write("parts/tip.xml",
-        "<mujoco model=\"Tip\"><worldbody><frame name=\"f\" pos=\"0 0 2\"><body name=\"tip\">" +
-            kMass +
-            "<joint name=\"j\"/></body></frame><body name=\"other\"/></worldbody>"
-            "</mujoco>");
+        "<mujoco model='Tip'><worldbody><frame name='f' pos='0 0 2'><body name='tip'>" + kMass +
+            "<joint name='j'/></body></frame><body name='other'/></worldbody></mujoco>");
   Write("main.xml",
-        "<mujoco><asset><model file=\"parts/tip.xml\"/></asset><worldbody>"
-        "<attach model=\"Tip\" frame=\"f\"/></worldbody></mujoco>");
+        "<mujoco><asset><model file='parts/tip.xml'/></asset><worldbody><attach model='Tip' "
+        "frame='f'/></worldbody></mujoco>");
   ASSERT_EQ(Read().description.bodies.size(), 2u);
   EXPECT_EQ(Read().description.joints[0].from.position.z(), 2.0);
 }
 
 TEST_F(ImportMjcfAttach, PartsThatReferToTheRestOfAModelStayThere) {
-  Write("arm.xml", "<mujoco><worldbody>" + Arm("", "", "") + "<body name=\"other\">" + kMass +
-                       "<joint name=\"o\"/></body></worldbody><actuator><motor joint=\"o\"/><motor "
-                       "joint=\"k\"/></actuator><equality><joint joint1=\"o\" joint2=\"j\"/>"
-                       "</equality></mujoco>");
+  Write("arm.xml",
+        "<mujoco><worldbody>" + Arm("", "", "") + "<body name='other'>" + kMass +
+            "<joint name='o'/></body></worldbody><actuator><motor joint='o'/><motor "
+            "joint='k'/></actuator><equality><joint joint1='o' joint2='j'/></equality></mujoco>");
   Write("main.xml",
-        "<mujoco><asset><model name=\"arm\" file=\"arm.xml\"/></asset><worldbody>"
-        "<attach model=\"arm\" body=\"tip\" prefix=\"x\"/></worldbody></mujoco>");
+        "<mujoco><asset><model name='arm' file='arm.xml'/></asset><worldbody><attach model='arm' "
+        "body='tip' prefix='x'/></worldbody></mujoco>");
   const Imported imported = Read();
   ASSERT_EQ(imported.description.bodies.size(), 2u);
   EXPECT_EQ(imported.description.joints[0].name, "xk");
@@ -139,14 +109,14 @@ TEST_F(ImportMjcfAttach, PartsThatReferToTheRestOfAModelStayThere) {
 
 TEST_F(ImportMjcfAttach, CopiesAreTheSameAsWrittenOut) {
   // classes apply as where the original is: soft by childclass, and arm, the main class
-  const std::string arm = "class=\"arm\"", soft = "class=\"soft\"";
+  const std::string arm = "class='arm'", soft = "class='soft'";
   const auto main = [&](const std::string& copy, const std::string& rest) {
-    return "<mujoco model=\"m\"><compiler angle=\"radian\"/>" + kDefaults +
-           "<worldbody><body name=\"post\" childclass=\"soft\">" + kMass +
-           "<joint name=\"p\"/><frame pos=\"0 0 9\">" + Arm("", "", arm) +
-           "</frame></body><body name=\"cart\" pos=\"1 0 0\">" + kMass +
-           "<joint name=\"c\"/><frame pos=\"0 1 0\">" + copy + "</frame></body></worldbody>" +
-           rest + "</mujoco>";
+    return "<mujoco model='m'><compiler angle='radian'/>" + kDefaults +
+           "<worldbody><body name='post' childclass='soft'>" + kMass +
+           "<joint name='p'/><frame pos='0 0 9'>" + Arm("", "", arm) +
+           "</frame></body><body name='cart' pos='1 0 0'>" + kMass +
+           "<joint name='c'/><frame pos='0 1 0'>" + copy + "</frame></body></worldbody>" + rest +
+           "</mujoco>";
   };
   const auto parts = [](const std::string& p) {
     const std::string text = ArmParts(p);
@@ -154,11 +124,11 @@ TEST_F(ImportMjcfAttach, CopiesAreTheSameAsWrittenOut) {
   };
   // not copied: a reference to p; and to the world, as in MuJoCo
   const std::string others =
-      "<equality><joint joint1=\"p\" joint2=\"j\"/>"
-      "<connect body1=\"tip\" body2=\"world\" anchor=\"0 0 0\"/></equality>";
-  Write("main.xml", main("<attach body=\"base\" prefix=\"l_\"/>", parts("") + others));
+      "<equality><joint joint1='p' joint2='j'/><connect body1='tip' body2='world' anchor='0 0 "
+      "0'/></equality>";
+  Write("main.xml", main("<attach body='base' prefix='l_'/>", parts("") + others));
   const std::string whole = main(Arm("l_", soft, arm), parts("") + others + parts("l_"));
-  EXPECT_EQ(TextOf(Read()), TextOf(ImportText(whole, "file.xml")));
+  EXPECT_EQ(TextOf(Read()), TextOf(ImportOf(whole)));
   const MechanismDescription read = Read().description;
   ASSERT_EQ(read.bodies.size(), 7u);
   EXPECT_EQ(read.bodies[6].name, "l_tip");
@@ -167,11 +137,11 @@ TEST_F(ImportMjcfAttach, CopiesAreTheSameAsWrittenOut) {
 }
 
 TEST_F(ImportMjcfAttach, CopiesContainCopies) {
-  const std::string hinge = kMass + "<joint name=\"j\" frictionloss=\"1\"/>";
-  Write("main.xml", "<mujoco><worldbody>\n<frame name=\"f\" pos=\"0 0 2\"><body name=\"a\">" +
-                        hinge + "</body></frame><body name=\"b\">" + kMass +
-                        "<joint name=\"k\"/><attach frame=\"f\" prefix=\"x_\"/></body>\n"
-                        "<attach body=\"b\" prefix=\"y_\"/></worldbody></mujoco>");
+  const std::string hinge = kMass + "<joint name='j' frictionloss='1'/>";
+  Write("main.xml", "<mujoco><worldbody>\n<frame name='f' pos='0 0 2'><body name='a'>" + hinge +
+                        "</body></frame><body name='b'>" + kMass +
+                        "<joint name='k'/><attach frame='f' prefix='x_'/></body>\n<attach body='b' "
+                        "prefix='y_'/></worldbody></mujoco>");
   const Imported imported = Read();
   std::vector<std::string> names;
   for (const JointDescription& joint : imported.description.joints) names.push_back(joint.name);
@@ -186,14 +156,13 @@ TEST_F(ImportMjcfAttach, CopiesContainCopies) {
 
 TEST_F(ImportMjcfAttach, CopiesAreAttachedToo) {
   Write("arm.xml",
-        "<mujoco><worldbody><body name=\"a\">" + kMass +
-            "<joint name=\"j\"/></body><body name=\"b\">" + kMass +
-            "<joint name=\"k\"/><attach body=\"a\" prefix=\"x_\"/></body></worldbody>"
-            "<actuator><damper joint=\"j\" kv=\"2\" ctrlrange=\"0 1\"/></actuator></mujoco>");
+        "<mujoco><worldbody><body name='a'>" + kMass + "<joint name='j'/></body><body name='b'>" +
+            kMass +
+            "<joint name='k'/><attach body='a' prefix='x_'/></body></worldbody><actuator><damper "
+            "joint='j' kv='2' ctrlrange='0 1'/></actuator></mujoco>");
   Write("main.xml",
-        "<mujoco><asset><model name=\"arm\" file=\"arm.xml\"/></asset><worldbody>"
-        "<attach model=\"arm\" body=\"b\" prefix=\"m_\"/></worldbody><keyframe><key "
-        "ctrl=\"1\"/></keyframe></mujoco>");
+        "<mujoco><asset><model name='arm' file='arm.xml'/></asset><worldbody><attach model='arm' "
+        "body='b' prefix='m_'/></worldbody><keyframe><key ctrl='1'/></keyframe></mujoco>");
   const Imported imported = Read();
   ASSERT_EQ(imported.description.joints.size(), 2u);
   EXPECT_EQ(imported.description.joints[1].name, "m_x_j");
@@ -208,44 +177,42 @@ TEST_F(ImportMjcfAttach, FaultsOfCopiesAreNamed) {
     Write("main.xml", "<mujoco><worldbody>\n" + text + "</worldbody></mujoco>");
   };
   const std::string arm = Arm("", "", "");
-  world(arm + "<attach body=\"no\" prefix=\"p\"/>");
-  ExpectMessage({"<attach> body: found \"no\"", "the name of a body before this <attach>"});
-  world("<attach body=\"base\" prefix=\"p\"/>" + arm);
-  ExpectMessage({"main.xml:2: <attach> body: found \"base\"", "before this <attach>"});
-  world(arm + "<attach body=\"base\"/>");
-  ExpectMessage({"<attach>: found no \"prefix\""});
-  world(arm + "<attach body=\"base\" prefix=\"\"/>");
-  ExpectMessage({"<attach> prefix: found \"\"", "there is a body base"});
-  world(arm + "<body name=\"x\"><site name=\"ps\"/></body><attach body=\"base\" prefix=\"p\"/>");
-  ExpectMessage({"<attach> prefix: found \"p\"", "there is a site ps"});
-  world("<body name=\"a\"><body name=\"b\"><attach body=\"a\" prefix=\"p\"/></body></body>");
-  ExpectMessage({"<attach> body: found \"a\"", "no cycle: this body contains the <attach>"});
-  world("<frame name=\"a\"><attach frame=\"a\" prefix=\"p\"/></frame>");
-  ExpectMessage({"<attach> frame: found \"a\"", "no cycle: this frame contains the <attach>"});
-  world("<replicate count=\"2\">" + arm + "</replicate><attach body=\"tip\" prefix=\"p\"/>");
+  world(arm + "<attach body='no' prefix='p'/>");
+  ExpectMessage({"<attach> body: found 'no'", "the name of a body before this <attach>"});
+  world("<attach body='base' prefix='p'/>" + arm);
+  ExpectMessage({"main.xml:2: <attach> body: found 'base'", "before this <attach>"});
+  world(arm + "<attach body='base'/>");
+  ExpectMessage({"<attach>: found no 'prefix'"});
+  world(arm + "<attach body='base' prefix=''/>");
+  ExpectMessage({"<attach> prefix: found ''", "there is a body base"});
+  world(arm + "<body name='x'><site name='ps'/></body><attach body='base' prefix='p'/>");
+  ExpectMessage({"<attach> prefix: found 'p'", "there is a site ps"});
+  world("<body name='a'><body name='b'><attach body='a' prefix='p'/></body></body>");
+  ExpectMessage({"<attach> body: found 'a'", "no cycle: this body contains the <attach>"});
+  world("<frame name='a'><attach frame='a' prefix='p'/></frame>");
+  ExpectMessage({"<attach> frame: found 'a'", "no cycle: this frame contains the <attach>"});
+  world("<replicate count='2'>" + arm + "</replicate><attach body='tip' prefix='p'/>");
   ExpectMessage({"a body that is not in a <replicate>"});
   // each body contains the previous one twice
-  std::string bodies = "<body name=\"b0\"/>";
+  std::string bodies = "<body name='b0'/>";
   for (int i = 1; i < 30; ++i) {
     bodies += fmt::format(
-        "<body name=\"b{0}\"><attach body=\"b{1}\" prefix=\"x{0}\"/><attach body=\"b{1}\" "
-        "prefix=\"y{0}\"/></body>",
+        "<body name='b{0}'><attach body='b{1}' prefix='x{0}'/><attach body='b{1}' "
+        "prefix='y{0}'/></body>",
         i, i - 1);
   }
   world(bodies);
   ExpectMessage({"<attach>: found more than 100000 elements of copies"});
   // each body is one deeper than the previous one
-  bodies = "<body name=\"b0\"/>";
+  bodies = "<body name='b0'/>";
   for (int i = 1; i < 300; ++i) {
-    bodies +=
-        fmt::format("<body name=\"b{0}\"><attach body=\"b{1}\" prefix=\"x\"/></body>", i, i - 1);
+    bodies += fmt::format("<body name='b{0}'><attach body='b{1}' prefix='x'/></body>", i, i - 1);
   }
   world(bodies);
   ExpectMessage({"<attach>: found a copy with more than", "elements within each other"});
 }
 
 TEST_F(ImportMjcfAttach, MeshesAreFoundBesideTheirModel) {
-  fs::create_directories(folder_.path() / "model/parts/meshes");
   // a cube of 1 m
   std::string cube;
   for (const int i : {0, 1, 2, 3, 4, 5, 6, 7}) {
@@ -255,56 +222,56 @@ TEST_F(ImportMjcfAttach, MeshesAreFoundBesideTheirModel) {
     cube += fmt::format("f {}\n", face);
   }
   Write("parts/meshes/cube.obj", cube);
-  Write("parts/box.xml",
-        "<mujoco><compiler meshdir=\"meshes\"/><asset><mesh file=\"cube.obj\"/></asset><worldbody>"
-        "<body name=\"b\"><joint/><geom type=\"mesh\" mesh=\"cube\" density=\"10\"/></body>"
-        "</worldbody></mujoco>");
+  Write(
+      "parts/box.xml",
+      "<mujoco><compiler meshdir='meshes'/><asset><mesh file='cube.obj'/></asset><worldbody><body "
+      "name='b'><joint/><geom type='mesh' mesh='cube' density='10'/></body></worldbody></mujoco>");
   Write("main.xml",
-        "<mujoco><asset><model name=\"box\" file=\"parts/box.xml\"/></asset><worldbody>"
-        "<attach model=\"box\" prefix=\"p_\"/></worldbody></mujoco>");
+        "<mujoco><asset><model name='box' file='parts/box.xml'/></asset><worldbody><attach "
+        "model='box' prefix='p_'/></worldbody></mujoco>");
   EXPECT_NEAR(Read().description.bodies[1].mass, 10.0, 1e-13);
   Write("main.xml",
-        "<mujoco><compiler meshdir=\"parts/meshes\" strippath=\"true\"/><asset><mesh name=\"m\" "
-        "file=\"away/cube.obj\"/></asset><worldbody><body><joint/><geom type=\"mesh\" mesh=\"m\" "
-        "density=\"10\"/></body></worldbody></mujoco>");
+        "<mujoco><compiler meshdir='parts/meshes' strippath='true'/><asset><mesh name='m' "
+        "file='away/cube.obj'/></asset><worldbody><body><joint/><geom type='mesh' mesh='m' "
+        "density='10'/></body></worldbody></mujoco>");
   EXPECT_NEAR(Read().description.bodies[1].mass, 10.0, 1e-13);
 }
 
 TEST_F(ImportMjcfAttach, FaultsAreNamed) {
   const auto attach = [&](const std::string& attributes,
-                          const std::string& asset = "<model name=\"a\" file=\"a.xml\"/>") {
+                          const std::string& asset = "<model name='a' file='a.xml'/>") {
     Write("main.xml", "<mujoco><asset>" + asset + "</asset><worldbody>\n<attach " + attributes +
                           "/></worldbody></mujoco>");
   };
   Write("a.xml", "<mujoco><worldbody>" + Arm("", "", "") + "</worldbody></mujoco>");
-  attach("prefix=\"p\"");
-  ExpectMessage({"main.xml:2: <attach>: found no \"model\", \"body\" or \"frame\"",
+  attach("prefix='p'");
+  ExpectMessage({"main.xml:2: <attach>: found no 'model', 'body' or 'frame'",
                  "a <model> of <asset>, or a body"});
-  attach("model=\"a\" pos=\"1 0 0\"");
-  ExpectMessage({"main.xml:2: <attach>: found \"pos\"", "a <frame> around it moves it"});
-  attach("body=\"a\" frame=\"b\" prefix=\"p\"");
-  ExpectMessage({"main.xml:2: <attach>: found \"body\" and \"frame\", expected one of them"});
-  attach("model=\"b\"");
-  ExpectMessage({"main.xml:2: <attach> model: found \"b\"", "the name of a <model> in <asset>"});
-  attach("model=\"a\" body=\"no\"");
-  ExpectMessage({"main.xml:2: <attach> body: found \"no\"", "the name of a body of", "a.xml"});
-  attach("model=\"a\"", "<model name=\"a\" file=\"../a.xml\"/>");
-  ExpectMessage({"main.xml:1: <model name=\"a\"> file: found \"../a.xml\""});
-  attach("model=\"a\"", "<model name=\"a\" file=\"main.xml\"/>");
+  attach("model='a' pos='1 0 0'");
+  ExpectMessage({"main.xml:2: <attach>: found 'pos'", "a <frame> around it moves it"});
+  attach("body='a' frame='b' prefix='p'");
+  ExpectMessage({"main.xml:2: <attach>: found 'body' and 'frame', expected one of them"});
+  attach("model='b'");
+  ExpectMessage({"main.xml:2: <attach> model: found 'b'", "the name of a <model> in <asset>"});
+  attach("model='a' body='no'");
+  ExpectMessage({"main.xml:2: <attach> body: found 'no'", "the name of a body of", "a.xml"});
+  attach("model='a'", "<model name='a' file='../a.xml'/>");
+  ExpectMessage({"main.xml:1: <model name='a'> file: found '../a.xml'"});
+  attach("model='a'", "<model name='a' file='main.xml'/>");
   ExpectMessage({"no cycle of files (main.xml > main.xml)"});
-  Write("a.xml", "<mujoco><compiler angle=\"radian\"/><worldbody/></mujoco>");
-  attach("model=\"a\"");
-  ExpectMessage({"<attach> model: found \"a\"", "a model with angle=\"degree\" in its <compiler>"});
+  Write("a.xml", "<mujoco><compiler angle='radian'/><worldbody/></mujoco>");
+  attach("model='a'");
+  ExpectMessage({"<attach> model: found 'a'", "a model with angle='degree' in its <compiler>"});
   // each model attaches the next twice
   for (int i = 0; i < 20; ++i) {
-    const std::string next = fmt::format("<attach model=\"n\" prefix=\"{}\"/>", "a");
+    const std::string next = fmt::format("<attach model='n' prefix='{}'/>", "a");
     Write(fmt::format("bomb{}.xml", i),
-          fmt::format("<mujoco><asset><model name=\"n\" file=\"bomb{}.xml\"/></asset><worldbody>"
-                      "{}{}</worldbody></mujoco>",
+          fmt::format("<mujoco><asset><model name='n' "
+                      "file='bomb{}.xml'/></asset><worldbody>{}{}</worldbody></mujoco>",
                       i + 1, next, next));
   }
   Write("bomb20.xml", "<mujoco><worldbody/></mujoco>");
-  attach("model=\"a\"", "<model name=\"a\" file=\"bomb0.xml\"/>");
+  attach("model='a'", "<model name='a' file='bomb0.xml'/>");
   ExpectMessage({"at most 16 nested files"});
 }
 

@@ -1,4 +1,5 @@
 // <replicate> of MJCF: copies in place, their names, and the elements that refer to them.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -9,14 +10,14 @@
 namespace loopbench::harness {
 namespace import_mjcf_replicas_test {
 
-const std::string kMass = "<inertial pos=\"0 0 0\" mass=\"2\" diaginertia=\"1 1 1\"/>";
+const std::string kMass = "<inertial pos='0 0 0' mass='2' diaginertia='1 1 1'/>";
 
 std::string Mujoco(const std::string& world, const std::string& rest = "") {
   return "<mujoco>\n<worldbody>" + world + "</worldbody>\n" + rest + "</mujoco>";
 }
 
 Imported Read(const std::string& world, const std::string& rest = "") {
-  return ImportText(Mujoco(world, rest), "file.xml");
+  return ImportOf(Mujoco(world, rest));
 }
 
 std::string Written(const Imported& imported) {
@@ -25,7 +26,7 @@ std::string Written(const Imported& imported) {
 
 std::string Body(const std::string& name, const std::string& inside,
                  const std::string& attributes = "") {
-  return "<body name=\"" + name + "\" " + attributes + ">" + kMass + inside + "</body>";
+  return "<body name='" + name + "' " + attributes + ">" + kMass + inside + "</body>";
 }
 
 /// The pose in the ground of a body with a joint to it.
@@ -41,8 +42,8 @@ Frame PoseOfBody(const Imported& imported, const std::string& name) {
 TEST(ImportMjcfReplicas, CopiesStandWhereMuJoCoPutsThem) {
   // the example of MuJoCo's XML reference, with bodies for geoms
   const Imported imported = Read(
-      "<replicate count=\"2\" offset=\"0 1 0\" euler=\"90 0 0\">"
-      "<replicate count=\"2\" sep=\"-\" offset=\"1 0 0\" euler=\"0 90 0\">" +
+      "<replicate count='2' offset='0 1 0' euler='90 0 0'><replicate count='2' sep='-' offset='1 0 "
+      "0' euler='0 90 0'>" +
       Body("Alice", "<joint/>") + "</replicate></replicate>");
   const double h = std::sqrt(0.5);
   const std::vector<std::tuple<std::string, Eigen::Vector3d, Eigen::Quaterniond>> expected = {
@@ -62,8 +63,8 @@ TEST(ImportMjcfReplicas, CopiesStandWhereMuJoCoPutsThem) {
 
 TEST(ImportMjcfReplicas, OffsetsAreInAxesOfThePreviousCopy) {
   // MuJoCo's test ParseReplicate
-  const Imported imported = Read("<replicate count=\"101\" offset=\"3 0 .1\" euler=\"0 0 1.8\">" +
-                                 Body("b", "<joint/>", "pos=\"0 -1 0\"") + "</replicate>");
+  const Imported imported = Read("<replicate count='101' offset='3 0 .1' euler='0 0 1.8'>" +
+                                 Body("b", "<joint/>", "pos='0 -1 0'") + "</replicate>");
   EXPECT_EQ(imported.description.bodies[1].name, "b000");
   double x = 0.0, y = 0.0;
   for (int i = 0; i <= 100; ++i) {
@@ -71,8 +72,7 @@ TEST(ImportMjcfReplicas, OffsetsAreInAxesOfThePreviousCopy) {
     const Frame X =
         PoseOfBody(imported, imported.description.bodies[static_cast<std::size_t>(i) + 1].name);
     // a sum of 100 shifts of 3 m
-    EXPECT_LE((X.p - Eigen::Vector3d(x + std::sin(theta), y - std::cos(theta), 0.1 * i)).norm(),
-              1e-13 * (1 + i));
+    ExpectNear(X.p, {x + std::sin(theta), y - std::cos(theta), 0.1 * i}, 1e-13 * (1 + i));
     x += 3.0 * std::cos(theta);
     y += 3.0 * std::sin(theta);
   }
@@ -84,42 +84,38 @@ TEST(ImportMjcfReplicas, SuffixesHaveTheDigitsOfTheCount) {
         .description.bodies.back()
         .name;
   };
-  EXPECT_EQ(last("count=\"1\""), "b0");
-  EXPECT_EQ(last("count=\"9\""), "b8");
-  EXPECT_EQ(last("count=\"10\" sep=\"_\""), "b_09");
-  EXPECT_EQ(last("count=\"12\" sep=\"\""), "b11");
+  EXPECT_EQ(last("count='1'"), "b0");
+  EXPECT_EQ(last("count='9'"), "b8");
+  EXPECT_EQ(last("count='10' sep='_'"), "b_09");
+  EXPECT_EQ(last("count='12' sep=''"), "b11");
 }
 
 TEST(ImportMjcfReplicas, ReferencesAreCopiedToo) {
   // names outside of <replicate> stay
-  const std::string body = Body("arm", "<joint name=\"j\"/><site name=\"s\"/>" +
-                                           Body("hand", "<joint name=\"k\"/>", "pos=\"1 0 0\""));
+  const std::string body = Body("arm", "<joint name='j'/><site name='s'/>" +
+                                           Body("hand", "<joint name='k'/>", "pos='1 0 0'"));
   const auto rest = [](const std::vector<std::string>& suffixes) {
-    std::string equality, tendon, actuator;
-    for (const std::string& i : suffixes) {
-      equality += "<joint name=\"e" + i + "\" joint1=\"j" + i + "\" joint2=\"k" + i +
-                  "\" polycoef=\"0 2\"/>";
-      tendon += "<spatial stiffness=\"3\" springlength=\"1\"><site site=\"s" + i +
-                "\"/><site site=\"wall\"/></spatial>";
-      actuator += "<damper joint=\"k" + i + "\" kv=\"2\" ctrlrange=\"0 1\"/>";
-    }
-    for (const std::string& i : suffixes) {
-      equality +=
-          "<connect name=\"c" + i + "\" body1=\"hand" + i + "\" body2=\"base\" anchor=\"0 0 0\"/>";
-    }
-    return "<equality>" + equality + "</equality><tendon>" + tendon + "</tendon><actuator>" +
-           actuator + "</actuator>";
+    const auto all = [&](const char* part) {
+      return Joined(suffixes, "",
+                    [&](const auto& i) { return fmt::format(fmt::runtime(part), i); });
+    };
+    return "<equality>" + all("<joint name='e{0}' joint1='j{0}' joint2='k{0}' polycoef='0 2'/>") +
+           all("<connect name='c{0}' body1='hand{0}' body2='base' anchor='0 0 0'/>") +
+           "</equality><tendon>" +
+           all("<spatial stiffness='3' springlength='1'><site site='s{0}'/><site site='wall'/>"
+               "</spatial>") +
+           "</tendon><actuator>" + all("<damper joint='k{0}' kv='2' ctrlrange='0 1'/>") +
+           "</actuator>";
   };
-  const std::string base =
-      "<site name=\"wall\" pos=\"0 0 9\"/>" + Body("base", "<joint name=\"b\"/>");
+  const std::string base = "<site name='wall' pos='0 0 9'/>" + Body("base", "<joint name='b'/>");
   const Imported replicated =
-      Read(base + "<replicate count=\"2\" offset=\"0 0 1\">" + body + "</replicate>", rest({""}));
+      Read(base + "<replicate count='2' offset='0 0 1'>" + body + "</replicate>", rest({""}));
   std::string all;
   for (const std::string i : {"0", "1"}) {
     all += Body("arm" + i,
-                "<joint name=\"j" + i + "\"/><site name=\"s" + i + "\"/>" +
-                    Body("hand" + i, "<joint name=\"k" + i + "\"/>", "pos=\"1 0 0\""),
-                i == "0" ? "" : "pos=\"0 0 1\"");
+                "<joint name='j" + i + "'/><site name='s" + i + "'/>" +
+                    Body("hand" + i, "<joint name='k" + i + "'/>", "pos='1 0 0'"),
+                i == "0" ? "" : "pos='0 0 1'");
   }
   EXPECT_EQ(Written(replicated), Written(Read(base + all, rest({"0", "1"}))));
   EXPECT_EQ(replicated.description.couplings.size(), 2u);
@@ -127,10 +123,10 @@ TEST(ImportMjcfReplicas, ReferencesAreCopiedToo) {
 
 TEST(ImportMjcfReplicas, ReferencesIntoNestedReplicatesFollowBoth) {
   const Imported imported =
-      Read("<replicate count=\"2\" sep=\"o\" offset=\"5 0 0\">" + Body("a", "<joint name=\"j\"/>") +
-               "<replicate count=\"3\" sep=\"i\" offset=\"0 1 0\">" +
-               Body("b", "<joint name=\"k\"/>") + "</replicate></replicate>",
-           "<equality><joint joint1=\"k\" joint2=\"j\" name=\"e\"/></equality>");
+      Read("<replicate count='2' sep='o' offset='5 0 0'>" + Body("a", "<joint name='j'/>") +
+               "<replicate count='3' sep='i' offset='0 1 0'>" + Body("b", "<joint name='k'/>") +
+               "</replicate></replicate>",
+           "<equality><joint joint1='k' joint2='j' name='e'/></equality>");
   ASSERT_EQ(imported.description.couplings.size(), 6u);
   const auto& joints = imported.description.joints;
   for (const CouplingDescription& coupling : imported.description.couplings) {
@@ -142,9 +138,9 @@ TEST(ImportMjcfReplicas, ReferencesIntoNestedReplicatesFollowBoth) {
 
 TEST(ImportMjcfReplicas, NotesCountOnce) {
   const Imported imported =
-      Read("<replicate count=\"20\" offset=\"1 0 0\">" +
-               Body("b", "<joint frictionloss=\"1\"/>\n<geom size=\"1\"/>") + "</replicate>",
-           "<keyframe><key qpos=\"1\"/></keyframe>");
+      Read("<replicate count='20' offset='1 0 0'>" +
+               Body("b", "<joint frictionloss='1'/>\n<geom size='1'/>") + "</replicate>",
+           "<keyframe><key qpos='1'/></keyframe>");
   EXPECT_EQ(imported.notes.size(), 3u);
   ExpectNote(imported, "<key>", "one replica");
 }
@@ -154,29 +150,28 @@ TEST(ImportMjcfReplicas, FaultyReplicatesAreRefused) {
     ExpectRefusal(Mujoco("<replicate " + attributes + ">" + Body("b", "<joint/>") + "</replicate>"),
                   words);
   };
-  refuse("", {"file.xml:2: <replicate>: found no \"count\"", "1 to 100000"});
+  refuse("", {"file.xml:2: <replicate>: found no 'count'", "1 to 100000"});
   for (const char* count : {"0", "-1", "1e9", "2.5", "nan", "1 2", ""}) {
-    refuse(std::string("count=\"") + count + "\"", {"<replicate> count: found"});
+    refuse(std::string("count='") + count + "'", {"<replicate> count: found"});
   }
-  refuse("count=\"2\" offset=\"1 0\"", {"<replicate> offset", "3 numbers"});
-  refuse("count=\"2\" euler=\"1 inf 0\"", {"<replicate> euler"});
-  refuse("count=\"2\" sep=\"123456789012345678901234567890123\"", {"<replicate> sep", "32 bytes"});
-  refuse("count=\"100000\"", {"more than 100000 elements of replicas"});
+  refuse("count='2' offset='1 0'", {"<replicate> offset", "3 numbers"});
+  refuse("count='2' euler='1 inf 0'", {"<replicate> euler"});
+  refuse("count='2' sep='123456789012345678901234567890123'", {"<replicate> sep", "32 bytes"});
+  refuse("count='100000'", {"more than 100000 elements of replicas"});
   std::string nested = Body("b", "<joint/>");
-  for (int i = 0; i < 17; ++i) nested = "<replicate count=\"1\">" + nested + "</replicate>";
+  for (int i = 0; i < 17; ++i) nested = "<replicate count='1'>" + nested + "</replicate>";
   ExpectRefusal(Mujoco(nested), {"more than 16 nested <replicate>"});
   nested = Body("b", "<joint/>");
-  for (int i = 0; i < 16; ++i) nested = "<replicate count=\"9\">" + nested + "</replicate>";
+  for (int i = 0; i < 16; ++i) nested = "<replicate count='9'>" + nested + "</replicate>";
   ExpectRefusal(Mujoco(nested), {"more than 100000 elements of replicas"});
-  ExpectRefusal(Mujoco(Body("a", "<replicate count=\"2\"><joint/></replicate>")),
+  ExpectRefusal(Mujoco(Body("a", "<replicate count='2'><joint/></replicate>")),
                 {"<joint>: found a joint in a <replicate>"});
-  const std::string two = "<replicate count=\"2\" offset=\"1 0 0\">" +
-                          Body("a", "<joint name=\"j\"/>") +
-                          "</replicate><replicate count=\"2\" offset=\"0 1 0\">" +
-                          Body("b", "<joint name=\"k\"/>") + "</replicate>";
-  ExpectRefusal(Mujoco(two, "<equality><joint joint1=\"j\" joint2=\"k\"/></equality>"),
-                {"<joint> joint2: found \"k\"", "names in one <replicate>"});
-  ExpectRefusal(Mujoco(two, "<actuator><motor joint=\"z\"/></actuator>"), {"found \"z\""});
+  const std::string two = "<replicate count='2' offset='1 0 0'>" + Body("a", "<joint name='j'/>") +
+                          "</replicate><replicate count='2' offset='0 1 0'>" +
+                          Body("b", "<joint name='k'/>") + "</replicate>";
+  ExpectRefusal(Mujoco(two, "<equality><joint joint1='j' joint2='k'/></equality>"),
+                {"<joint> joint2: found 'k'", "names in one <replicate>"});
+  ExpectRefusal(Mujoco(two, "<actuator><motor joint='z'/></actuator>"), {"found 'z'"});
   ExpectRefusal(Mujoco(two + Body("a0", "<joint/>")), {"a second body of this name"});
   ExpectRefusal(Mujoco("<attach/>" + two), {"<attach>: found an element that stands for other"});
   ExpectRefusal(Mujoco(two, "<tendon><replicate/></tendon>"), {"stands for other"});

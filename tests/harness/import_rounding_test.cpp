@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-#include "tests/harness/import_mjcf_texts.h"
+#include "tests/harness/import_texts.h"
 
 namespace loopbench::harness {
 namespace import_rounding_test {
@@ -13,20 +13,16 @@ namespace import_rounding_test {
 using import_mjcf_texts::kEps;
 using std::numbers::pi;
 
-const ImportOptions kKept = [] {
-  ImportOptions options;
-  options.keeps_digits = true;
-  return options;
-}();
+const ImportOptions kKept = {.keeps_digits = true};
 
 Imported Urdf(const std::string& rpy, const std::string& axis, const ImportOptions& options = {}) {
-  return ImportText(
-      "<robot name=\"r\"><link name=\"world\"/><link name=\"a\"><inertial><mass value=\"1\"/>"
-      "<inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\n"
-      "<joint name=\"j\" type=\"continuous\"><origin rpy=\"" +
-          rpy + "\"/><axis xyz=\"" + axis +
-          "\"/><parent link=\"world\"/><child link=\"a\"/></joint></robot>",
-      "file.urdf", options);
+  return ImportOf(
+      "<robot name='r'><link name='world'/><link name='a'><inertial><mass value='1'/><inertia "
+      "ixx='1' iyy='1' izz='1'/></inertial></link>\n<joint name='j' type='continuous'><origin "
+      "rpy='" +
+          rpy + "'/><axis xyz='" + axis +
+          "'/><parent link='world'/><child link='a'/></joint></robot>",
+      options);
 }
 
 double AngleOf(const std::string& word, const ImportOptions& options = {}) {
@@ -99,8 +95,8 @@ TEST(ImportRounding, DirectionsHaveTheirSquaresInTwelfths) {
 
 Eigen::Matrix3d TurnOf(const std::string& quaternion, const ImportOptions& options = {}) {
   const std::string text =
-      import_mjcf_texts::Model("<joint/>", "", "", "quat=\"" + quaternion + "\"");
-  return PoseOf(ImportText(text, "file.xml", options).description.joints[0].from).R;
+      import_mjcf_texts::Model("<joint/>", "", "", "quat='" + quaternion + "'");
+  return PoseOf(ImportOf(text, options).description.joints[0].from).R;
 }
 
 std::string Digits(const Eigen::Quaterniond& q, const char* format) {
@@ -155,51 +151,48 @@ TEST(ImportRounding, OtherQuaternionsStayWhatTheyAre) {
     EXPECT_EQ(TurnOf(text), TurnOf(text, kKept)) << text;
   }
   EXPECT_EQ(TurnOf("0.7071 0.70720 0 0"), TurnOf("0.7071 0.70720 0 0", kKept));
-  ExpectRefusal(import_mjcf_texts::Model("", "", "", "quat=\"0 0 0 0\""), {"not zero"});
+  ExpectRefusal(import_mjcf_texts::Model("", "", "", "quat='0 0 0 0'"), {"not zero"});
 }
 
 TEST(ImportRounding, AllFormsOfOrientationsAreLookedAt) {
-  const std::string radian = "<compiler angle=\"radian\"/>";
+  const std::string radian = "<compiler angle='radian'/>";
   const Eigen::Matrix3d half(Eigen::AngleAxisd(pi / 4, Eigen::Vector3d::UnitX()));
   const auto mjcf = [&](const std::string& form) {
     const Imported imported =
-        import_mjcf_texts::Read("<joint axis=\"0 0.86603 0.5\"/>", radian, "", form);
+        import_mjcf_texts::Read("<joint axis='0 0.86603 0.5'/>", radian, "", form);
     EXPECT_TRUE(HasNote(imported, "<body", "directions: 2 ")) << form;
     return PoseOf(imported.description.joints[0].from).R;
   };
-  EXPECT_LE((mjcf("euler=\"0.7854 0 0\"") - half).norm(), 4 * kEps);
-  EXPECT_LE((mjcf("axisangle=\"1 0 0 0.7854\"") - half).norm(), 4 * kEps);
-  EXPECT_LE((mjcf("xyaxes=\"1 0 0 0 0.707 0.707\"") - half).norm(), 4 * kEps);
-  EXPECT_LE((mjcf("zaxis=\"0 -0.707 0.707\"") - half).norm(), 4 * kEps);
+  EXPECT_LE((mjcf("euler='0.7854 0 0'") - half).norm(), 4 * kEps);
+  EXPECT_LE((mjcf("axisangle='1 0 0 0.7854'") - half).norm(), 4 * kEps);
+  EXPECT_LE((mjcf("xyaxes='1 0 0 0 0.707 0.707'") - half).norm(), 4 * kEps);
+  EXPECT_LE((mjcf("zaxis='0 -0.707 0.707'") - half).norm(), 4 * kEps);
   const auto sdf = [&](const std::string& pose) {
-    return ImportText(
-        "<sdf version=\"1.9\"><model name=\"m\"><link name=\"a\">" + pose +
-            "</link><joint name=\"j\" type=\"revolute\"><parent>world</parent><child>a"
-            "</child><axis><xyz>0 0.86603 0.5</xyz></axis></joint></model></sdf>",
-        "file.sdf");
+    return ImportOf("<sdf version='1.9'><model name='m'><link name='a'>" + pose +
+                    "</link><joint name='j' "
+                    "type='revolute'><parent>world</parent><child>a</child><axis><xyz>0 "
+                    "0.86603 0.5</xyz></axis></joint></model></sdf>");
   };
   for (const std::string pose :
        {"<pose>0 0 0 0.7854 0 0</pose>",
-        "<pose rotation_format=\"quat_xyzw\">0 0 0 0.38268 0 0 0.92388</pose>"}) {
+        "<pose rotation_format='quat_xyzw'>0 0 0 0.38268 0 0 0.92388</pose>"}) {
     const Imported imported = sdf(pose);
     EXPECT_LE((PoseOf(imported.description.joints[0].from).R - half).norm(), 4 * kEps);
     ExpectNote(imported, "<pose", "directions: 2 ");
     EXPECT_EQ(imported.description.joints[0].axis.y(), std::sqrt(0.75));
   }
   // degrees are as they are, and so are places
-  EXPECT_FALSE(HasNote(sdf("<pose degrees=\"true\">1.5708 0.7854 0 1.5708 0 0</pose>"), "<pose",
-                       "taken as"));
+  EXPECT_FALSE(
+      HasNote(sdf("<pose degrees='true'>1.5708 0.7854 0 1.5708 0 0</pose>"), "<pose", "taken as"));
 }
 
 TEST(ImportRounding, AxesThatARoundedTurnMadeLeanAreParallel) {
-  const Imported imported = ImportText(
-      "<robot name=\"r\"><link name=\"world\"/><link name=\"a\"/><link name=\"b\"><inertial><mass "
-      "value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>"
-      "<joint name=\"A\" type=\"fixed\"><parent link=\"world\"/><child link=\"a\"/>"
-      "<origin rpy=\"1.5708 0 0\"/></joint>"
-      "<joint name=\"B\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/>"
-      "<axis xyz=\"0 0 1\"/></joint></robot>",
-      "file.urdf");
+  const Imported imported = ImportOf(
+      "<robot name='r'><link name='world'/><link name='a'/><link name='b'><inertial><mass "
+      "value='1'/><inertia ixx='1' iyy='1' izz='1'/></inertial></link><joint name='A' "
+      "type='fixed'><parent link='world'/><child link='a'/><origin rpy='1.5708 0 "
+      "0'/></joint><joint name='B' type='continuous'><parent link='a'/><child link='b'/><axis "
+      "xyz='0 0 1'/></joint></robot>");
   const JointDescription& joint = imported.description.joints[0];
   const Eigen::Vector3d axis =
       PoseOf(joint.from).R * AxisAlignment(joint) * Eigen::Vector3d::UnitZ();

@@ -11,102 +11,82 @@ namespace import_sdf_couplings_test {
 constexpr double kPi = std::numbers::pi;
 
 std::string Sdf(const std::string& inside) {
-  return "<sdf version=\"1.11\">\n<model name=\"m\">\n" + inside + "</model></sdf>";
+  return "<sdf version='1.11'>\n<model name='m'>\n" + inside + "</model></sdf>";
 }
 
 std::string Link(const std::string& name, const std::string& pose = "0 0 0 0 0 0") {
-  return "<link name=\"" + name + "\"><pose>" + pose + "</pose></link>\n";
-}
-
-std::string Joint(const std::string& name, const std::string& type, const std::string& parent,
-                  const std::string& child, const std::string& inside = "<axis/>") {
-  return "<joint name=\"" + name + "\" type=\"" + type + "\"><parent>" + parent +
-         "</parent><child>" + child + "</child>" + inside + "</joint>\n";
+  return "<link name='" + name + "'><pose>" + pose + "</pose></link>\n";
 }
 
 /// A joint "f" of the link "b" that follows the joint "j" of the link "a".
 std::string Follower(const std::string& mimic, const std::string& type = "revolute",
                      const std::string& leader = "revolute") {
-  return Sdf(Link("a") + Link("b") + Joint("f", type, "world", "b", "<axis>" + mimic + "</axis>") +
-             Joint("j", leader, "world", "a"));
+  return Sdf(Link("a") + Link("b") +
+             SdfJoint("f", type, "world", "b", "<axis>" + mimic + "</axis>") +
+             SdfJoint("j", leader, "world", "a"));
 }
 
-Imported Read(const std::string& inside) { return ImportText(Sdf(inside), "file.sdf"); }
-
-/// Expects the only coupling: coordinates with their factors, and the offset.
-void ExpectCoupling(const Imported& imported, const std::string& name,
-                    const std::vector<std::pair<std::string, double>>& parts, double offset) {
-  ASSERT_EQ(imported.description.couplings.size(), 1u);
-  const CouplingDescription& coupling = imported.description.couplings[0];
-  EXPECT_EQ(coupling.name, name);
-  EXPECT_EQ(coupling.offset, offset);
-  ASSERT_EQ(coupling.parts.size(), parts.size());
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    EXPECT_EQ(imported.description.joints[coupling.parts[i].joint].name, parts[i].first);
-    EXPECT_EQ(coupling.parts[i].ratio, parts[i].second);
-  }
-}
+Imported Read(const std::string& inside) { return ImportOf(Sdf(inside)); }
 
 TEST(ImportSdfCouplings, AMimicFollowsFromItsReference) {
   // position = 0.25 (leader - 3) + 2
   const Imported imported =
-      ImportText(Follower("<mimic joint=\"j\"><multiplier>0.25</multiplier><offset>2</offset>"
-                          "<reference>3</reference></mimic>"),
-                 "file.sdf");
+      ImportOf(Follower("<mimic "
+                        "joint='j'><multiplier>0.25</multiplier><offset>2</"
+                        "offset><reference>3</reference></mimic>"));
   ExpectCoupling(imported, "f mimic", {{"f", 1.0}, {"j", -0.25}}, 1.25);
   EXPECT_FALSE(HasNote(imported, "<mimic>", ""));
-  const Imported plain =
-      ImportText(Follower("<mimic joint=\"j\" axis=\"axis\"/>", "prismatic"), "file.sdf");
+  const Imported plain = ImportOf(Follower("<mimic joint='j' axis='axis'/>", "prismatic"));
   ExpectCoupling(plain, "f mimic", {{"f", 1.0}, {"j", -1.0}}, 0.0);
   // constant without a leader
-  const Imported held = ImportText(
-      Follower("<mimic joint=\"j\"><multiplier>0</multiplier><offset>2</offset></mimic>"),
-      "file.sdf");
+  const Imported held =
+      ImportOf(Follower("<mimic joint='j'><multiplier>0</multiplier><offset>2</offset></mimic>"));
   EXPECT_TRUE(held.description.couplings.empty());
   EXPECT_EQ(held.description.joints[0].motions.size(), 1u);
 }
 
 TEST(ImportSdfCouplings, LeadersAreNamedInTheModelOfTheFollower) {
-  const std::string mimic = "<axis><mimic joint=\"j\"/></axis>";
-  const std::string hand = "<model name=\"hand\">" + Link("p") + Link("q") +
-                           Joint("j", "revolute", "world", "p") +
-                           Joint("f", "revolute", "p", "q", mimic) + "</model>";
-  const Imported imported = Read(Link("a") + Joint("j", "revolute", "world", "a") + hand);
+  const std::string mimic = "<axis><mimic joint='j'/></axis>";
+  const std::string hand = "<model name='hand'>" + Link("p") + Link("q") +
+                           SdfJoint("j", "revolute", "world", "p") +
+                           SdfJoint("f", "revolute", "p", "q", mimic) + "</model>";
+  const Imported imported = Read(Link("a") + SdfJoint("j", "revolute", "world", "a") + hand);
   ExpectCoupling(imported, "hand::f mimic", {{"hand::f", 1.0}, {"hand::j", -1.0}}, 0.0);
 }
 
 TEST(ImportSdfCouplings, MimicsOfSeveralCoordinatesAreDropped) {
   const std::string axes = "<axis><xyz>1 0 0</xyz></axis><axis2><xyz>0 1 0</xyz></axis2>";
   const auto follower = [&](const std::string& mimic) {
-    return Read(Link("a") + Link("b") + Joint("j", "universal", "world", "a", axes) +
-                Joint("f", "revolute", "world", "b", mimic));
+    return Read(Link("a") + Link("b") + SdfJoint("j", "universal", "world", "a", axes) +
+                SdfJoint("f", "revolute", "world", "b", mimic));
   };
   for (const char* axis : {"axis", "axis2"}) {
-    ExpectNote(follower(std::string("<axis><mimic joint=\"j\" axis=\"") + axis + "\"/></axis>"),
+    ExpectNote(follower(std::string("<axis><mimic joint='j' axis='") + axis + "'/></axis>"),
                "<mimic>", "a freedom more");
   }
-  ExpectNote(follower("<axis/><axis2><mimic joint=\"j\"/></axis2>"), "<mimic>", "no such axis");
+  ExpectNote(follower("<axis/><axis2><mimic joint='j'/></axis2>"), "<mimic>", "no such axis");
 }
 
 TEST(ImportSdfCouplings, FaultyMimicsAreRefused) {
-  ExpectRefusal(Follower("<mimic/>"), {"file.xml:5: <mimic>: found no \"joint\"", "a joint"});
-  ExpectRefusal(Follower("<mimic joint=\"\"/>"), {"<mimic> joint: found \"\""});
-  ExpectRefusal(Follower("<mimic joint=\"z\"/>"), {"<mimic> joint: found \"z\"", "in this file"});
-  ExpectRefusal(Follower("<mimic joint=\"f\"/>"), {"<mimic>: found a joint that follows itself"});
-  ExpectRefusal(Follower("<mimic joint=\"j\" axis=\"axis3\"/>"),
-                {"<mimic> axis: found \"axis3\"", "one of axis, axis2"});
-  ExpectRefusal(Follower("<mimic joint=\"j\" axis=\"axis2\"/>"),
-                {"<mimic> axis: found \"axis2\"", "no second one"});
+  ExpectRefusal(Follower("<mimic/>"), {"file.xml:5: <mimic>: found no 'joint'", "a joint"});
+  ExpectRefusal(Follower("<mimic joint=''/>"), {"<mimic> joint: found ''"});
+  ExpectRefusal(Follower("<mimic joint='z'/>"), {"<mimic> joint: found 'z'", "in this file"});
+  ExpectRefusal(Follower("<mimic joint='f'/>"), {"<mimic>: found a joint that follows itself"});
+  ExpectRefusal(Follower("<mimic joint='j' axis='axis3'/>"),
+                {"<mimic> axis: found 'axis3'", "one of axis, axis2"});
+  ExpectRefusal(Follower("<mimic joint='j' axis='axis2'/>"),
+                {"<mimic> axis: found 'axis2'", "no second one"});
   for (const char* value : {"multiplier", "offset", "reference"}) {
     const std::string tag = value;
     for (const char* text : {"nan", "inf", "1 2", "", "x"}) {
-      ExpectRefusal(Follower("<mimic joint=\"j\"><" + tag + ">" + text + "</" + tag + "></mimic>"),
-                    {"<" + tag + ">: found \"" + text + "\""});
+      ExpectRefusal(Follower("<mimic joint='j'><" + tag + ">" + text + "</" + tag + "></mimic>"),
+                    {"<" + tag + ">: found '" + text + "'"});
     }
   }
-  ExpectRefusal(Follower("<mimic joint=\"j\"><multiplier>1e300</multiplier><reference>1e300"
-                         "</reference></mimic>"),
-                {"file.xml", "f mimic", "the offset must be finite"});
+  ExpectRefusal(
+      Follower(
+          "<mimic joint='j'><multiplier>1e300</multiplier><reference>1e300</reference></mimic>"),
+      {"file.xml", "f mimic", "the offset must be finite"});
 }
 
 TEST(ImportSdfCouplings, CyclesOfMimicsAreRefused) {
@@ -114,31 +94,31 @@ TEST(ImportSdfCouplings, CyclesOfMimicsAreRefused) {
   for (int i = 0; i < 5; ++i) {
     const std::string n = std::to_string(i), leader = std::to_string((i + 3) % 5);
     links += Link("l" + n);
-    joints += Joint("j" + n, "revolute", "world", "l" + n,
-                    i == 4 ? "<axis/>" : "<axis><mimic joint=\"j" + leader + "\"/></axis>");
+    joints += SdfJoint("j" + n, "revolute", "world", "l" + n,
+                       i == 4 ? "<axis/>" : "<axis><mimic joint='j" + leader + "'/></axis>");
   }
   // 0 follows 3, 1 follows 4, 2 follows 0, 3 follows 1
   EXPECT_EQ(Read(links + joints).description.couplings.size(), 4u);
-  const std::string last = "type=\"revolute\"><parent>world</parent><child>l4</child><axis/>";
+  const std::string last = "type='revolute'><parent>world</parent><child>l4</child><axis/>";
   std::string cycle = joints;
-  cycle.replace(cycle.find(last), last.size(),
-                "type=\"revolute\"><parent>world</parent><child>l4</child><axis>"
-                "<mimic joint=\"j2\"/></axis>");
+  cycle.replace(
+      cycle.find(last), last.size(),
+      "type='revolute'><parent>world</parent><child>l4</child><axis><mimic joint='j2'/></axis>");
   ExpectRefusal(Sdf(links + cycle), {"<mimic>: found joints that follow each other", "no cycle"});
 }
 
 /// Two shafts on a moving base; `b` is turned by a quarter about y, and the base carries a mount.
 std::string Shafts(const std::string& gearbox, const std::string& axis_of_b = "<xyz>0 0 1</xyz>") {
   return Link("base") + Link("mount", "0 0 1 0 0 0") + Link("a") +
-         Link("b", "1 0 0 0 1.5707963267948966 0") + Joint("bolt", "fixed", "base", "mount", "") +
-         Joint("ja", "revolute", "base", "a") +
-         Joint("jb", "revolute", "mount", "b", "<axis>" + axis_of_b + "</axis>") + gearbox;
+         Link("b", "1 0 0 0 1.5707963267948966 0") +
+         SdfJoint("bolt", "fixed", "base", "mount", "") + SdfJoint("ja", "revolute", "base", "a") +
+         SdfJoint("jb", "revolute", "mount", "b", "<axis>" + axis_of_b + "</axis>") + gearbox;
 }
 
 /// Its axes are in axes of `b`, whose z is the base's x and whose -x is the base's z.
 std::string Gearbox(const std::string& inside, const std::string& reference = "base",
                     const std::string& axes = "<axis><xyz>-1 0 0</xyz></axis><axis2/>") {
-  return Joint(
+  return SdfJoint(
       "g", "gearbox", "a", "b",
       axes + "<gearbox_reference_body>" + reference + "</gearbox_reference_body>" + inside);
 }
@@ -158,22 +138,22 @@ TEST(ImportSdfCouplings, AGearboxCouplesTheJointsOfItsReferenceBody) {
   ExpectCoupling(Read(Shafts(Gearbox(three), "<xyz>0 0 -1</xyz>")), "g",
                  {{"jb", 1.0}, {"ja", -3.0}}, 0.0);
   ExpectCoupling(Read(Shafts(Gearbox(three, "base",
-                                     "<axis><xyz expressed_in=\"a\">0 0 1</xyz></axis>"
-                                     "<axis2><xyz expressed_in=\"base\">1 0 0</xyz></axis2>"))),
+                                     "<axis><xyz expressed_in='a'>0 0 1</xyz></axis><axis2><xyz "
+                                     "expressed_in='base'>1 0 0</xyz></axis2>"))),
                  "g", {{"jb", 1.0}, {"ja", 3.0}}, 0.0);
 }
 
 TEST(ImportSdfCouplings, JointsToTheReferenceBodyTurnItTheOtherWay) {
   const std::string gearbox =
-      Joint("g", "gearbox", "a", "b",
-            "<axis/><gearbox_reference_body>r</gearbox_reference_body><gearbox_ratio>2"
-            "</gearbox_ratio><physics><ode/></physics>");
+      SdfJoint("g", "gearbox", "a", "b",
+               "<axis/><gearbox_reference_body>r</gearbox_reference_body><gearbox_ratio>2</"
+               "gearbox_ratio><physics><ode/></physics>");
   const Imported imported =
-      Read(Link("a") + Link("r") + Link("b") + Joint("p", "revolute", "a", "r") +
-           Joint("q", "continuous", "r", "b") + gearbox);
+      Read(Link("a") + Link("r") + Link("b") + SdfJoint("p", "revolute", "a", "r") +
+           SdfJoint("q", "continuous", "r", "b") + gearbox);
   // the angle of `a` from `r` is -p
   ExpectCoupling(imported, "g", {{"q", 1.0}, {"p", -2.0}}, 0.0);
-  ExpectNote(imported, "<joint name=\"g\">", "no <axis2>");
+  ExpectNote(imported, "<joint name='g'>", "no <axis2>");
 }
 
 TEST(ImportSdfCouplings, GearboxesWithoutTwoHingesAreRefused) {
@@ -181,31 +161,30 @@ TEST(ImportSdfCouplings, GearboxesWithoutTwoHingesAreRefused) {
     ExpectRefusal(Sdf(text), words);
   };
   refuse(Shafts(Gearbox("<gearbox_ratio>0</gearbox_ratio>")),
-         {"<gearbox_ratio>: found \"0\"", "not 0"});
-  refuse(Shafts(Gearbox("<gearbox_ratio>nan</gearbox_ratio>")), {"<gearbox_ratio>: found \"nan\""});
-  refuse(Shafts(Joint("g", "gearbox", "a", "b")), {"no <gearbox_reference_body>"});
-  refuse(Shafts(Gearbox("", "none")), {"<gearbox_reference_body>", "\"none\", which is not there"});
-  refuse(Shafts(Gearbox("", "base", "")), {"<joint name=\"g\">: found no <axis>"});
+         {"<gearbox_ratio>: found '0'", "not 0"});
+  refuse(Shafts(Gearbox("<gearbox_ratio>nan</gearbox_ratio>")), {"<gearbox_ratio>: found 'nan'"});
+  refuse(Shafts(SdfJoint("g", "gearbox", "a", "b")), {"no <gearbox_reference_body>"});
+  refuse(Shafts(Gearbox("", "none")), {"<gearbox_reference_body>", "'none', which is not there"});
+  refuse(Shafts(Gearbox("", "base", "")), {"<joint name='g'>: found no <axis>"});
   refuse(Shafts(Gearbox("", "base", "<axis><xyz>0 1 0</xyz></axis><axis2/>")),
-         {"<parent>: found \"a\", which no hinge or screw about this axis joins"});
+         {"<parent>: found 'a', which no hinge or screw about this axis joins"});
   refuse(Shafts(Gearbox("", "base", "<axis><xyz>-1 0 0</xyz></axis>")),
-         {"<child>: found \"b\", which no hinge"});
-  refuse(Shafts(Gearbox("", "world")), {"<parent>: found \"a\", which no hinge"});
-  refuse(Shafts(Gearbox("", "a")), {"<parent>: found \"a\", which no hinge"});
-  refuse(Shafts(Joint("g", "gearbox", "a", "a",
-                      "<axis/><gearbox_reference_body>base</gearbox_reference_body>")),
+         {"<child>: found 'b', which no hinge"});
+  refuse(Shafts(Gearbox("", "world")), {"<parent>: found 'a', which no hinge"});
+  refuse(Shafts(Gearbox("", "a")), {"<parent>: found 'a', which no hinge"});
+  refuse(Shafts(SdfJoint("g", "gearbox", "a", "a",
+                         "<axis/><gearbox_reference_body>base</gearbox_reference_body>")),
          {"found a joint that follows itself"});
-  refuse(Shafts(Joint("ja", "gearbox", "a", "b")), {"a second \"ja\""});
+  refuse(Shafts(SdfJoint("ja", "gearbox", "a", "b")), {"a second 'ja'"});
 }
 
 TEST(ImportSdfCouplings, ThreadsOfScrews) {
   const auto screw = [](const std::string& inside) {
-    return Link("a") + Joint("j", "screw", "world", "a", "<axis/>" + inside);
+    return Link("a") + SdfJoint("j", "screw", "world", "a", "<axis/>" + inside);
   };
   // the newer pitch counts, as in libsdformat
   const Imported both =
-      Read(screw("<thread_pitch>7</thread_pitch><screw_thread_pitch>0.5"
-                 "</screw_thread_pitch>"));
+      Read(screw("<thread_pitch>7</thread_pitch><screw_thread_pitch>0.5</screw_thread_pitch>"));
   EXPECT_EQ(both.description.joints[0].parameter, 0.5 / (2 * kPi));
   for (const char* tag : {"thread_pitch", "screw_thread_pitch"}) {
     for (const char* text : {"0", "nan", "inf", "", "1 1"}) {
@@ -217,13 +196,13 @@ TEST(ImportSdfCouplings, ThreadsOfScrews) {
 
 TEST(ImportSdfCouplings, FollowersStartWhereLeadersPlaceThem) {
   const auto start = [](const std::string& own) {
-    return Read(Link("a") + Link("b") +
-                Joint("f", "revolute", "world", "b",
-                      "<axis><mimic joint=\"j\"><multiplier>2</multiplier><offset>0.5</offset>"
-                      "</mimic>" +
-                          own + "</axis>") +
-                Joint("j", "revolute", "world", "a",
-                      "<axis><initial_position>0.25</initial_position></axis>"));
+    return Read(
+        Link("a") + Link("b") +
+        SdfJoint("f", "revolute", "world", "b",
+                 "<axis><mimic joint='j'><multiplier>2</multiplier><offset>0.5</offset></mimic>" +
+                     own + "</axis>") +
+        SdfJoint("j", "revolute", "world", "a",
+                 "<axis><initial_position>0.25</initial_position></axis>"));
   };
   const auto value = [](const Imported& imported, int joint) {
     const auto& all = imported.description.initial.coordinates;
@@ -234,7 +213,7 @@ TEST(ImportSdfCouplings, FollowersStartWhereLeadersPlaceThem) {
   EXPECT_EQ(value(placed, 1), 0.25);
   const Imported moved = start("<initial_position>3</initial_position>");
   EXPECT_EQ(value(moved, 0), 1.0);
-  ExpectNote(moved, "<link name=\"b\">", "starts at 1");
+  ExpectNote(moved, "<link name='b'>", "starts at 1");
 }
 
 }  // namespace import_sdf_couplings_test

@@ -37,10 +37,8 @@ double StabilityFunction(const std::string& profile, double re, double im) {
   TestOde ode(2, [=](double, auto y, auto ydot) {
     ydot[0] = re * y[0] - im * y[1];
     ydot[1] = im * y[0] + re * y[1];
-    return Outcome::kFinished;
   });
-  IntegratorOptions options = WithTolerance(profile, 1e-8);
-  options.fixed_step = 1;
+  IntegratorOptions options = WithTolerance(profile, 1e-8, 1);
   State y{1, 0};
   const IntegratorResult result = Integrate(ode, 0, 1, y, options);
   EXPECT_EQ(result.outcome, Outcome::kFinished) << result.message;
@@ -70,7 +68,6 @@ TestOde StiffLinear() {
         ydot[0] = -2 * slow - 1e5 * fast;
         ydot[1] = -slow + 1e5 * fast;
         ydot[2] = y[0];
-        return Outcome::kFinished;
       },
       1);
 }
@@ -174,12 +171,8 @@ TEST(IntegratorImplicit, ExceptionsOfTheJacobianPassThrough) {
 // z = 1 + gamma h z^2 has no real solution for 4 gamma h > 1: with a fixed step of 4 the first
 // stage cannot be solved, whatever the profile's gamma (0.18 to 0.44).
 TEST_P(EveryImplicitProfile, EquationsWithoutSolutionEndAsNewtonFailure) {
-  TestOde ode(1, [](double, auto y, auto ydot) {
-    ydot[0] = y[0] * y[0];
-    return Outcome::kFinished;
-  });
-  IntegratorOptions options = WithTolerance(GetParam(), 1e-6);
-  options.fixed_step = 4;
+  TestOde ode(1, [](double, auto y, auto ydot) { ydot[0] = y[0] * y[0]; });
+  IntegratorOptions options = WithTolerance(GetParam(), 1e-6, 4);
   State y{1};
   testing::internal::CaptureStderr();
   const IntegratorResult result = Integrate(ode, 0, 8, y, options);
@@ -196,8 +189,7 @@ TEST_P(EveryImplicitProfile, EquationsWithoutSolutionEndAsNewtonFailure) {
 TEST_P(EveryImplicitProfile, LongFixedStepsConverge) {
   for (const double step : {0.02, 0.03, 0.04, 0.05}) {
     TestOde ode = Pendulum();
-    IntegratorOptions options = WithTolerance(GetParam(), 1e-9);
-    options.fixed_step = step;
+    IntegratorOptions options = WithTolerance(GetParam(), 1e-9, step);
     State y{1, 0, 0, 10};
     const IntegratorResult result = Integrate(ode, 0, 0.6, y, options);
     EXPECT_EQ(result.outcome, Outcome::kFinished) << step << ": " << result.message;
@@ -220,18 +212,15 @@ TEST(IntegratorImplicit, FailureInADifferenceQuotientIsTheOutcome) {
 
 // A knot of a table in a stiff problem: y follows g(t) = |t - 1/2| within 1e-6.
 TEST_P(EveryImplicitProfile, StopsAtKnotsOfStiffForcing) {
-  TestOde ode(1, [](double t, auto y, auto ydot) {
-    ydot[0] = 1e6 * (std::abs(t - 0.5) - y[0]);
-    return Outcome::kFinished;
-  });
+  TestOde ode(1, [](double t, auto y, auto ydot) { ydot[0] = 1e6 * (std::abs(t - 0.5) - y[0]); });
   IntegratorOptions options = WithTolerance(GetParam(), 1e-6);
   options.stop_times = {0.5};
   State y{0.5};
   double worst = 0;
-  const IntegratorResult result = Integrate(ode, 0, 1, y, options, [&](double t, auto state) {
-    worst = std::max(worst, std::abs(state[0] - std::abs(t - 0.5)));
-    return StepAction::kContinue;
-  });
+  const IntegratorResult result =
+      Integrate(ode, 0, 1, y, options, Watch([&](double t, auto state) {
+                  worst = std::max(worst, std::abs(state[0] - std::abs(t - 0.5)));
+                }));
   EXPECT_EQ(result.outcome, Outcome::kFinished) << result.message;
   EXPECT_LT(worst, 1e-4);  // 100 times the tolerance
   EXPECT_LT(result.steps, 1000);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -20,9 +21,19 @@ constexpr double kGravity = 9.81;
 /// A system given by a function; remembers where it was evaluated.
 class TestOde : public Ode {
  public:
-  using Function = std::function<Outcome(double, std::span<const double>, std::span<double>)>;
+  /// A function without a result finishes.
+  template <class Function>
   TestOde(int size, Function function, int num_quadratures = 0)
-      : size_(size), num_quadratures_(num_quadratures), function_(std::move(function)) {}
+      : size_(size),
+        num_quadratures_(num_quadratures),
+        function_([function](double t, auto y, auto ydot) mutable {
+          if constexpr (std::is_void_v<decltype(function(t, y, ydot))>) {
+            function(t, y, ydot);
+            return Outcome::kFinished;
+          } else {
+            return function(t, y, ydot);
+          }
+        }) {}
   int size() const override { return size_; }
   int num_quadratures() const override { return num_quadratures_; }
   Outcome Derivative(double t, std::span<const double> y, std::span<double> ydot) override {
@@ -33,7 +44,7 @@ class TestOde : public Ode {
 
  private:
   int size_, num_quadratures_;
-  Function function_;
+  std::function<Outcome(double, std::span<const double>, std::span<double>)> function_;
 };
 
 /// Smooth, non-autonomous, coupled and non-linear, with the solution
@@ -44,7 +55,6 @@ inline TestOde SmoothProblem() {
     ydot[1] = std::sin(t) - std::log(y[0]) - y[2];
     ydot[2] = std::log(y[0]) - y[2] + y[1];
     ydot[3] = -2 * t * y[3] * y[3];
-    return Outcome::kFinished;
   });
 }
 inline State SmoothSolution(double t) {
@@ -61,12 +71,30 @@ inline TestOde Pendulum() {
     ydot[1] = y[3];
     ydot[2] = -tension * y[0];
     ydot[3] = -tension * y[1] - kGravity;
-    return Outcome::kFinished;
   });
 }
 
-inline IntegratorOptions WithTolerance(const std::string& profile, double tolerance) {
+/// An observer that looks and lets the run continue.
+template <class Look>
+StepObserver Watch(Look look) {
+  return [look](double t, std::span<double> y) mutable {
+    look(t, y);
+    return StepAction::kContinue;
+  };
+}
+
+/// The options by default but for one.
+template <class T>
+IntegratorOptions With(T IntegratorOptions::*option, std::type_identity_t<T> value) {
   IntegratorOptions options;
+  options.*option = std::move(value);
+  return options;
+}
+
+inline IntegratorOptions WithTolerance(const std::string& profile, double tolerance,
+                                       double fixed_step = 0) {
+  IntegratorOptions options;
+  options.fixed_step = fixed_step;
   options.profile = profile;
   options.rtol = options.atol = tolerance;
   return options;
@@ -84,6 +112,8 @@ inline int OrderOf(const std::string& profile) {
 
 /// How far an observed order may lie from the claimed one; reasons at the tests.
 constexpr double kMaxOrderError = 0.6;
+
+class EveryProfile : public testing::TestWithParam<std::string> {};
 
 /// Profile names without hyphens, as GoogleTest wants them.
 inline std::string NameOfProfileTest(const testing::TestParamInfo<std::string>& info) {

@@ -2,14 +2,13 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <cmath>
 #include <string>
 
 #include "harness/base/text.h"
 #include "harness/config/experiment_reader.h"
 #include "harness/run/processes.h"
 #include "harness/run/timing.h"
-#include "mechanism/model/dense_memory.h"
+#include "mechanism/algebra/dense_memory.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {

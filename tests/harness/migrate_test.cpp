@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <regex>
 
 #include "harness/base/record.h"
 #include "harness/base/store.h"
@@ -13,45 +14,36 @@
 namespace loopbench::harness {
 namespace migrate_test {
 
-constexpr const char* kOldExperiment = R"({
+/// Returns the text with the old or the new name of each "<old|new>".
+std::string WithNames(const std::string& text, bool is_new) {
+  static const std::regex names("<([^|]*)\\|([^>]*)>");
+  return std::regex_replace(text, names, is_new ? "$2" : "$1");
+}
+
+constexpr const char* kExperiment = R"({
   "name": "tiny",
-  "scenes": [{"mechanism": "old-bar.json",   "horizon": 0.5}],
-  "columns": [{"formulation": ["odca", "lagrange"],
-               "enforcement": ["acceleration", "position"], "solver": "as-published"},
-              {"formulation": "odca", "enforcement": "position"}],
-  "exclude": [{"enforcement": "position", "solver": "as-published"}],
-  "ensembles": [{"size": 2, "seed": 1, "perturb": 1e-3, "scenes": "four-bar", "enforcement": "position"}],
-  "sweep": [{"name": "mass", "field": "/scenes/0/mechanism/bodies/0/mass", "values": [1, 2]},
-            {"name": "level", "field": "/columns/1/enforcement", "values": ["position", "velocity"]}],
-  "tolerances": [1e-6], "compile": {"planar": false},
-  "timing": {"repeats": 0, "columns": [{"formulation": "odca", "enforcement": "position"}]}
+  "<scenes|problems>": [{"mechanism": "old-bar.json",   "horizon": 0.5}],
+  "<columns|methods>": [{"formulation": ["odca", "lagrange"],
+               "enforcement": ["acceleration", "<position|projection>"], "solver": "<as-published|plain>"},
+              {"formulation": "odca", "enforcement": "<position|projection>"}],
+  "exclude": [{"enforcement": "<position|projection>", "solver": "<as-published|plain>"}],
+  "ensembles": [{"size": 2, "seed": 1, "perturb": 1e-3, "<scenes|problems>": "four-bar",
+                 "enforcement": "<position|projection>"}],
+  "sweep": [{"name": "mass", "field": "/<scenes|problems>/0/mechanism/bodies/0/mass", "values": [1, 2]},
+            {"name": "level", "field": "/<columns|methods>/1/enforcement",
+             "values": ["<position|projection>", "velocity"]}],
+  "tolerances": [1e-6], "<compile|preprocess>": {"planar": false},
+  "timing": {"repeats": 0,
+             "<columns|methods>": [{"formulation": "odca", "enforcement": "<position|projection>"}]}
 })";
 
-constexpr const char* kNewExperiment = R"({
-  "name": "tiny",
-  "problems": [{"mechanism": "old-bar.json",   "horizon": 0.5}],
-  "methods": [{"formulation": ["odca", "lagrange"],
-               "enforcement": ["acceleration", "projection"], "solver": "plain"},
-              {"formulation": "odca", "enforcement": "projection"}],
-  "exclude": [{"enforcement": "projection", "solver": "plain"}],
-  "ensembles": [{"size": 2, "seed": 1, "perturb": 1e-3, "problems": "four-bar", "enforcement": "projection"}],
-  "sweep": [{"name": "mass", "field": "/problems/0/mechanism/bodies/0/mass", "values": [1, 2]},
-            {"name": "level", "field": "/methods/1/enforcement", "values": ["projection", "velocity"]}],
-  "tolerances": [1e-6], "preprocess": {"planar": false},
-  "timing": {"repeats": 0, "methods": [{"formulation": "odca", "enforcement": "projection"}]}
-})";
-
-constexpr const char* kOldMap = R"({"title": "t", "columns": [
-  {"label": "O", "select": {"formulation": "odca", "solver": "as-published"}}],
-  "groups": [{"label": "g", "must_hold": "all", "why": "because", "rows": [
-    {"label": "r", "select": {"mechanism": "four-bar"}, "right": ["finished", "inexpressible"],
-     "decides": [{"measure": "error_shape_max", "limit": 5, "of": "rtol"}]}]}]})";
-
-constexpr const char* kNewMap = R"({"title": "t", "methods": [
-  {"label": "O", "select": {"formulation": "odca", "solver": "plain"}}],
-  "groups": [{"label": "g", "required": "all", "rationale": "because", "rows": [
-    {"label": "r", "select": {"mechanism": "four-bar"}, "expected_outcome": ["finished", "unsupported"],
-     "criteria": [{"measure": "error_path_max", "limit": 5, "relative_to": "rtol"}]}]}]})";
+constexpr const char* kMap = R"({"title": "t", "<columns|methods>": [
+  {"label": "O", "select": {"formulation": "odca", "solver": "<as-published|plain>"}}],
+  "groups": [{"label": "g", "<must_hold|required>": "all", "<why|rationale>": "because", "rows": [
+    {"label": "r", "select": {"mechanism": "four-bar"},
+     "<right|expected_outcome>": ["finished", "<inexpressible|unsupported>"],
+     "<decides|criteria>": [{"measure": "<error_shape_max|error_path_max>", "limit": 5,
+                             "<of|relative_to>": "rtol"}]}]}]})";
 
 class MigrateTest : public CommandLineTest {
  protected:
@@ -67,6 +59,11 @@ class MigrateTest : public CommandLineTest {
     EXPECT_EQ(again.text, name + ": no old names\n");
     EXPECT_EQ(fs::last_write_time(folder_ / name), written);
     return now;
+  }
+
+  /// Migrates the text with old names, and expects the one with new names.
+  void ExpectNewNames(const std::string& name, const std::string& text) const {
+    EXPECT_EQ(Migrated(name, WithNames(text, false)), WithNames(text, true));
   }
 
   /// The mechanism of the fixture as earlier versions had it.
@@ -112,15 +109,15 @@ class MigrateTest : public CommandLineTest {
 
 TEST_F(MigrateTest, AnOldExperimentIsReadAfterwards) {
   EXPECT_EQ(Migrated("old-bar.json", OldMechanism()), mechanism_);
-  Write("old.json", kOldExperiment);
+  Write("old.json", WithNames(kExperiment, false));
   ExpectEnding(Call("run old.json"), 2, {"unknown key \"scenes\"", "loopbench migrate FILE"});
-  EXPECT_EQ(Migrated("old.json", kOldExperiment), kNewExperiment);
+  ExpectNewNames("old.json", kExperiment);
   ExpectEnding(Call("check old.json old-bar.json"), 0, {"old.json: experiment"});
   ExpectEnding(Call("migrate old.json old-bar.json tiny.json"), 0, {"tiny.json: no old names"});
 }
 
 TEST_F(MigrateTest, OldRulesAreReadAfterwards) {
-  EXPECT_EQ(Migrated("map.json", kOldMap), kNewMap);
+  ExpectNewNames("map.json", kMap);
   std::string claims = kTinyClaims;
   claims.replace(claims.find("partially_reproduced"), 20, "only_under");
   EXPECT_EQ(Migrated("claims.json", claims), kTinyClaims);
@@ -176,16 +173,12 @@ TEST_F(MigrateTest, MechanismsOfAStoreKeepTheirChecksum) {
 }
 
 TEST_F(MigrateTest, ValuesOfASweepFollowItsField) {
-  EXPECT_EQ(Migrated("sweep.json", R"({"scenes": [], "sweep": [
-    {"values": ["position", "velocity"], "field": "/columns/0/enforcement/0"},
-    {"values": ["position"], "field": "/scenes/0/mechanism/name"}]})"),
-            R"({"problems": [], "sweep": [
-    {"values": ["projection", "velocity"], "field": "/methods/0/enforcement/0"},
-    {"values": ["position"], "field": "/problems/0/mechanism/name"}]})");
-  EXPECT_EQ(Migrated("claims.json", R"({"claims": [{"checks": [{"select": {"content": "a"},
-    "relative_to": {"solver": "as-published", "content": "b"}}]}]})"),
-            R"({"claims": [{"checks": [{"select": {"config_hash": "a"},
-    "relative_to": {"solver": "plain", "config_hash": "b"}}]}]})");
+  ExpectNewNames("sweep.json", R"({"<scenes|problems>": [], "sweep": [
+    {"values": ["<position|projection>", "velocity"], "field": "/<columns|methods>/0/enforcement/0"},
+    {"values": ["position"], "field": "/<scenes|problems>/0/mechanism/name"}]})");
+  ExpectNewNames("claims.json",
+                 R"({"claims": [{"checks": [{"select": {"<content|config_hash>": "a"},
+    "relative_to": {"solver": "<as-published|plain>", "<content|config_hash>": "b"}}]}]})");
 }
 
 TEST_F(MigrateTest, NamesOfTheUserStay) {

@@ -120,18 +120,17 @@ TEST(ObserversTest, ComparisonsJudgeItsKeysByTheirRule) {
 }
 
 TEST(ObserversTest, ARowThatCannotBeIsRefused) {
-  const auto refusal = [](ObserverRow row) {
-    return RefusalOf([&] { RegisterObserver(std::move(row)); });
+  const auto refusal = [](void (*change)(ObserverRow&)) {
+    ObserverRow row = Hasty();
+    change(row);
+    return RefusalOf([&] { RegisterObserver(row); });
   };
-  ObserverRow row = Hasty();
-  row.name = "Haste";
-  EXPECT_EQ(refusal(row), "observer \"Haste\": found no word, expected a-z, 0-9, '-' and '_'");
-  row = Hasty();
-  row.sentence.clear();
-  ExpectPart(refusal(row), "observer \"haste\": found no sentence");
-  row = Hasty();
-  row.spatial = nullptr;
-  ExpectPart(refusal(row), "observer \"haste\": found no factory");
+  EXPECT_EQ(refusal([](ObserverRow& row) { row.name = "Haste"; }),
+            "observer \"Haste\": found no word, expected a-z, 0-9, '-' and '_'");
+  ExpectPart(refusal([](ObserverRow& row) { row.sentence.clear(); }),
+             "observer \"haste\": found no sentence");
+  ExpectPart(refusal([](ObserverRow& row) { row.spatial = nullptr; }),
+             "observer \"haste\": found no factory");
   EXPECT_TRUE(RegisteredObservers().empty());
 }
 

@@ -2,40 +2,25 @@
 // leaves no temporary file.
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
-#include <functional>
 #include <set>
-#include <string>
 #include <thread>
-#include <vector>
 
-#include "harness/base/text.h"
 #include "tests/harness/cli_fixture.h"
 
 namespace loopbench::harness {
 namespace output_test {
 
-void ExpectPart(const std::string& text, const std::string& part) {
-  EXPECT_NE(text.find(part), std::string::npos) << "no <" << part << "> in\n" << text;
-}
-
 class OutputFiles : public CommandLineTest {
  protected:
   fs::path At(const std::string& name) const { return folder_ / name; }
-  void ExpectNothingElse(const std::set<std::string>& names) const {
-    for (const auto& entry : fs::directory_iterator(folder_)) {
-      EXPECT_TRUE(names.contains(entry.path().filename().string())) << entry.path();
-    }
-  }
-  const std::set<std::string> files_ = {"four-bar.json", "tiny.json", "claims.json"};
 };
 
 TEST_F(OutputFiles, GoesThroughLinks) {
@@ -52,9 +37,11 @@ TEST_F(OutputFiles, GoesThroughLinks) {
   EXPECT_TRUE(fs::is_symlink(At("dangling")));
   EXPECT_EQ(ReadFile(At("folder/new")), "made");
   fs::create_symlink("circle", At("circle"));
-  ExpectPart(ErrorOf([&] { WriteFileAtomically(At("circle"), "x"); }), "symbolic links");
+  ExpectWords(MessageOf<std::runtime_error>([&] { WriteFileAtomically(At("circle"), "x"); }),
+              {"symbolic links"});
   fs::create_symlink("nowhere/x", At("lost"));
-  ExpectPart(ErrorOf([&] { WriteFileAtomically(At("lost"), "x"); }), "No such file");
+  ExpectWords(MessageOf<std::runtime_error>([&] { WriteFileAtomically(At("lost"), "x"); }),
+              {"No such file"});
 }
 
 TEST_F(OutputFiles, GoesIntoDevicesAndPipes) {
@@ -79,22 +66,22 @@ TEST_F(OutputFiles, GoesIntoDevicesAndPipes) {
   EXPECT_TRUE(fs::is_character_file(At("null")));
   EXPECT_THROW(WriteFileAtomically(At("full"), "x"), SystemFault);
   EXPECT_TRUE(fs::is_symlink(At("full")));
-  ExpectPart(ErrorOf([&] { WriteFileAtomically(folder_, "x"); }), "found a folder");
+  ExpectWords(MessageOf<std::runtime_error>([&] { WriteFileAtomically(folder_, "x"); }),
+              {"found a folder"});
 }
 
 TEST_F(OutputFiles, GoesToStandardOutputBehindWhatWasPrinted) {
-  ExpectEnding(Call("run tiny.json --out out"), 0, {});
+  Expect("run tiny.json --out out", 0);
   for (const std::string out : {"/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"}) {
     const std::string table = "table out --format csv --out " + out;
-    ExpectEnding(Call("", "'" LOOPBENCH_BINARY "' " + table + " > text 2> messages; exit $?;"), 0,
-                 {});
+    Expect("", 0, {}, "'" LOOPBENCH_BINARY "' " + table + " > text 2> messages; exit $?;");
     const std::string text = ReadFile(At("text"));
     EXPECT_TRUE(text.starts_with("experiment,mechanism,")) << text;
-    EXPECT_EQ(text.find("wrote"), text.npos) << text;
-    ExpectPart(ReadFile(At("messages")), "wrote " + out);
-    ExpectEnding(Call(table), 0, {"experiment,mechanism,", "wrote " + out});  // a pipe
+    ExpectNone(text, {"wrote"});
+    ExpectWords(ReadFile(At("messages")), {"wrote " + out});
+    Expect(table, 0, {"experiment,mechanism,", "wrote " + out});  // a pipe
   }
-  ExpectEnding(Call("view four-bar.json --format svg --out /dev/stdout"), 0, {"<svg", "wrote"});
+  Expect("view four-bar.json --format svg --out /dev/stdout", 0, {"<svg", "wrote"});
   // messages go to standard error
   const std::string svg =
       Call("", "'" LOOPBENCH_BINARY
@@ -128,46 +115,36 @@ TEST_F(OutputFiles, OntoAnInputIsRefused) {
     const CommandInputs inputs;
     EXPECT_EQ(ReadFile(At("link")), "text");
     for (const char* name : {"input", "link", "hard", "./input"}) {
-      ExpectPart(ErrorOf([&] { WriteFileAtomically(At(name), "x"); }), "an input of this command");
-      ExpectPart(ErrorOf([&] { RequireOutput(At(name)); }), "an input of this command");
+      ExpectWords(MessageOf<std::runtime_error>([&] { WriteFileAtomically(At(name), "x"); }),
+                  {"an input of this command"});
+      ExpectWords(MessageOf<std::runtime_error>([&] { RequireOutput(At(name)); }),
+                  {"an input of this command"});
     }
     WriteFileAtomically(At("other"), "x");
   }
   EXPECT_EQ(ReadFile(At("input")), "text");
   WriteFileAtomically(At("input"), "x");  // the command is over
-  std::set<std::string> names = files_;
-  names.insert({"input", "link", "hard", "other"});
-  ExpectNothingElse(names);
+  EXPECT_EQ(NamesIn(folder_), (std::vector<std::string>{"claims.json", "four-bar.json", "hard",
+                                                        "input", "link", "other", "tiny.json"}));
 }
-
-/// Commands that write one file, each with its output last, and the inputs that it must not be.
-struct Writer {
-  std::string command;
-  std::vector<std::string> inputs;
-};
 
 // Each option that names a file, of each command that has one.
 TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
-  Write("moving.json", R"({"name": "moving", "tolerances": [1e-6],
-    "problems": [{"mechanism": "four-bar.json", "horizon": 0.5}],
-    "methods": [{"formulation": ["odca", "lagrange"], "enforcement": "projection"}],
-    "output": {"step": 0.1}, "timing": {"repeats": 0}})");
-  ExpectEnding(Call("run moving.json --out store"), 0, {});
+  Write("moving.json", TinyWith(R"("output": {"step": 0.1})"));
+  Expect("run moving.json --out store", 0);
   fs::copy(At("store"), At("copy"), fs::copy_options::recursive);
-  ExpectEnding(Call("trajectory store --where formulation=odca --out csv"), 0, {});
-  ExpectEnding(Call("trajectory store --where formulation=lagrange --out csv"), 0, {});
-  std::vector<std::string> motions;
-  for (const auto& entry : fs::directory_iterator(At("csv"))) {
-    motions.push_back("csv/" + entry.path().filename().string());
-  }
+  Expect("trajectory store --out csv", 0);
+  const std::vector<std::string> motions = NamesIn(At("csv"));
   ASSERT_EQ(motions.size(), 2u);
-  ExpectEnding(Call("history add store --store past --commit a --date 2026-01-01"), 0, {});
+  const std::string motion = "csv/" + motions.front();
+  Expect("history add store --store past --commit a --date 2026-01-01", 0);
   Write(
       "b.json",
       R"({"benchmarks": [{"name": "rhs/chain/3/odca/acceleration/joint/rank-revealing", "cpu_time": 1, "real_time": 1},
     {"name": "rhs/chain/30/odca/acceleration/joint/rank-revealing", "cpu_time": 10, "real_time": 10}]})");
   const std::string store = "store/results.jsonl";
-  for (const Writer& writer : std::vector<Writer>{
+  // commands that write one file, each with its output last, and the inputs that it must not be
+  for (const auto& [command, inputs] : std::map<std::string, std::vector<std::string>>{
            {"table store --format csv --out ", {store}},
            {"view four-bar.json --format html --out ", {"four-bar.json"}},
            {"view four-bar.json --format svg --out ", {"four-bar.json"}},
@@ -178,24 +155,24 @@ TEST_F(OutputFiles, OfEveryCommandGoesTheSameWay) {
            {"compare store copy --junit ", {store, "copy/results.jsonl"}},
            {"check-claims store --claims claims.json --out ", {store, "claims.json"}},
            {"history report --store past --out ", {"past/history.jsonl"}},
-           {"trajectory " + motions[0] + " --out ", {motions[0]}}}) {
-    SCOPED_TRACE(writer.command);
+           {"trajectory " + motion + " --out ", {motion}}}) {
+    SCOPED_TRACE(command);
     Write("target", "old");
     fs::remove(At("there"));
     fs::create_symlink("target", At("there"));
-    ExpectEnding(Call(writer.command + "there"), 0, {});
+    Expect(command + "there", 0);
     EXPECT_TRUE(fs::is_symlink(At("there")));
     EXPECT_NE(ReadFile(At("target")), "old");
     fs::remove(At("there"));
     ASSERT_EQ(::mkfifo(At("there").c_str(), 0600), 0);
-    ExpectEnding(Call(writer.command + "there", "{ timeout 60 cat there > read & } &&"), 0, {});
+    Expect(command + "there", 0, {}, "{ timeout 60 cat there > read & } &&");
     EXPECT_TRUE(fs::is_fifo(At("there")));
     fs::remove(At("there"));
-    for (const std::string& input : writer.inputs) {
+    for (const std::string& input : inputs) {
       const std::string before = ReadFile(At(input));
       fs::create_symlink(input, At("there"));
       for (const std::string& path : {input, std::string("there")}) {
-        ExpectEnding(Call(writer.command + path), 2, {"found an input of this command"});
+        Expect(command + path, 2, {"found an input of this command"});
       }
       fs::remove(At("there"));
       EXPECT_EQ(ReadFile(At(input)), before) << input;
@@ -207,9 +184,9 @@ TEST_F(OutputFiles, IsAskedForBeforeAnythingIsMeasured) {
   Write("file", "no folder");
   const Ending refused = Call("baseline renew --experiments tiny.json --dir file/dir");
   ExpectEnding(refused, 2, {"cannot write 'file/dir/results.jsonl'", "Not a directory"});
-  EXPECT_EQ(refused.text.find("runs"), std::string::npos) << refused.text;
-  ExpectEnding(Call("advise four-bar.json --out file/x"), 2, {"cannot write 'file/x'"});
-  ExpectEnding(Call("advise four-bar.json --out four-bar.json"), 2, {"an input of this command"});
+  ExpectNone(refused.text, {"runs"});
+  Expect("advise four-bar.json --out file/x", 2, {"cannot write 'file/x'"});
+  Expect("advise four-bar.json --out four-bar.json", 2, {"an input of this command"});
 }
 
 /// Forks a process that calls `work`, waits until it is ready, and ends it.
@@ -250,10 +227,6 @@ TEST_F(OutputFiles, ProgramsEndWithTheProcessThatRunsThem) {
   EXPECT_FALSE(runs());
 }
 
-std::size_t Count(const fs::path& folder) {
-  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), {}));
-}
-
 TEST_F(OutputFiles, UnderWayIsRemovedBySignals) {
   const fs::path tmp = At("tmp");
   fs::create_directory(tmp);
@@ -268,18 +241,18 @@ TEST_F(OutputFiles, UnderWayIsRemovedBySignals) {
   };
   for (const int signal : {SIGTERM, SIGHUP, SIGINT}) {
     EXPECT_EQ(EndedBy(signal, work), signal);
-    EXPECT_EQ(Count(tmp), 0u) << signal;
+    EXPECT_EQ(NamesIn(tmp).size(), 0u) << signal;
   }
   // no process can handle this one: the next folder of the name removes the leftovers
   EXPECT_EQ(EndedBy(SIGKILL, [] { new TemporaryFolder("gone"); }), SIGKILL);
-  EXPECT_EQ(Count(tmp), 1u);
+  EXPECT_EQ(NamesIn(tmp).size(), 1u);
   fs::create_directory(tmp / "gone.tmp-mine-is-longer");
   {
     const TemporaryFolder living("gone"), another("gone"), other("other");
     EXPECT_TRUE(fs::exists(living.path())) << "its lock keeps it";
-    EXPECT_EQ(Count(tmp), 4u);
+    EXPECT_EQ(NamesIn(tmp).size(), 4u);
   }
-  EXPECT_EQ(Count(tmp), 1u);
+  EXPECT_EQ(NamesIn(tmp).size(), 1u);
   if (kept.empty()) {
     ::unsetenv("TMPDIR");
   } else {
@@ -293,8 +266,8 @@ TEST_F(OutputFiles, OfKilledProcessesAreRemovedByTheNextRun) {
     for (const fs::path& path : {tmp, table}) (new OutputFile(path))->Write("half of it");
   };
   EXPECT_EQ(EndedBy(SIGKILL, work), SIGKILL);
-  EXPECT_EQ(Count(tmp.parent_path()), 1u);
-  EXPECT_EQ(Count(At("out")), 2u);
+  EXPECT_EQ(NamesIn(tmp.parent_path()).size(), 1u);
+  EXPECT_EQ(NamesIn(At("out")).size(), 2u);
   OutputFile living(table);
   // names that only look alike
   const std::set<std::string> kept = {"drift.csv.tmp", "1-2.tmp", "a.0-1.tmp", "b.1-2.tmpx",
@@ -308,16 +281,42 @@ TEST_F(OutputFiles, OfKilledProcessesAreRemovedByTheNextRun) {
   Write("out/references/" + far.filename().string(), "far");
   const int lock = ::open(far.c_str(), O_RDONLY | O_CLOEXEC);
   ASSERT_EQ(::flock(lock, LOCK_EX), 0);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"ran 2 cases"});
-  EXPECT_EQ(Count(tmp.parent_path()), kept.size() + 1);
+  Expect("run tiny.json --out out", 0, {"ran 2 cases"});
+  EXPECT_EQ(NamesIn(tmp.parent_path()).size(), kept.size() + 1);
   for (const std::string& name : kept) EXPECT_TRUE(fs::exists(tmp.parent_path() / name)) << name;
   EXPECT_TRUE(fs::exists(far));
   living.Finish();
   ::close(lock);
-  ExpectEnding(Call("run tiny.json --out out"), 0, {"2 reused"});
+  Expect("run tiny.json --out out", 0, {"2 reused"});
   EXPECT_FALSE(fs::exists(far));
   for (const auto& entry : fs::directory_iterator(At("out"))) {
     EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
+  }
+}
+
+TEST(Files, ANewFileOfAKilledWriterIsNotThere) {
+  const TemporaryFolder folder("loopbench-files");
+  const std::filesystem::path path = folder.path() / "new";
+  const std::string text(1 << 16, 'x');
+  const auto write_and_be_killed = [&] {
+    const rlimit half = {text.size() / 2, text.size() / 2};
+    ::setrlimit(RLIMIT_FSIZE, &half);
+    std::signal(SIGXFSZ, SIG_DFL);
+    WriteNewFile(path, text);
+  };
+  EXPECT_EXIT(write_and_be_killed(), ::testing::KilledBySignal(SIGXFSZ), "");
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_TRUE(WriteNewFile(path, text));
+  EXPECT_EQ(ReadFile(path), text);
+  EXPECT_FALSE(WriteNewFile(path, "another"));
+  EXPECT_EQ(ReadFile(path), text);
+}
+
+TEST(Files, ANewFileLeavesNothingBesideIt) {
+  const TemporaryFolder folder("loopbench-files");
+  for (const char* text : {"first", "second"}) WriteNewFile(folder.path() / "new", text);
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    EXPECT_EQ(entry.path().filename(), "new");
   }
 }
 

@@ -1,11 +1,51 @@
-// Where the repository lies that the tests were built from.
+// Where the repository lies that the tests were built from, helpers for its files, and expected
+// messages.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <filesystem>
+#include <string>
+#include <vector>
+
+#include "harness/base/text.h"
 
 namespace loopbench::harness {
 
 inline const std::filesystem::path kRoot = LOOPBENCH_SOURCE_DIR;
 inline const std::filesystem::path kConfigs = kRoot / "configs";
+
+/// The JSON files below a folder, sorted.
+inline std::vector<std::filesystem::path> JsonFilesIn(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+/// The message of the Error that `call` throws, "" if none. Other errors pass through.
+template <class Error = ConfigError>
+std::string MessageOf(const auto& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+inline void ExpectWords(const std::string& text, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    EXPECT_NE(text.find(word), std::string::npos) << "no <" << word << "> in\n" << text;
+  }
+}
+inline void ExpectNone(const std::string& text, const std::vector<std::string>& words) {
+  for (const std::string& word : words) {
+    EXPECT_EQ(text.find(word), std::string::npos) << "<" << word << "> in\n" << text;
+  }
+}
 
 }  // namespace loopbench::harness

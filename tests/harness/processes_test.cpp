@@ -5,30 +5,34 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <chrono>
 #include <csignal>
-#include <cstdlib>
-#include <filesystem>
 #include <map>
-#include <stdexcept>
 #include <thread>
-#include <vector>
 
 #include "harness/base/text.h"
 
 namespace loopbench::harness {
 namespace processes_test {
 
-std::map<std::size_t, ProcessResult> RunAll(const std::vector<std::function<std::string()>>& pieces,
-                                            int jobs, const ProcessLimits& limits = {}) {
-  std::map<std::size_t, ProcessResult> results;
+using Results = std::map<std::size_t, ProcessResult>;
+
+Results RunAll(const std::vector<std::function<std::string()>>& pieces, int jobs,
+               const ProcessLimits& limits = {}) {
+  Results results;
   RunInProcesses(
       pieces.size(), jobs, [&](std::size_t i) { return pieces[i](); },
       [&](std::size_t) { return limits; },
       [&](std::size_t i, const ProcessResult& result) { results[i] = result; });
   return results;
 }
+
+/// The ending of a result, and a part of its text.
+void ExpectResult(const ProcessResult& result, ProcessEnding ending, const std::string& part) {
+  EXPECT_EQ(result.ending, ending) << result.text;
+  EXPECT_NE(result.text.find(part), std::string::npos) << result.text;
+}
+
+constexpr ProcessLimits kImpatient = {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5};
 
 std::string Hang() {
   for (;;) ::pause();
@@ -60,62 +64,57 @@ std::string Hoard() {
 
 TEST(ProcessesTest, AnswersComeBackWhole) {
   const std::string large(3'000'000, 'a');  // many times what a pipe holds
-  const auto results = RunAll(
-      {[] { return std::string("small"); }, [&] { return large; }, [] { return std::string(); }},
-      2);
+  const std::vector<std::string> texts = {"small", large, ""};
+  const Results results =
+      RunAll({[&] { return texts[0]; }, [&] { return texts[1]; }, [&] { return texts[2]; }}, 2);
   ASSERT_EQ(results.size(), 3u);
-  EXPECT_EQ(results.at(0).text, "small");
-  EXPECT_EQ(results.at(1).text, large);
-  EXPECT_EQ(results.at(2).text, "");
-  for (const auto& [i, result] : results) EXPECT_EQ(result.ending, ProcessEnding::kAnswered);
+  for (const auto& [i, result] : results) {
+    EXPECT_EQ(result.ending, ProcessEnding::kAnswered);
+    EXPECT_EQ(result.text, texts[i]);
+  }
 }
 
 TEST(ProcessesTest, EachEndingHasItsName) {
-  const auto results =
+  const Results results =
       RunAll({[]() -> std::string { throw std::logic_error("a reason"); },
               [] { return ::raise(SIGKILL), std::string(); }, []() -> std::string { ::_exit(7); },
               Hang, [] { return std::string("fine"); }},
-             3, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
-  EXPECT_EQ(results.at(0).ending, ProcessEnding::kThrew);
-  EXPECT_EQ(results.at(0).text, "a reason");
-  EXPECT_EQ(results.at(1).ending, ProcessEnding::kKilled);
-  EXPECT_NE(results.at(1).text.find("signal 9"), std::string::npos);
-  EXPECT_EQ(results.at(2).ending, ProcessEnding::kCrashed);
-  EXPECT_NE(results.at(2).text.find("exit code 7"), std::string::npos);
-  EXPECT_EQ(results.at(3).ending, ProcessEnding::kOverTime);
-  EXPECT_NE(results.at(3).text.find("0.5 s asleep"), std::string::npos) << results.at(3).text;
-  EXPECT_EQ(results.at(4).text, "fine");
+             3, kImpatient);
+  ExpectResult(results.at(0), ProcessEnding::kThrew, "a reason");
+  ExpectResult(results.at(1), ProcessEnding::kKilled, "signal 9");
+  ExpectResult(results.at(2), ProcessEnding::kCrashed, "exit code 7");
+  ExpectResult(results.at(3), ProcessEnding::kOverTime, "0.5 s asleep");
+  ExpectResult(results.at(4), ProcessEnding::kAnswered, "fine");
 }
 
 /// The operator, or the system for lack of memory, ends a process: no result of its work.
 TEST(ProcessesTest, AKilledProcessStartsOnceMore) {
   const std::filesystem::path mark = std::filesystem::path(testing::TempDir()) / "killed";
-  const auto results = RunAll({[&] {
-                                 if (!std::filesystem::exists(mark)) {
-                                   WriteFileAtomically(mark, "");
-                                   ::raise(SIGTERM);
-                                 }
-                                 return std::string("done");
-                               },
-                               [] { return std::string("fine"); }},
-                              1);
+  const Results results = RunAll({[&] {
+                                    if (!std::filesystem::exists(mark)) {
+                                      WriteFileAtomically(mark, "");
+                                      ::raise(SIGTERM);
+                                    }
+                                    return std::string("done");
+                                  },
+                                  [] { return std::string("fine"); }},
+                                 1);
   EXPECT_EQ(results.at(0).text, "done");
   EXPECT_EQ(results.at(1).text, "fine");
 }
 
 TEST(ProcessesTest, WaitingForAProgramIsNoSleep) {
-  const auto results = RunAll({[] {
-                                return RunProgram({"sh", "-c", "sleep 2; echo x"}).output;
-                              }},
-                              1, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
+  const Results results = RunAll({[] {
+                                   return RunProgram({"sh", "-c", "sleep 2; echo x"}).output;
+                                 }},
+                                 1, kImpatient);
   EXPECT_EQ(results.at(0).text, "x\n");
 }
 
 TEST(ProcessesTest, CpuTimeIsLimited) {
-  const auto results = RunAll({[] { return Compute(60.0); }, [] { return Compute(0.01); }}, 2,
-                              {.cpu_s = 0.3, .memory_mb = 0.0});
-  EXPECT_EQ(results.at(0).ending, ProcessEnding::kOverTime);
-  EXPECT_NE(results.at(0).text.find("0.3 s of CPU time"), std::string::npos) << results.at(0).text;
+  const Results results = RunAll({[] { return Compute(60.0); }, [] { return Compute(0.01); }}, 2,
+                                 {.cpu_s = 0.3, .memory_mb = 0.0});
+  ExpectResult(results.at(0), ProcessEnding::kOverTime, "0.3 s of CPU time");
   EXPECT_GE(results.at(0).cpu_s, 0.29);
   EXPECT_LT(results.at(0).cpu_s, 1.0);
   EXPECT_EQ(results.at(1).text, "done");
@@ -136,8 +135,8 @@ TEST(ProcessesTest, OfMoreJobsThanProcessorsNoneIsOverTime) {
 }
 
 TEST(ProcessesTest, StoppingIsNeitherComputingNorIdling) {
-  const auto results = RunAll({[] { return BeStopped(1.5), Compute(0.05); }}, 1,
-                              {.cpu_s = 0.4, .memory_mb = 0.0, .idle_s = 0.5});
+  const Results results = RunAll({[] { return BeStopped(1.5), Compute(0.05); }}, 1,
+                                 {.cpu_s = 0.4, .memory_mb = 0.0, .idle_s = 0.5});
   EXPECT_EQ(results.at(0).text, "done");
   EXPECT_GE(results.at(0).wall_s, 1.4);
 }
@@ -146,7 +145,7 @@ TEST(ProcessesTest, NapsOfAnotherKindOfHangingAreIdlingToo) {
   const auto nap = []() -> std::string {
     for (;;) std::this_thread::sleep_for(std::chrono::milliseconds(5));
   };
-  const auto results = RunAll({nap}, 1, {.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5});
+  const Results results = RunAll({nap}, 1, kImpatient);
   EXPECT_EQ(results.at(0).ending, ProcessEnding::kOverTime);
 }
 
@@ -155,7 +154,7 @@ TEST(ProcessesTest, AnAnswerThatWaitsToBeReadIsNotIdling) {
   std::map<std::size_t, ProcessResult> results;
   RunInProcesses(
       2, 2, [&](std::size_t i) { return i == 0 ? std::string("first") : Compute(0.1) + large; },
-      [](std::size_t) { return ProcessLimits{.cpu_s = 10.0, .memory_mb = 0.0, .idle_s = 0.5}; },
+      [](std::size_t) { return kImpatient; },
       [&](std::size_t i, const ProcessResult& result) {
         results[i] = result;
         if (i == 0) std::this_thread::sleep_for(std::chrono::seconds(1));  // a slow disk
@@ -165,8 +164,8 @@ TEST(ProcessesTest, AnAnswerThatWaitsToBeReadIsNotIdling) {
 
 TEST(ProcessesTest, MemoryIsLimited) {
   if (!LimitsMemory()) GTEST_SKIP() << "sanitizers reserve the address space";
-  const auto results = RunAll({Hoard, [] { return std::string(8 << 20, 'x'); }}, 1,
-                              {.cpu_s = 0.0, .memory_mb = 64.0});
+  const Results results = RunAll({Hoard, [] { return std::string(8 << 20, 'x'); }}, 1,
+                                 {.cpu_s = 0.0, .memory_mb = 64.0});
   EXPECT_EQ(results.at(0).ending, ProcessEnding::kOverMemory);
   EXPECT_EQ(results.at(1).ending, ProcessEnding::kAnswered) << "8 MiB are within 64";
 }
@@ -193,10 +192,10 @@ TEST(ProcessesTest, WhatDoneThrowsEndsEverything) {
 }
 
 /// Results by task, and how many processes there were.
-std::pair<std::map<std::size_t, ProcessResult>, std::size_t> Share(
-    std::size_t count, const std::function<std::string(std::size_t)>& work,
-    const ProcessLimits& limits = {}) {
-  std::map<std::size_t, ProcessResult> results;
+std::pair<Results, std::size_t> Share(std::size_t count,
+                                      const std::function<std::string(std::size_t)>& work,
+                                      const ProcessLimits& limits = {}) {
+  Results results;
   const auto all = [&](const std::vector<std::size_t>& tasks) {
     std::vector<std::string> texts;
     for (const std::size_t task : tasks) texts.push_back(work(task));
@@ -213,14 +212,14 @@ std::pair<std::map<std::size_t, ProcessResult>, std::size_t> Share(
 }
 
 TEST(SharedProcessesTest, AnswerEveryTaskInFewProcesses) {
-  const auto [results, processes] = Share(500, [](std::size_t i) {
+  const auto text = [](std::size_t i) {
     return std::string(i % 7, 'x') + "\n" + std::to_string(i) + (i % 3 == 0 ? "\n" : "");
-  });
+  };
+  const auto [results, processes] = Share(500, text);
   ASSERT_EQ(results.size(), 500u);
   for (const auto& [i, result] : results) {
     EXPECT_EQ(result.ending, ProcessEnding::kAnswered);
-    EXPECT_EQ(result.text,
-              std::string(i % 7, 'x') + "\n" + std::to_string(i) + (i % 3 == 0 ? "\n" : ""));
+    EXPECT_EQ(result.text, text(i));
   }
   EXPECT_LT(processes, 100u);
 }

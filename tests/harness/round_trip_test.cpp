@@ -6,8 +6,8 @@
 
 #include "harness/config/formulations.h"
 #include "harness/config/mechanism_reader.h"
-#include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/import.h"
+#include "harness/exchange/model.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/assembly.h"
 #include "tests/harness/places.h"

@@ -1,6 +1,7 @@
 // Masses of meshes and shapes against closed forms, and meshes that are refused.
 #include "harness/exchange/solids.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -183,39 +184,21 @@ TEST(Solids, ReversedAndOpenMeshesAreSeen) {
 }
 
 /// A model folder with meshes.
-class MeshFiles : public testing::Test {
+class MeshFiles : public ModelFolder {
  protected:
-  void SetUp() override { fs::create_directories(top_ / "model/meshes"); }
-  void TearDown() override { fs::remove_all(top_); }
-  void Write(const std::string& name, const std::string& text) const {
-    WriteFileAtomically(top_ / "model" / name, text);
-  }
-  std::string MessageOf(const std::string& name) const {
-    try {
-      ReadMesh(top_ / "model" / name);
-    } catch (const ConfigError& error) {
-      return error.what();
-    }
-    return "";
-  }
   void ExpectFault(const std::string& name, const std::string& text,
                    const std::string& words) const {
     Write(name, text);
-    EXPECT_NE(MessageOf(name).find(words), std::string::npos) << MessageOf(name);
+    ExpectSaid(MessageOf([&] { ReadMesh(model_ / name); }), {words});
   }
-
-  const fs::path top_ = fs::path(testing::TempDir()) / "loopbench-meshes";
 };
 
 std::string AsObj(const TriangleMesh& mesh) {
   std::string text = "# box\n";
-  for (const Vector3d& p : mesh.points) {
-    text += "v " + std::to_string(p.x()) + " " + std::to_string(p.y()) + " " +
-            std::to_string(p.z()) + "\n";
-  }
+  const int count = static_cast<int>(mesh.points.size());
+  for (const Vector3d& p : mesh.points) text += fmt::format("v {:f}\n", fmt::join(p, " "));
   for (const auto& [a, b, c] : mesh.triangles) {
-    text += "f " + std::to_string(a + 1) + "/7/8 " + std::to_string(b + 1) + "//3 " +
-            std::to_string(c - static_cast<int>(mesh.points.size())) + "\r\n";
+    text += fmt::format("f {}/7/8 {}//3 {}\r\n", a + 1, b + 1, c - count);
   }
   return text;
 }
@@ -226,8 +209,7 @@ std::string AsTextStl(const TriangleMesh& mesh) {
     text += "facet normal 0 0 0\n outer loop\n";
     for (const int corner : triangle) {
       const Vector3d& p = mesh.points[corner];
-      text += "  vertex " + std::to_string(p.x()) + " " + std::to_string(p.y()) + " +" +
-              std::to_string(p.z()) + "\n";
+      text += fmt::format("  vertex {:f} {:f} +{:f}\n", p.x(), p.y(), p.z());
     }
     text += " endloop\nendfacet\n";
   }
@@ -256,7 +238,7 @@ TEST_F(MeshFiles, AllTypesAreTheSameSolid) {
   Write("binary.STL", AsBinaryStl(mesh));
   const Solid expected = SolidOf(mesh, MeshRule::kEnclosed);
   for (const char* name : {"box.obj", "text.stl", "binary.STL"}) {
-    const TriangleMesh read = ReadMesh(top_ / "model" / name);
+    const TriangleMesh read = ReadMesh(model_ / name);
     EXPECT_EQ(read.points.size(), 8u) << name;
     EXPECT_EQ(NumOpenEdges(read), 0u) << name;
     const Solid solid = SolidOf(read, MeshRule::kEnclosed);
@@ -276,17 +258,17 @@ TEST_F(MeshFiles, EqualPointsOfObjAreOne) {
     split.triangles.push_back({first, first + 1, first + 2});
   }
   Write("split.obj", AsObj(split));
-  EXPECT_EQ(NumOpenEdges(ReadMesh(top_ / "model/split.obj")), 0u);
+  EXPECT_EQ(NumOpenEdges(ReadMesh(model_ / "split.obj")), 0u);
 }
 
 TEST_F(MeshFiles, FaultsAreNamedWithTheirLine) {
   ExpectFault("a.obj", "v 0 0 0\nv 1 0\n", "a.obj:2: found a point without three numbers");
   ExpectFault("a.obj", "v 0 0 nan\n", "a.obj:1: found a point");
   ExpectFault("a.obj", "v 0 0 0\nf 1 1 2\n",
-              "a.obj:2: found the corner \"2\", expected numbers of points, 1 to 1");
-  ExpectFault("a.obj", "v 0 0 0\nf 0 1 1\n", "the corner \"0\"");
-  ExpectFault("a.obj", "v 0 0 0\nf -2 1 1\n", "the corner \"-2\"");
-  ExpectFault("a.obj", "v 0 0 0\nf 99999999999 1 1\n", "the corner \"99999999999\"");
+              "a.obj:2: found the corner '2', expected numbers of points, 1 to 1");
+  ExpectFault("a.obj", "v 0 0 0\nf 0 1 1\n", "the corner '0'");
+  ExpectFault("a.obj", "v 0 0 0\nf -2 1 1\n", "the corner '-2'");
+  ExpectFault("a.obj", "v 0 0 0\nf 99999999999 1 1\n", "the corner '99999999999'");
   ExpectFault("a.obj", "v 0 0 0\nf 1 1\n", "fewer than 3 corners");
   ExpectFault("a.obj", "", "found no triangles");
   ExpectFault("a.stl", "solid x\nvertex 0 0 0\nendloop\n",
@@ -299,113 +281,95 @@ TEST_F(MeshFiles, FaultsAreNamedWithTheirLine) {
   const float inf = INFINITY;
   std::memcpy(infinite.data() + 84 + 50 + 12, &inf, sizeof inf);
   ExpectFault("a.stl", infinite, "a corner that is not finite in triangle 1");
-  ExpectFault("a.dae", "<COLLADA/>", "found a mesh of type \".dae\", expected .stl or .obj");
+  ExpectFault("a.dae", "<COLLADA/>", "found a mesh of type '.dae', expected .stl or .obj");
 }
 
 TEST_F(MeshFiles, MjcfGeomsTakeTheMassOfTheirMesh) {
   Write("meshes/brick.obj", AsObj(Box({0.5, 1.25, 2.0})));
   const auto model = [](const std::string& asset, const std::string& geom) {
-    return "<mujoco><compiler meshdir=\"meshes\"/><default><mesh scale=\"2 1 1\"/></default>\n"
-           "<asset>" +
+    return "<mujoco><compiler meshdir='meshes'/><default><mesh scale='2 1 1'/></default>\n<asset>" +
            asset + "</asset>\n<worldbody><body><joint/>" + geom + "</body></worldbody></mujoco>";
   };
-  const auto read = [&] { return ImportMechanism(top_ / "model/m.xml"); };
-  const auto refusal = [&]() -> std::string {
-    try {
-      read();
-    } catch (const ConfigError& error) {
-      return error.what();
-    }
-    return "";
-  };
   // scaled to 1 x 1.25 x 2, its corner at (0, 0, 1), then turned about z by a quarter
-  Write(
-      "m.xml",
-      model("<mesh file=\"brick.obj\" refpos=\"0 0 -1\"/>",
-            "<geom type=\"mesh\" mesh=\"brick\" density=\"10\" pos=\"3 0 0\" quat=\"1 0 0 1\"/>"));
-  const BodyDescription body = read().description.bodies.at(1);
+  Write("main.xml",
+        model("<mesh file='brick.obj' refpos='0 0 -1'/>",
+              "<geom type='mesh' mesh='brick' density='10' pos='3 0 0' quat='1 0 0 1'/>"));
+  const BodyDescription body = Read().description.bodies.at(1);
   EXPECT_NEAR(body.mass, 25.0, 64 * 25 * kEps);
-  EXPECT_LE((body.com - Vector3d(3 - 0.625, 0.5, 2)).norm(), 64 * kEps);
+  ExpectNear(body.com, {3 - 0.625, 0.5, 2}, 64 * kEps);
   const Vector3d moments = 25.0 / 12.0 * Vector3d(1 + 4, 1.5625 + 4, 1 + 1.5625);
   const Matrix3d expected = moments.asDiagonal();
   EXPECT_LE((body.inertia - expected).norm(), 256 * kEps * expected.norm());
 
-  const std::string geom = "<geom type=\"mesh\" mesh=\"brick\" mass=\"3\"/>";
-  Write(
-      "m.xml",
-      model("<mesh name=\"brick\" file=\"brick.obj\" scale=\"1 -1 1\" inertia=\"exact\"/>", geom));
-  EXPECT_NEAR(read().description.bodies.at(1).com.y(), -0.625, 64 * kEps);
+  const std::string geom = "<geom type='mesh' mesh='brick' mass='3'/>";
+  Write("main.xml",
+        model("<mesh name='brick' file='brick.obj' scale='1 -1 1' inertia='exact'/>", geom));
+  EXPECT_NEAR(Read().description.bodies.at(1).com.y(), -0.625, 64 * kEps);
   struct Row {
     const char *asset, *words;
   };
   for (const Row& row :
-       {Row{"<mesh name=\"brick\" file=\"none.obj\"/>",
-            "m.xml:2: <mesh name=\"brick\"> file: found \"none.obj\", expected a file that exists"},
-        {"<mesh name=\"brick\" file=\"../../out.obj\"/>",
-         "a file below the folder of the main file"},
-        {"<mesh name=\"brick\" file=\"/etc/passwd\"/>", "a file below the folder of the main file"},
-        {"<mesh name=\"brick\" file=\".\"/>", "a file that exists"},
-        {"<mesh name=\"brick\"/>", "a mesh without points"},
-        {"<mesh name=\"brick\" vertex=\"0 0 0\"/>", "vertex: found"},
-        {"<mesh name=\"brick\" vertex=\"0 0 0 1 0 0 0 1 0 1 1 0\"/>", "found points in a plane"},
-        {"<mesh name=\"brick\" vertex=\"0 0 0 1 0 0 0 1 0 1 1 0 7\"/>", "found 13 numbers"},
-        {"<mesh name=\"brick\" vertex=\"0 0 0 1 0 0 0 1 0 0 0 1\" face=\"0 1 2 0 1 3 0 2 3 1 2 "
-         "4\"/>",
-         "found 4 in \"face\", expected a point, 0 to 3"},
-        {"<mesh name=\"brick\" file=\"brick.obj\" scale=\"0 1 1\"/>", "a mesh of 0 m^3"},
-        {"<mesh file=\"brick.obj\"/><mesh file=\"brick.obj\"/>", "a name that no other mesh has"},
-        {"", "mesh: found \"brick\", expected the name of a mesh"}}) {
-    WriteFileAtomically(top_ / "out.obj", AsObj(Box({1, 1, 1})));
-    Write("m.xml", model(row.asset, geom));
-    EXPECT_NE(refusal().find(row.words), std::string::npos) << row.asset << ": " << refusal();
+       {Row{"<mesh name='brick' file='none.obj'/>",
+            "main.xml:2: <mesh name='brick'> file: found 'none.obj', expected a file that exists"},
+        {"<mesh name='brick' file='../../out.obj'/>", "a file below the folder of the main file"},
+        {"<mesh name='brick' file='/etc/passwd'/>", "a file below the folder of the main file"},
+        {"<mesh name='brick' file='.'/>", "a file that exists"},
+        {"<mesh name='brick'/>", "a mesh without points"},
+        {"<mesh name='brick' vertex='0 0 0'/>", "vertex: found"},
+        {"<mesh name='brick' vertex='0 0 0 1 0 0 0 1 0 1 1 0'/>", "found points in a plane"},
+        {"<mesh name='brick' vertex='0 0 0 1 0 0 0 1 0 1 1 0 7'/>", "found 13 numbers"},
+        {"<mesh name='brick' vertex='0 0 0 1 0 0 0 1 0 0 0 1' face='0 1 2 0 1 3 0 2 3 1 2 4'/>",
+         "found 4 in 'face', expected a point, 0 to 3"},
+        {"<mesh name='brick' file='brick.obj' scale='0 1 1'/>", "a mesh of 0 m^3"},
+        {"<mesh file='brick.obj'/><mesh file='brick.obj'/>", "a name that no other mesh has"},
+        {"", "mesh: found 'brick', expected the name of a mesh"}}) {
+    Write("../out.obj", AsObj(Box({1, 1, 1})));
+    Write("main.xml", model(row.asset, geom));
+    ExpectMessage({row.words});
   }
   // eight corners, two points within and one on a face: their hull is the cuboid of 1 x 2 x 3
   const std::string cuboid =
-      "vertex=\"0 0 0 1 0 0 0 2 0 1 2 0 0.5 1 1 0 0 3 1 0 3 0.25 1.5 2 0 2 3 1 2 3 0.5 0 1.5\"";
+      "vertex='0 0 0 1 0 0 0 2 0 1 2 0 0.5 1 1 0 0 3 1 0 3 0.25 1.5 2 0 2 3 1 2 3 0.5 0 1.5'";
   Write("meshes/points.obj",
         "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 1 2 0\nv 0.5 1 1\nv 0 0 3\nv 1 0 3\nv 0 2 3\nv 1 2 3\n");
   for (const std::string& points :
-       {cuboid, cuboid + " inertia=\"convex\"", cuboid + " inertia=\"exact\"",
-        std::string("file=\"points.obj\"")}) {
-    Write("m.xml", model("<mesh name=\"brick\" scale=\"1 1 1\" " + points + "/>", geom));
-    const BodyDescription made = read().description.bodies.at(1);
-    EXPECT_LE((made.com - Vector3d(0.5, 1.0, 1.5)).norm(), 64 * kEps);
+       {cuboid, cuboid + " inertia='convex'", cuboid + " inertia='exact'",
+        std::string("file='points.obj'")}) {
+    Write("main.xml", model("<mesh name='brick' scale='1 1 1' " + points + "/>", geom));
+    const BodyDescription made = Read().description.bodies.at(1);
+    ExpectNear(made.com, {0.5, 1.0, 1.5}, 64 * kEps);
     const Vector3d wanted = Vector3d(13.0, 10.0, 5.0) / 4.0;  // m/12 (b^2 + c^2)
     EXPECT_LE((made.inertia.diagonal() - wanted).norm(), 64 * kEps * wanted.norm());
   }
   // without a type MuJoCo fits a sphere to the mesh
-  Write("m.xml", model("<mesh file=\"brick.obj\"/>", "<geom mesh=\"brick\"/>"));
-  EXPECT_NE(refusal().find("a shape is not fitted to it"), std::string::npos) << refusal();
+  Write("main.xml", model("<mesh file='brick.obj'/>", "<geom mesh='brick'/>"));
+  ExpectMessage({"a shape is not fitted to it"});
   TriangleMesh open = Box({0.5, 1.25, 2.0});
   open.triangles.pop_back();
   Write("meshes/brick.obj", AsObj(open));
-  Write("m.xml", model("<mesh file=\"brick.obj\"/>", geom));
-  ExpectNote(read(), "<mesh>", "not closed at 3 edges");
-  Write("m.xml", model("<mesh file=\"brick.obj\" inertia=\"exact\"/>", geom));
-  EXPECT_NE(refusal().find("a closed mesh: 3 edges"), std::string::npos) << refusal();
+  Write("main.xml", model("<mesh file='brick.obj'/>", geom));
+  ExpectNote(Read(), "<mesh>", "not closed at 3 edges");
+  Write("main.xml", model("<mesh file='brick.obj' inertia='exact'/>", geom));
+  ExpectMessage({"a closed mesh: 3 edges"});
 }
 
 TEST_F(MeshFiles, SdfLinksTakeTheMassOfTheirShapes) {
   const auto model = [](const std::string& inside, const std::string& link_pose = "") {
-    return "<sdf version=\"1.11\"><model name=\"m\"><frame name=\"end\"><pose>0 0 3 0 0 "
-           "1.5707963267948966</pose></frame><link name=\"arm\">" +
-           link_pose +
-           "<inertial "
-           "auto=\"true\"><density>1200</density>"
-           "</inertial>" +
-           inside +
-           "</link><joint name=\"pin\" type=\"revolute\"><parent>world</parent>"
-           "<child>arm</child><axis><xyz>0 1 0</xyz></axis></joint></model></sdf>";
+    return "<sdf version='1.11'><model name='m'><frame name='end'><pose>0 0 3 0 0 "
+           "1.5707963267948966</pose></frame><link name='arm'>" +
+           link_pose + "<inertial auto='true'><density>1200</density></inertial>" + inside +
+           "</link><joint name='pin' "
+           "type='revolute'><parent>world</parent><child>arm</child><axis><xyz>0 1 "
+           "0</xyz></axis></joint></model></sdf>";
   };
   const auto shape = [](const std::string& geometry, const std::string& more = "") {
-    return "<collision name=\"c" + std::to_string(more.size()) + "\">" + more + "<geometry>" +
+    return "<collision name='c" + std::to_string(more.size()) + "'>" + more + "<geometry>" +
            geometry + "</geometry></collision>";
   };
   // a beam of 1.92 kg and a bob of 5.02655 kg
-  const Imported pendulum = ImportText(
-      model(shape("<box><size>0.04 0.04 1.0</size></box>", "<pose>0 0 -0.5 0 0 0</pose>") +
-            shape("<sphere><radius>0.1</radius></sphere>", "<pose>0 0 -1 0 0 0</pose>")),
-      "m.sdf");
+  const Imported pendulum =
+      ImportOf(model(shape("<box><size>0.04 0.04 1.0</size></box>", "<pose>0 0 -0.5 0 0 0</pose>") +
+                     shape("<sphere><radius>0.1</radius></sphere>", "<pose>0 0 -1 0 0 0</pose>")));
   const BodyDescription& body = pendulum.description.bodies.at(1);
   EXPECT_NEAR(body.mass, 6.946548, 1e-6);
   EXPECT_NEAR(body.com.z(), -0.861802, 1e-6);
@@ -413,18 +377,17 @@ TEST_F(MeshFiles, SdfLinksTakeTheMassOfTheirShapes) {
   // shapes relative to other frames: (0.2, 0, 0) in "end" is (0, 0.2, 3) in the model
   const std::string turned = "<pose>0 0.2 1 1.5707963267948966 0 0</pose>";  // y, z: z, -y
   const BodyDescription placed =
-      ImportText(model(shape("<box><size>0.04 0.04 1.0</size></box>",
-                             "<pose relative_to=\"end\">0.2 0 0 0 0 0</pose>"),
-                       turned),
-                 "m.sdf")
+      ImportOf(model(shape("<box><size>0.04 0.04 1.0</size></box>",
+                           "<pose relative_to='end'>0.2 0 0 0 0 0</pose>"),
+                     turned))
           .description.bodies.at(1);
   EXPECT_LT((placed.com - Eigen::Vector3d(0.0, 2.0, 0.0)).norm(), 1e-14);
   EXPECT_NEAR(placed.inertia(1, 1), 1.92 * 2 * 0.04 * 0.04 / 12, 1e-15);  // along the link's y
   ExpectRefusal(model(shape("<sphere><radius>1</radius></sphere>",
-                            "<pose relative_to=\"ends\">0 0 0 0 0 0</pose>")),
-                {"the frame \"ends\", which is not there"});
+                            "<pose relative_to='ends'>0 0 0 0 0 0</pose>")),
+                {"the frame 'ends', which is not there"});
   const auto mass_of = [&](const std::string& inside) {
-    return ImportText(model(inside), "m.sdf").description.bodies.at(1).mass;
+    return ImportOf(model(inside)).description.bodies.at(1).mass;
   };
   EXPECT_NEAR(mass_of(shape("<cylinder><radius>0.1</radius><length>2</length></cylinder>")),
               1200 * pi * 0.02, 1e-12);
@@ -434,11 +397,11 @@ TEST_F(MeshFiles, SdfLinksTakeTheMassOfTheirShapes) {
   EXPECT_NEAR(mass_of(shape("<ellipsoid><radii>1 2 3</radii></ellipsoid>")), 1200 * 8 * pi, 1e-10);
   ExpectRefusal(model(""), {"<inertial>: found auto without a <collision>"});
   ExpectRefusal(model(shape("<plane/>")), {"a shape whose volume is not known"});
-  ExpectRefusal(model(shape("<sphere><radius>-1</radius></sphere>")), {"<radius>: found \"-1\""});
+  ExpectRefusal(model(shape("<sphere><radius>-1</radius></sphere>")), {"<radius>: found '-1'"});
   ExpectRefusal(model(shape("<mesh><uri>a.stl</uri></mesh>")), {"a text has no other files"});
   Write("brick.obj", AsObj(Box({0.5, 1.25, 2.0})));
   Write("m.sdf", model(shape("<mesh><uri>brick.obj</uri><scale>0.1 0.1 0.1</scale></mesh>")));
-  EXPECT_NEAR(ImportMechanism(top_ / "model/m.sdf").description.bodies.at(1).mass, 1.5, 1e-13);
+  EXPECT_NEAR(Read("m.sdf").description.bodies.at(1).mass, 1.5, 1e-13);
 }
 
 }  // namespace solids_test

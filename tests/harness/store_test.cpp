@@ -39,15 +39,6 @@ class StoreTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
-std::string ErrorOf(const std::filesystem::path& path) {
-  try {
-    ReadRecords(path);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 Record Sample() {
   Record record;
   record.Set("kind", std::string("timing"));
@@ -89,21 +80,6 @@ TEST(RecordJson, NonFiniteNumbersBecomeNull) {
   EXPECT_TRUE(std::isnan(back.Numbers("series.drift")[2]));
 }
 
-TEST(RecordJson, WhatIsNotAFlatObjectIsRefusedByName) {
-  const auto message = [](std::string_view line) -> std::string {
-    try {
-      FromJsonLine(line);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
-  EXPECT_TRUE(Contains(message("[1]"), "expected a JSON object, found an array"));
-  EXPECT_TRUE(Contains(message(R"({"a":{"b":1}})"), "key 'a'"));
-  EXPECT_TRUE(Contains(message(R"({"a":["x"]})"), "expected an array of numbers, found \"x\""));
-  EXPECT_TRUE(Contains(message(R"({"a":18446744073709551615})"), "below 2^63"));
-}
-
 TEST(RecordJson, CaseIdDependsOnValuesAndNotOnTheOrderOfKeys) {
   Record a;
   a.Set("mechanism", std::string("four-bar"));
@@ -116,14 +92,6 @@ TEST(RecordJson, CaseIdDependsOnValuesAndNotOnTheOrderOfKeys) {
   EXPECT_NE(CaseId(a), CaseId(b));
   // FNV-1a of "{}", so that identifiers stay the same from one version to the next.
   EXPECT_EQ(CaseId(Record{}), "08f44b07b5901a25");
-}
-
-TEST_F(StoreTest, ABadLineIsAnErrorWithFileLineAndText) {
-  const auto file = folder_ / "broken.jsonl";
-  WriteFileAtomically(file, "{\"kind\":\"timing\"}\n{\"a\":oops}\n");
-  EXPECT_TRUE(Contains(ErrorOf(file), "broken.jsonl:2:"));
-  EXPECT_TRUE(Contains(ErrorOf(file), "{\"a\":oops}"));
-  EXPECT_TRUE(Contains(ErrorOf(folder_ / "absent.jsonl"), "No such file"));
 }
 
 TEST_F(StoreTest, ATornLastLineIsSkippedWithAWarningAndRemovedBeforeTheNextAppend) {

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "harness/base/text.h"
+#include "harness/figures/figures.h"
 #include "harness/judge/judge.h"
 #include "tests/harness/cli_fixture.h"
+#include "tests/harness/records.h"
 #include "tests/harness/work_precision_records.h"
 
 namespace loopbench::harness {
@@ -125,22 +127,21 @@ TEST(WorkPrecision, FallsBackAndSaysSo) {
   std::vector<Record> records = Store({1e-3, 1e-6}, {1.0, 2.0});
   EXPECT_TRUE(MakeWorkPrecision(records, {}).remarks.empty());
   for (Record& record : records) {
-    record.Set("error_position_max", Value());
-    record.Set("closed_form_error_max", 0.5);
-    record.Set("drift_position_max", 0.25);
+    record = Changed(record, "error_position_max", Value(), "closed_form_error_max", 0.5,
+                     "drift_position_max", 0.25);
   }
   WorkPrecision work_precision = MakeWorkPrecision(records, {});
   EXPECT_EQ(work_precision.error, "closed_form_error_max");
   ASSERT_EQ(work_precision.remarks.size(), 1u);
-  EXPECT_NE(work_precision.remarks[0].find("no record has error_position_max"), std::string::npos);
+  ExpectWords(work_precision.remarks[0], {"no record has error_position_max"});
   for (Record& record : records) record.Set("closed_form_error_max", Value());
   std::erase_if(records, [](const Record& record) { return record.Text("kind") == "timing"; });
   work_precision = MakeWorkPrecision(records, {});
   EXPECT_EQ(work_precision.error, "drift_position_max");
   EXPECT_EQ(work_precision.cost, "rhs_equivalents");
   ASSERT_EQ(work_precision.remarks.size(), 2u);
-  EXPECT_NE(work_precision.remarks[0].find("no distance from the right motion"), std::string::npos);
-  EXPECT_NE(work_precision.remarks[1].find("no accuracy case was timed"), std::string::npos);
+  ExpectWords(work_precision.remarks[0], {"no distance from the right motion"});
+  ExpectWords(work_precision.remarks[1], {"no accuracy case was timed"});
 }
 
 /// The usual timings of an experiment are at one tolerance for all: of no accuracy case.
@@ -238,6 +239,172 @@ TEST_F(WorkPrecisionProgram, PrintsAndWritesWhatAccuracyCosts) {
   ExpectEnding(Call("work-precision out --error-levels nan"), 2, {"expected a number from 0"});
   ExpectEnding(Call("work-precision out --format csv --where 'rtol<1e-7'"), 0,
                {"problem,formulation"});
+}
+
+TEST(WorkPrecisionReport, SaysNoneReachedIt) {
+  const std::vector<Record> records = Store({1e-4, 1e-7}, {0.1, 0.3});
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
+  const std::string overview = ToText(OverviewTable(work_precision));
+  ExpectWords(overview, {"none", "0.3 (3.00)"});
+  ExpectWords(ToCsv(CheapestTable(work_precision)), {"none"});
+}
+
+TEST(WorkPrecisionReport, ListsFrontAndReasonsAndHidesOnlyTheBeaten) {
+  std::vector<Record> records = Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3});
+  records[4].Set("warnings", std::string("energy"));
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
+  const Table brief = WorkPrecisionTable(work_precision, {});
+  ASSERT_EQ(brief.rows.size(), 2u);
+  EXPECT_EQ(brief.rows[0].Text("front"), "*");
+  EXPECT_EQ(brief.rows[1].Text("reason"), "warnings: energy");
+  ExpectWords(ToText(brief), {"not shown: 1 dominated rows"});
+  EXPECT_EQ(WorkPrecisionTable(work_precision, {.compact = true, .all = true}).rows.size(), 3u);
+  const std::string csv =
+      ToCsv(WorkPrecisionTable(work_precision, {.compact = false, .all = true}));
+  ExpectWords(csv, {"problem,formulation,enforcement,coordinates,solver,integrator,rtol,error,"});
+  const std::string page = WorkPrecisionMarkdown(work_precision, {"command: x"});
+  ExpectWords(
+      page, {"cheapest method for an error", "equal in all compared rows", "energy", "command: x"});
+}
+
+std::string Statement(const std::vector<Record>& records) {
+  return Joined(FairnessStatement(MakeWorkPrecision(records, {})), "\n");
+}
+
+void ExpectNone(const std::string& text, std::initializer_list<std::string> words) {
+  for (const std::string& word : words) {
+    EXPECT_EQ(text.find(word), std::string::npos) << word << " in\n" << text;
+  }
+}
+
+TEST(Fairness, SaysWhatWasEqualAndWhatWasNot) {
+  std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
+  const std::string alike = Statement(records);
+  ExpectWords(
+      alike,
+      {"error: error_position_max", "cost: wall_s_median [s]", "integrator ode45", "machine m",
+       "threads 1", "simplifications none", "mechanism and start problem", "not recorded: compiler",
+       "formulation (odca 2, lagrange 1)", "tolerance (0.001 1, 0.0001 1, 1e-05 1)"});
+  ExpectNone(alike, {"warning", "not compared"});
+  for (const int i : {2, 3})
+    records[static_cast<std::size_t>(i)].Set("integrator", std::string("verner"));
+  records[4].Set("warnings", std::string("energy"));
+  const std::string mixed = Statement(records);
+  ExpectWords(mixed, {"integrator (ode45 1, verner 1)",
+                      "1 of 3 rows are not compared: warnings: energy 1"});
+}
+
+TEST(Fairness, TheLibrarysCodeIsNotEqualForAllFormulations) {
+  std::vector<Record> records = Store({1e-3, 1e-6, 1e-9}, {0.1, 0.2, 0.4});
+  ExpectWords(Statement(records), {"not equal: the library's code", "execution generated"});
+  for (Record& record : records) record.Set("execution", std::string("generated"));
+  ExpectNone(Statement(records), {"library's code"});
+}
+
+TEST(Fairness, WarnsOfTimesOfTwoMachinesAndOfANoisyOne) {
+  std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
+  records[1].Set("machine", std::string("another"));
+  records[3].Set("noise", std::string("A/A spread 9 %"));
+  ExpectWords(Statement(records),
+              {"machine (another 1, m 1)", "warning: the costs are times of more",
+               "warning: noisy machine in 1 of 2 timings"});
+  for (Record& record : records) record.Set("wall_s_median", Value());
+  ExpectNone(Statement(records), {"warning"});  // rhs_equivalents are no times
+}
+
+TEST(Fairness, SaysWhatReferencesAreCertifiedTo) {
+  std::vector<Record> records = Store({1e-3, 1e-13}, {0.1, 0.2});
+  records[0].Set("reference_error", 1e-11);
+  records[0].Set("reference_valid_until", 8.0);
+  records[2].Set("reference_error", 3e-12);
+  ExpectWords(Statement(records),
+              {"certified to 3.0e-12 to 1.0e-11 m", "1 row has no larger error than that",
+               "1 row goes beyond the validity limit of the reference"});
+}
+
+TEST(Fairness, CountsOfImplicitIntegratorsAreNotAllTheyDo) {
+  std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
+  for (Record& record : records) record.Set("wall_s_median", Value());
+  ExpectWords(Statement(records), {"cost: rhs_equivalents"});
+  ExpectNone(Statement(records), {"leaves out Jacobians"});
+  records[2].Set("newton_iterations", std::int64_t{40});
+  ExpectWords(Statement(records), {"leaves out Jacobians"});
+}
+
+/// Two problems differ in what each has alone in common.
+TEST(Fairness, WhatIsEqualInEachProblemIsEqual) {
+  std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
+  for (Record record : Store({1e-2, 1e-5}, {10.0, 20.0})) {
+    record.Set("mechanism", std::string("other"));
+    if (record.Find("problem_id") != nullptr) record.Set("problem_id", std::string("problem-2"));
+    records.push_back(record);
+  }
+  ExpectWords(Statement(records), {"mechanism and start (in each problem)"});
+}
+
+TEST(WorkPrecisionFigures, DrawTheFrontWarningsAndFailures) {
+  std::vector<Record> records = Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4});
+  records[2].Set("warnings", std::string("energy"));
+  records[4].Set("outcome", std::string("singular"));
+  records[5].Set("wall_s_median", Value());
+  records[4].Set("cpu_s", 0.05);
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
+  const Figure figure = WorkPrecisionFigure(work_precision, work_precision.problems.front());
+  std::size_t flagged = 0, crosses = 0;
+  for (const Curve& curve : figure.curves) {
+    flagged += curve.style.flagged ? curve.x.size() : 0;
+    crosses += curve.crosses.size();
+    for (const auto& cross : curve.crosses) EXPECT_EQ(cross.first, 0.05);
+  }
+  EXPECT_EQ(flagged, 1u);
+  EXPECT_EQ(crosses, 1u);
+  const Curve& stairs = figure.curves.back();
+  EXPECT_EQ(stairs.label, "Pareto front");
+  EXPECT_EQ(stairs.x, (std::vector<double>{0.1, 0.4, 0.4}));
+  EXPECT_EQ(stairs.y, (std::vector<double>{1e-3, 1e-3, 1e-7}));
+}
+
+TEST(WorkPrecisionFigures, TheLineOfTolerancesIsTheirMultipleByTheLink) {
+  const WorkPrecision work_precision =
+      MakeWorkPrecision(Store({1e-3, 1e-2, 1e-6}, {0.1, 0.2, 0.3}), {});
+  const Figure figure = ToleranceFigure(work_precision, work_precision.problems.front(), "ode45");
+  const Curve& line = figure.curves.back();
+  EXPECT_EQ(line.label, "error = tolerance x link");
+  ASSERT_EQ(line.x.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_DOUBLE_EQ(line.x[i], i == 0 ? 1e-5 : 1e-3);
+    EXPECT_DOUBLE_EQ(line.y[i], 2.0 * line.x[i]);  // links are 2 m long
+  }
+}
+
+TEST(WorkPrecisionFigures, MarksAreRunsAndDashesJoinWhatIsBestAtALevel) {
+  const WorkPrecision work_precision =
+      MakeWorkPrecision(Store({1e-3, 1e-2, 1e-6, 1e-7}, {0.1, 0.2, 0.3, 0.4}), {});
+  const Figure figure = WorkPrecisionFigure(work_precision, work_precision.problems.front());
+  std::size_t marks = 0;
+  for (const Curve& curve : figure.curves) {
+    EXPECT_NE(curve.points, curve.line) << "marks, or a line";
+    marks += curve.points ? curve.x.size() : 0;
+  }
+  EXPECT_EQ(marks, 4u);
+  EXPECT_LE(GnuplotScript(figure, FigureSize::kOneColumn).legend_rows, kLegendRows);
+}
+
+TEST(WorkPrecisionFigures, ErrorsOverTimeHaveTheTrustHorizon) {
+  std::vector<Record> records = Store({1e-3, 1e-6}, {0.1, 0.2});
+  EXPECT_EQ(WorkPrecisionFigures(MakeWorkPrecision(records, {})).size(), 2u)
+      << "no series, no third";
+  for (Record& record : records) {
+    if (record.Text("kind") != "accuracy") continue;
+    record = Changed(record, "series.error_t", std::vector<double>{0, 5, 10}, "series.error",
+                     std::vector<double>{0, 1e-9, 1e-6}, "reference_valid_until", 7.5);
+  }
+  const WorkPrecision work_precision = MakeWorkPrecision(records, {});
+  const Figure figure = ErrorOverTimeFigure(work_precision.problems.front(), "ode45");
+  ASSERT_EQ(figure.curves.size(), 2u) << "the finest tolerance, and the horizon";
+  EXPECT_EQ(figure.curves[1].label, "validity limit of the reference");
+  EXPECT_EQ(figure.curves[1].x, (std::vector<double>{7.5, 7.5}));
+  EXPECT_EQ(WorkPrecisionFigures(work_precision).size(), 3u);
 }
 
 }  // namespace work_precision_test

@@ -12,7 +12,6 @@
 
 #include "mechanism/description/library.h"
 #include "odca/odca.h"
-#include "tests/contract/extremes.h"
 #include "tests/contract/placed.h"
 #include "tests/contract/system_with.h"
 
@@ -93,11 +92,7 @@ struct Factored {
       : mechanism(description, Coordinates::kJoint),
         kinematics(mechanism),
         response(JointResponse<Planar>::Make(mechanism, kNoLimit)) {
-    VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
-    for (const TreeStep& step : mechanism.tree()) {
-      q[mechanism.joints()[step.joint].q_offset] = step.parent == kGround ? angle : -angle;
-    }
-    kinematics.UpdatePosition(q);
+    kinematics.UpdatePosition(testing::LadderAt(mechanism, angle));
     is_certain = response->Factor(kinematics);
   }
 
@@ -161,13 +156,9 @@ using Sparse = testing::SystemWith<lagrange::Lagrange, Planar, double>;
 
 /// A ladder of three windows with its cranks at `angle`, all speeds zero.
 Outcome Evaluate(Sparse& system, const Mechanism<Planar, double>& mechanism, double angle) {
-  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q()), udot;
-  for (const TreeStep& step : mechanism.tree()) {
-    const bool is_crank = step.parent == kGround;
-    q[mechanism.joints()[step.joint].q_offset] = is_crank ? angle : -angle;
-  }
   const VectorX<double> u = VectorX<double>::Zero(mechanism.num_u());
-  return system->Evaluate(0.0, q, u, udot);
+  VectorX<double> udot;
+  return system->Evaluate(0.0, testing::LadderAt(mechanism, angle), u, udot);
 }
 
 TEST(Lagrange, LeavesSuspiciousPositionsToTheDenseEquations) {

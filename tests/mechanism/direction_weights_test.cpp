@@ -13,6 +13,7 @@
 #include "mechanism/loops/scaled_loops.h"
 #include "mechanism/start/assembly.h"
 #include "tests/contract/comparison.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace direction_weights_test {
@@ -28,12 +29,9 @@ DirectionWeights<double> WeightsOf(MatrixX<double> X, std::span<const int> rows)
 
 /// The scaled geometric response of a row of windows, `distance` [rad] from all bars in line.
 MatrixX<double> ResponseOfLadder(int windows, double distance, std::vector<int>* rows) {
-  const MechanismDescription description = Ladder(windows, distance, 0.0);
-  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
-  Kinematics<Planar, double> kinematics(mechanism);
-  kinematics.UpdatePosition(Assemble<Planar>(description, mechanism).q);
-  *rows = mechanism.RowsOfConstraints();
-  const MatrixX<double> B = ScaleLoops(kinematics).B;
+  const testing::Assembled<> at(Ladder(windows, distance, 0.0));
+  *rows = at.mechanism.RowsOfConstraints();
+  const MatrixX<double> B = ScaleLoops(at.kinematics).B;
   return B * B.transpose();
 }
 

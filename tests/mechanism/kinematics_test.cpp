@@ -156,12 +156,11 @@ TEST(SpatialKinematicsTest, ExactDirectionsHaveTheirPartsAndRates) {
     const Compiled compiled = Compile(d, {.planar = false});
     const MechanismDescription& part = compiled.parts.front().description;
     for (const auto set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-      const Mechanism<Spatial, double> mechanism(part, set);
-      EXPECT_TRUE(mechanism.is_redundant());
-      const auto start = Assemble<Spatial>(part, mechanism);
-      VectorX<double> u = start.u;
+      const testing::Assembled<Spatial> at(part, set);
+      EXPECT_TRUE(at.mechanism.is_redundant());
+      VectorX<double> u = at.start.u;
       for (int i = 0; i < u.size(); ++i) u[i] += std::cos(2.3 * i);  // not admissible
-      ExpectDirections<Spatial>(mechanism, start.q, u);
+      ExpectDirections<Spatial>(at.mechanism, at.start.q, u);
     }
   }
 }

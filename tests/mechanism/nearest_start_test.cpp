@@ -9,25 +9,33 @@
 
 #include "mechanism/description/library.h"
 #include "mechanism/start/assembly.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace nearest_start_test {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
-using Joints = Mechanism<Planar, double>;
+using testing::Assembled;
+
+const Eigen::Vector3d kOrigin = Eigen::Vector3d::Zero(), kX = Eigen::Vector3d::UnitX();
+
+/// Bars of 1 kg with these moments of inertia, "bar1" first.
+MechanismDescription Bars(const std::string& name, const std::vector<double>& inertias) {
+  MechanismDescription d;
+  d.name = name;
+  for (const double inertia : inertias) {
+    d.bodies.push_back(Bar("bar" + std::to_string(d.bodies.size()), 1.0, 1.0, inertia));
+  }
+  return d;
+}
 
 /// A double rocker, pins 3.5 m apart, bars of 2, 1.5 and 1.5 m; `A` and `C` are guessed.
 MechanismDescription Rocker(double crank, double A, double C) {
-  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), x = Eigen::Vector3d::UnitX();
-  MechanismDescription d;
-  d.name = "rocker";
+  MechanismDescription d = Bars("rocker", {2.0, 1.5, 1.5});
   d.gravity = {0.0, -9.81, 0.0};
-  for (const double length : {2.0, 1.5, 1.5}) {
-    d.bodies.push_back(Bar("bar" + std::to_string(d.bodies.size()), 1.0, 1.0, length));
-  }
-  d.joints = {Revolute("O", 0, origin, 1, origin), Revolute("A", 1, 2.0 * x, 2, origin),
-              Revolute("C", 0, 3.5 * x, 3, origin), Revolute("B", 2, 1.5 * x, 3, 1.5 * x)};
+  d.joints = {Revolute("O", 0, kOrigin, 1, kOrigin), Revolute("A", 1, 2.0 * kX, 2, kOrigin),
+              Revolute("C", 0, 3.5 * kX, 3, kOrigin), Revolute("B", 2, 1.5 * kX, 3, 1.5 * kX)};
   d.initial.coordinates = {{0, {crank}}, {1, {A}}, {2, {C}}};
   d.initial.held = {0};
   return d;
@@ -53,23 +61,18 @@ std::vector<Eigen::Vector2d> RockerPositions(double crank) {
 /// A closed chain of five bars with two free motions. Its start is a stationary point of the
 /// squared distance from the guesses along both.
 TEST(NearestStart, IsStationaryAlongFreeMotions) {
-  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), x = Eigen::Vector3d::UnitX();
-  const double lengths[] = {1.0, 1.4, 0.8, 1.2};
-  MechanismDescription d;
-  d.name = "chain";
-  for (const double length : lengths) {
-    d.bodies.push_back(Bar("bar" + std::to_string(d.bodies.size()), 1.0, 1.0, length));
-  }
+  const std::vector<double> lengths = {1.0, 1.4, 0.8, 1.2};
+  MechanismDescription d = Bars("chain", lengths);
   for (int i = 0; i < 4; ++i) {
     d.joints.push_back(Revolute("J" + std::to_string(i), i,
-                                i == 0 ? origin : Eigen::Vector3d(lengths[i - 1] * x), i + 1,
-                                origin));
+                                i == 0 ? kOrigin : Eigen::Vector3d(lengths[i - 1] * kX), i + 1,
+                                kOrigin));
   }
-  d.joints.push_back(Revolute("end", 4, lengths[3] * x, 0, 1.5 * x));
+  d.joints.push_back(Revolute("end", 4, lengths[3] * kX, 0, 1.5 * kX));
   const Eigen::Vector4d guess(1.2, -0.5, -1.3, -0.2);  // missed by 0.1 to 0.3 rad
   for (int i = 0; i < 4; ++i) d.initial.coordinates.push_back({i, {guess[i]}});
-  const Joints mechanism(d, Coordinates::kJoint);
-  const Start<double> start = Assemble<Planar>(d, mechanism);
+  const Assembled<> at(d);
+  const Start<double>& start = at.start;
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
   // rows of the closure: derivatives of the end's place by each angle
   Eigen::Matrix<double, 2, 4> J = Eigen::Matrix<double, 2, 4>::Zero();
@@ -91,8 +94,9 @@ double ModuloTurn(double angle) { return std::remainder(angle, 2 * std::numbers:
 
 /// Angles A and C of a start of the rocker.
 template <class Space>
-Eigen::Vector2d AngleAC(const Mechanism<Space, double>& mechanism, const Start<double>& start) {
-  return {start.q[mechanism.joints()[1].q_offset], start.q[mechanism.joints()[2].q_offset]};
+Eigen::Vector2d AngleAC(const Assembled<Space>& at) {
+  return {at.start.q[at.mechanism.joints()[1].q_offset],
+          at.start.q[at.mechanism.joints()[2].q_offset]};
 }
 
 /// Of a guess from a position, angles modulo a turn.
@@ -115,11 +119,11 @@ void ExpectNearestPositions(int starts) {
     ++tried;
     MechanismDescription d = Rocker(crank, guess[0], guess[1]);
     if (Space::kRot == 3) d.space = SpaceKind::kSpatial;
-    const Mechanism<Space, double> mechanism(d, Coordinates::kJoint);
-    const Start<double> start = Assemble<Space>(d, mechanism);
+    const Assembled<Space> at(d);
+    const Start<double>& start = at.start;
     ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
     EXPECT_EQ(start.q[0], crank);
-    const Eigen::Vector2d found = AngleAC(mechanism, start);
+    const Eigen::Vector2d found = AngleAC(at);
     EXPECT_LE((found - guess).cwiseAbs().maxCoeff(), std::numbers::pi * (1 + 4 * kEps))
         << "wound: from " << guess.transpose() << " to " << found.transpose();
     const double nearest = std::min(Away(guess, positions[0]), Away(guess, positions[1]));
@@ -145,11 +149,11 @@ TEST(NearestStartTest, SpatialStartsAreTheNearestToTheirGuesses) {
 /// A spring counts turns: its energy is that of the angle next to the guess.
 TEST(NearestStartTest, AnglesStayWithinHalfATurnOfTheirGuesses) {
   const MechanismDescription d = Rocker(0.0922819241303573, 0.37415581619492866, 3.019000253116773);
-  const Joints mechanism(d, Coordinates::kJoint);
-  const Start<double> start = Assemble(d, mechanism);
+  const Assembled<> at(d);
+  const Start<double>& start = at.start;
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
   // circles about the crank's end and the pin: 0.825734, 1.980432, or -1.253442, 4.059608, farther
-  EXPECT_LE((AngleAC(mechanism, start) - Eigen::Vector2d(0.825734, 1.980432)).norm(), 1e-6);
+  EXPECT_LE((AngleAC(at) - Eigen::Vector2d(0.825734, 1.980432)).norm(), 1e-6);
   const std::vector<MissedGuess> missed = FindMissedGuesses(d, start.q);
   ASSERT_EQ(missed.size(), 1u);
   EXPECT_EQ(missed[0].joint, 2);
@@ -161,11 +165,11 @@ TEST(NearestStartTest, AnglesStayWithinHalfATurnOfTheirGuesses) {
 TEST(NearestStartTest, AGuessOnTheJointThatClosesTheLoopIsUsed) {
   MechanismDescription d = Rocker(0.3, -1.6, 3.8);
   d.initial.coordinates.push_back({3, {5.1}});
-  const Joints mechanism(d, Coordinates::kJoint);
-  ASSERT_EQ(mechanism.constraints(), std::vector<int>{3});
-  const Start<double> start = Assemble(d, mechanism);
+  const Assembled<> at(d);
+  const Start<double>& start = at.start;
+  ASSERT_EQ(at.mechanism.constraints(), std::vector<int>{3});
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
-  EXPECT_LE((AngleAC(mechanism, start) - Eigen::Vector2d(-1.626127, 3.755653)).norm(), 1e-6);
+  EXPECT_LE((AngleAC(at) - Eigen::Vector2d(-1.626127, 3.755653)).norm(), 1e-6);
   EXPECT_TRUE(FindMissedGuesses(d, start.q).empty());
 }
 
@@ -179,10 +183,10 @@ TEST(NearestStartTest, AGuessOnTheJointThatClosesTheLoopDecides) {
         d.joints[3].cut = true;
         const double angle = right[1] - right[0] - crank + 2 * std::numbers::pi * turns;
         d.initial.coordinates.push_back({3, {angle + 0.1}});
-        const Joints mechanism(d, Coordinates::kJoint);
-        const Start<double> start = Assemble(d, mechanism);
+        const Assembled<> at(d);
+        const Start<double>& start = at.start;
         ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
-        EXPECT_LE(Away(AngleAC(mechanism, start), right), 64 * kEps) << crank << ' ' << turns;
+        EXPECT_LE(Away(AngleAC(at), right), 64 * kEps) << crank << ' ' << turns;
         EXPECT_TRUE(FindMissedGuesses(d, start.q).empty());
       }
     }
@@ -191,24 +195,23 @@ TEST(NearestStartTest, AGuessOnTheJointThatClosesTheLoopDecides) {
 
 /// A crank of 1 m, a rod of 2 m and a slider along x, which is at cos phi +- sqrt(4 - sin^2 phi).
 TEST(NearestStartTest, LengthsCountInLengthsOfTheMechanism) {
-  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), x = Eigen::Vector3d::UnitX();
   MechanismDescription d;
   d.name = "slider-crank";
   for (const double length : {1.0, 2.0, 0.2}) {
     d.bodies.push_back(Bar("bar" + std::to_string(d.bodies.size()), length, 1.0, 1.0));
   }
-  d.joints = {Revolute("O", 0, origin, 1, origin), Revolute("A", 1, x, 2, origin),
-              Revolute("S", 0, origin, 3, origin), Revolute("B", 2, 2.0 * x, 3, origin)};
+  d.joints = {Revolute("O", 0, kOrigin, 1, kOrigin), Revolute("A", 1, kX, 2, kOrigin),
+              Revolute("S", 0, kOrigin, 3, kOrigin), Revolute("B", 2, 2.0 * kX, 3, kOrigin)};
   d.joints[2].type = JointType::kPrismatic;
   d.initial.held = {0};
   const double cosine = std::cos(0.5), root = std::sqrt(4.0 - std::pow(std::sin(0.5), 2));
   for (const double guess : {-1.5, 0.5, 2.5}) {
     d.initial.coordinates = {{0, {0.5}}, {2, {guess}}};
-    const Joints mechanism(d, Coordinates::kJoint);
-    const Start<double> start = Assemble(d, mechanism);
+    const Assembled<> at(d);
+    const Start<double>& start = at.start;
     ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
     const double expected = guess < 2.0 ? cosine - root : cosine + root;
-    EXPECT_NEAR(start.q[mechanism.joints()[2].q_offset], expected, 64 * kEps) << guess;
+    EXPECT_NEAR(start.q[at.mechanism.joints()[2].q_offset], expected, 64 * kEps) << guess;
     EXPECT_EQ(FindMissedGuesses(d, start.q).size(), guess == 0.5 ? 1u : 0u) << guess;
   }
 }
@@ -216,25 +219,24 @@ TEST(NearestStartTest, LengthsCountInLengthsOfTheMechanism) {
 /// A pin in a slot at y = 1.2 sin 0.5 - sin 0.7, held at its angle and shift: they decide both
 /// bars.
 TEST(NearestStartTest, AHeldCutJointMayHaveSeveralCoordinates) {
-  const Eigen::Vector3d origin = Eigen::Vector3d::Zero(), x = Eigen::Vector3d::UnitX();
   const double height = 1.2 * std::sin(0.5) - std::sin(0.7);
   MechanismDescription d;
   d.name = "slot";
   for (const double length : {1.2, 1.0}) {
     d.bodies.push_back(Bar("bar" + std::to_string(d.bodies.size()), length, 1.0, 1.0));
   }
-  d.joints = {Revolute("O", 0, origin, 1, origin), Revolute("A", 1, 1.2 * x, 2, origin),
-              Revolute("S", 0, height * Eigen::Vector3d::UnitY(), 2, x)};
+  d.joints = {Revolute("O", 0, kOrigin, 1, kOrigin), Revolute("A", 1, 1.2 * kX, 2, kOrigin),
+              Revolute("S", 0, height * Eigen::Vector3d::UnitY(), 2, kX)};
   d.joints[2].type = JointType::kPinInSlot;
   d.joints[2].cut = true;
   d.initial.coordinates = {{2, {-0.7, 1.2 * std::cos(0.5) + std::cos(0.7)}}};
   d.initial.held = {2};
-  const Joints mechanism(d, Coordinates::kJoint);
-  ASSERT_EQ(mechanism.constraints(), std::vector<int>{2});
-  const Start<double> start = Assemble(d, mechanism);
+  const Assembled<> at(d);
+  const Start<double>& start = at.start;
+  ASSERT_EQ(at.mechanism.constraints(), std::vector<int>{2});
   ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
-  EXPECT_NEAR(start.q[mechanism.joints()[0].q_offset], 0.5, 64 * kEps);
-  EXPECT_NEAR(start.q[mechanism.joints()[1].q_offset], -1.2, 64 * kEps);
+  EXPECT_NEAR(start.q[at.mechanism.joints()[0].q_offset], 0.5, 64 * kEps);
+  EXPECT_NEAR(start.q[at.mechanism.joints()[1].q_offset], -1.2, 64 * kEps);
 }
 
 constexpr double kLeft[] = {0.026098795180722844, 0.4001497880670621};
@@ -291,11 +293,11 @@ TEST(NearestStartTest, TwoGuessesDecideTheBranchOfALeg) {
         ++reached;
         const MechanismDescription d =
             Leg(crank, {{3, {Q1 + 0.1 * random()}}, {4, {Q2 + 0.1 * random()}}});
-        const Joints mechanism(d, Coordinates::kJoint);
-        const Start<double> start = Assemble(d, mechanism);
+        const Assembled<> at(d);
+        const Start<double>& start = at.start;
         ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
         const auto angle = [&](int joint) {
-          return ModuloTurn(start.q[mechanism.joints()[joint].q_offset]);
+          return ModuloTurn(start.q[at.mechanism.joints()[joint].q_offset]);
         };
         EXPECT_LE(std::abs(ModuloTurn(angle(3) - Q1)), 1e-12) << crank;
         EXPECT_LE(std::abs(ModuloTurn(angle(4) - Q2)), 1e-12) << crank;
@@ -310,7 +312,7 @@ TEST(NearestStartTest, TwoGuessesDecideTheBranchOfALeg) {
 TEST(NearestStartTest, HeldValuesAreExact) {
   for (const double crank : {0.0, 1e-9, 0.7}) {
     const MechanismDescription d = Leg(crank, {});
-    const Start<double> start = Assemble(d, Joints(d, Coordinates::kJoint));
+    const Start<double> start = Assembled<>(d).start;
     ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
     EXPECT_EQ(start.q[0], crank);
   }

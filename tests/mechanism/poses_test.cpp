@@ -10,6 +10,7 @@
 
 #include "mechanism/description/library.h"
 #include "mechanism/model/kinematics.h"
+#include "tests/mechanism/shipped.h"
 
 namespace loopbench {
 namespace poses_test {
@@ -33,19 +34,11 @@ PoseTarget TipAt(double x, double y, bool fixed) {
   return {.body = 2, .point = 1.5 * Vector3d::UnitX(), .at = Vector3d(x, y, 0.0), .fixed = fixed};
 }
 
-double ValueOf(const MechanismDescription& d, int joint) {
-  for (const JointValues& values : d.initial.coordinates) {
-    if (values.joint == joint) return values.values[0];
-  }
-  ADD_FAILURE() << "no value of joint " << joint;
-  return 0.0;
-}
-
 /// Start after the targets are resolved; null if they cannot be met.
 template <class Space>
 Start<double> StartOf(MechanismDescription* d) {
   EXPECT_EQ(ResolvePoses(d), "");
-  return Assemble<Space>(*d, Mechanism<Space, double>(*d, Coordinates::kJoint));
+  return testing::Assembled<Space>(*d).start;
 }
 
 TEST(Poses, AFixedPointIsMetWithTheElbowNearestToTheGuess) {
@@ -62,7 +55,7 @@ TEST(Poses, AFixedPointIsMetWithTheElbowNearestToTheGuess) {
     // closed to 16 eps of an extent of 5 lengths; the elbow turns 0.7 rad per length
     EXPECT_NEAR(start.q[0], shoulder, 256 * kEps);
     EXPECT_NEAR(start.q[1], elbow, 256 * kEps);
-    EXPECT_EQ(ValueOf(d, 0), start.q[0]);
+    EXPECT_EQ(d.initial.GuessOf(0, 0), start.q[0]);
     EXPECT_TRUE(FindMissedPoses(d, start.q).empty());
   }
 }
@@ -142,15 +135,13 @@ TEST(Poses, OfALoopAreClosedPositions) {
     MechanismDescription one = d;
     const Vector3d tip(3.5 + 1.5 * std::cos(angle), 1.5 * std::sin(angle), 0.0);
     one.initial.poses = {{.body = 3, .point = 1.5 * Vector3d::UnitX(), .at = tip}};
-    const Start<double> start = StartOf<Planar>(&one);
-    ASSERT_EQ(start.outcome, Outcome::kFinished) << start.message;
-    const Mechanism<Planar, double> mechanism(one, Coordinates::kJoint);
-    Kinematics<Planar, double> kinematics(mechanism);
-    kinematics.UpdatePosition(start.q);
+    EXPECT_EQ(ResolvePoses(&one), "");
+    const testing::Assembled<> at(one);
+    ASSERT_EQ(at.start.outcome, Outcome::kFinished) << at.start.message;
     // met: the last of some quadratic steps
-    EXPECT_NEAR(std::remainder(kinematics.poses()[3].angle - angle, 2 * std::numbers::pi), 0.0,
+    EXPECT_NEAR(std::remainder(at.kinematics.poses()[3].angle - angle, 2 * std::numbers::pi), 0.0,
                 1e-8);
-    EXPECT_LE(start.position_residual, 64 * kEps);
+    EXPECT_LE(at.start.position_residual, 64 * kEps);
   }
 }
 

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "mechanism/description/library.h"
-#include "mechanism/simplify/freedom.h"
 #include "mechanism/simplify/model.h"
 #include "mechanism/simplify/restart.h"
 #include "tests/contract/generators.h"

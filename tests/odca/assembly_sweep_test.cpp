@@ -97,13 +97,11 @@ TEST(AssemblySweep, RefusesABodyThatIsHeldTwice) {
 TEST(AssemblySweep, IsNotTriedInRunsThatStartWhereItIsRefused) {
   for (const double angle : {1e-6, 1.1}) {
     const bool usable = angle > 1.0;
-    const Model mechanism(Grid(2, 2, angle, 0.5), Coordinates::kJoint);
+    const MechanismDescription grid = Grid(2, 2, angle, 0.5);
+    const Model mechanism(grid, Coordinates::kJoint);
     const auto sweep = Make(mechanism);
     ASSERT_NE(sweep, nullptr);
-    Numbers q = Numbers::Zero(mechanism.num_q()), qdot = q, udot = q;
-    for (const JointValues& start : Grid(2, 2, angle, 0.5).initial.coordinates) {
-      q[mechanism.joints()[start.joint].q_offset] = start.values[0];
-    }
+    Numbers q = testing::DescribedCoordinates(grid, mechanism), qdot = q, udot = q;
     const Numbers still = Numbers::Zero(q.size());
     Kinematics<Planar, double> kinematics(mechanism);
     kinematics.UpdatePosition(q);
@@ -163,8 +161,8 @@ TEST(AssemblySweep, ServesRunsWhoseWorkIsCounted) {
   EXPECT_GT(served, 30) << "but where bodies are held more than once";
 }
 
-/// Evaluates and projects with small pieces and 1, 2, 3 and 8 threads, and with one piece: the same
-/// bits, the same rejections. Evaluations allocate nothing. Returns true if none was rejected.
+/// The same bits with small pieces and 1, 2, 3 and 8 threads, and with one piece. Returns true if
+/// everything was accepted.
 bool ExpectTheSameBits(const Model& mechanism, long piece, const Numbers& q, const Numbers& u) {
   const auto found = [&](long enough, int threads) {
     PlanOptions options = PlanOptionsOf(SolverKind::kRankRevealing);
@@ -174,22 +172,7 @@ bool ExpectTheSameBits(const Model& mechanism, long piece, const Numbers& q, con
     EXPECT_EQ(pieces > 4, enough == piece) << pieces;
     const auto sweep = MakeAssemblySweep(mechanism, plan, threads);
     EXPECT_EQ(sweep->threads(), std::clamp(threads, 1, std::max(1, pieces - 1)));
-    Kinematics<Planar, double> kinematics(mechanism);
-    std::vector<Numbers> all;
-    Numbers accepted = Numbers::Zero(3), qdot = Numbers::Zero(u.size()), udot = qdot;
-    for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
-      double& each = accepted[speeds == SpeedsUsed::kGiven ? 0 : 1];
-      const long before = testing::CountAllocations();
-      for (int round = 0; round < 3; ++round) {
-        each = sweep->Evaluate(speeds, &kinematics, In(q), In(u), In(qdot), In(udot));
-      }
-      EXPECT_EQ(testing::CountAllocations(), before);
-      all.insert(all.end(), {qdot, udot});
-    }
-    Numbers moved = q, changed = u;
-    accepted[2] = sweep->Project(In(moved), In(changed), 1e-12).has_value();
-    all.insert(all.end(), {moved, changed, accepted});
-    return all;
+    return AllOf(*sweep, mechanism, q, u);
   };
   const auto alone = found(piece, 1);
   EXPECT_TRUE(found(1L << 40, 1) == alone) << mechanism.name();

@@ -1,10 +1,9 @@
 // Mechanisms of extreme structure: the accelerations satisfy every joint and every body's equation
 // of motion, and cost what the plan promises.
-#include "tests/contract/extremes.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <limits>
 
 #include "mechanism/description/library.h"

@@ -60,7 +60,7 @@ TEST(PaperTest, TwoHandleKernelsAreThePrintedFormulas) {
       ASSERT_GT(link.mobility, 0.0) << "not pinned by a joint of the tree";
       const double angle = scene.kinematics().poses()[at.body].angle + links.axes[k];
       const double speed = scene.kinematics().motions()[at.body].angular[0];
-      const auto leaf = pins::Leaf<Sought::kAccelerations>(link, pins::Turn(link, angle), speed);
+      const auto leaf = pins::Leaf<Unknowns::kAccelerations>(link, pins::Turn(link, angle), speed);
       const int after = k + 1 < n ? links.path[k + 1].before : at.ground;
       const TwoHandles body = scene.Body(at.body, at.before, after);
       tally.Hold("leaf", Difference(leaf, body), kMargin * kEps);
@@ -151,7 +151,7 @@ arms::Free<double> FreeOf(const Scene<Spatial>& scene, const ArmPlace& at, doubl
   const auto& side = joint.from == at.body ? joint.X_PF : joint.X_QM;
   const Rotation<Spatial, double> R = scene.kinematics().poses()[at.body].R * side.R;
   arms::Free<double> free;
-  arms::FreeMotion<Sought::kAccelerations>(
+  arms::FreeMotion<Unknowns::kAccelerations>(
       at.constants.link.shape, R.transpose() * scene.kinematics().motions()[at.body].angular, speed,
       free);
   return free;
@@ -186,8 +186,8 @@ void HoldArm(const Scene<Spatial>& scene, const arms::Arm& arm, int n, Tally& ta
     const arms::Free<double> alone = FreeOf(scene, at, 0.0);
     arms::Piece<double> leaf;
     leaf.response = link.response;
-    std::ranges::copy(alone.zeta13, leaf.zeta13);
-    std::ranges::copy(alone.zeta23, leaf.zeta23);
+    std::copy_n(alone.zeta13, arms::kRows, leaf.zeta13);
+    std::copy_n(alone.zeta23, arms::kRows, leaf.zeta23);
     const TwoHandles body = scene.Body(at.body, at.joint, at.after);
     // axes of joint sides are products of up to n rotations
     tally.Hold("leaf", Difference(leaf, body, at.on_1, at.on_2, gravity), kMargin * n * kEps);

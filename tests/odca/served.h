@@ -28,14 +28,25 @@ inline JointDescription Pin(Random& random, int from, int to) {
   return pin;
 }
 
+/// Bodies, drawn in order, in any order of numbers.
+inline std::vector<int> BodiesInAnyOrder(Builder& b, int n) {
+  std::vector<int> row;
+  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
+  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  return row;
+}
+
+inline void NameJoints(MechanismDescription& description) {
+  int number = 0;
+  for (JointDescription& joint : description.joints) joint.name = "j" + std::to_string(number++);
+}
+
 /// Bodies in a row, in any order of numbers, some of them pinned to Ground, no two neighbours, so
 /// that they can move; where that closes a loop the joint before such a body is cut, or the pin of
 /// the last one. Half of them may be a path of its own.
 inline MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves = false) {
   Builder b("path", SpaceKind::kPlanar, seed);
-  std::vector<int> row;
-  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
-  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  std::vector<int> row = BodiesInAnyOrder(b, n);
   const double share = b.random.Uniform(0.0, 1.0);
   bool pinned_before = false, neighbour = false;
   auto& joints = b.description.joints;
@@ -56,7 +67,7 @@ inline MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves
     pinned_before = pinned_before || pinned;
     neighbour = pinned;
   }
-  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "j" + std::to_string(j);
+  NameJoints(b.description);
   return b.description;
 }
 
@@ -64,9 +75,7 @@ inline MechanismDescription RandomPath(int n, std::uint64_t seed, bool in_halves
 /// cut pins close loops. Forces are of all kinds.
 inline MechanismDescription RandomBranches(int n, std::uint64_t seed, int forces = 0) {
   Builder b("branches", SpaceKind::kPlanar, seed);
-  std::vector<int> row;
-  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
-  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  std::vector<int> row = BodiesInAnyOrder(b, n);
   auto& joints = b.description.joints;
   for (int k = 0; k < n; ++k) {
     const bool on_ground = k == 0 || b.random.Chance(0.15);
@@ -82,7 +91,7 @@ inline MechanismDescription RandomBranches(int n, std::uint64_t seed, int forces
     joints.back().cut = true;
   }
   b.AddForces(forces);
-  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "j" + std::to_string(j);
+  NameJoints(b.description);
   return b.description;
 }
 
@@ -90,9 +99,7 @@ inline MechanismDescription RandomBranches(int n, std::uint64_t seed, int forces
 /// closed on Ground by one more joint, of which one is cut, with this kind.
 inline void AddPath(Builder& b, int n, bool closed, JointType cut_kind) {
   auto& joints = b.description.joints;
-  std::vector<int> row;
-  for (int k = 0; k < n; ++k) row.push_back(b.AddBody(1.0));
-  for (int k = n - 1; k > 0; --k) std::swap(row[k], row[b.random.Below(k + 1)]);
+  std::vector<int> row = BodiesInAnyOrder(b, n);
   row.push_back(kGround);
   const int cut = closed ? b.random.Below(n + 1) : -1;
   for (int k = 0; k < n + (closed ? 1 : 0); ++k) {

@@ -4,13 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <limits>
 #include <span>
 
 #include "odca/odca.h"
-#include "tests/contract/generators.h"
+#include "tests/contract/allocations.h"
+#include "tests/contract/builder.h"
 #include "tests/contract/system_with.h"
 
 namespace loopbench::odca {
@@ -114,29 +114,48 @@ std::pair<Numbers, Numbers> StateNear(const MechanismDescription& description,
                                       const Mechanism<Space, double>& mechanism, double size,
                                       testing::Random& random) {
   Numbers q = RandomNumbers(random, mechanism.num_q(), size);
-  for (const JointValues& start : description.initial.coordinates) {
-    q[mechanism.joints()[start.joint].q_offset] += start.values[0];
-  }
+  q += testing::DescribedCoordinates(description, mechanism);
   return {q, RandomNumbers(random, mechanism.num_u(), 1.0)};
 }
 
-/// Evaluates and projects with 1, 2, 3 and 7 threads: the same bits. `make` takes threads and makes
-/// a sweep of four groups.
-void ExpectTheSameBits(const auto& make, SpeedsUsed speeds, const Numbers& q, const Numbers& u,
-                       bool evaluates) {
-  const auto rates = [&](int threads) {
+/// All that a sweep finds: rates by given and by completed speeds, positions and speeds of a
+/// projection, and at last whether it accepted each. Nothing allocates.
+template <class Space>
+std::vector<Numbers> AllOf(ShortCut<Space>& sweep, const Mechanism<Space, double>& mechanism,
+                           const Numbers& q, const Numbers& u) {
+  Kinematics<Space, double> kinematics(mechanism);
+  std::vector<Numbers> all;
+  Numbers accepted = Numbers::Zero(3), moved = q, changed = u;
+  for (const SpeedsUsed speeds : {SpeedsUsed::kGiven, SpeedsUsed::kCompleted}) {
+    Numbers qdot = Numbers::Zero(u.size()), udot = qdot;
+    double& each = accepted[speeds == SpeedsUsed::kGiven ? 0 : 1];
+    const long before = testing::CountAllocations();
+    for (int round = 0; round < 3; ++round) {
+      each = sweep.Evaluate(speeds, &kinematics, In(q), In(u), In(qdot), In(udot));
+    }
+    EXPECT_EQ(testing::CountAllocations(), before);
+    EXPECT_EQ(udot.isZero(0.0), each == 0.0);
+    all.insert(all.end(), {qdot, udot});
+  }
+  const long before = testing::CountAllocations();
+  accepted[2] = sweep.Project(In(moved), In(changed), 1e-12).has_value();
+  EXPECT_EQ(testing::CountAllocations(), before);
+  all.insert(all.end(), {moved, changed, accepted});
+  return all;
+}
+
+/// The same bits with 1, 2, 3 and 7 threads. `make` takes threads and makes a sweep of four groups.
+template <class Space>
+void ExpectTheSameBits(const auto& make, const Mechanism<Space, double>& mechanism,
+                       const Numbers& q, const Numbers& u, bool accepted) {
+  const auto found = [&](int threads) {
     const auto sweep = make(threads);
     EXPECT_EQ(sweep->threads(), std::min(threads, 4)) << "no more than groups";
-    Numbers qdot = Numbers::Zero(u.size()), udot = qdot, moved = q, changed = u;
-    for (int round = 0; round < 3; ++round) {
-      EXPECT_EQ(sweep->Evaluate(speeds, nullptr, In(q), In(u), In(qdot), In(udot)), evaluates);
-    }
-    EXPECT_EQ(sweep->Project(In(moved), In(changed), 1e-12).has_value(), evaluates);
-    return std::array{qdot, udot, moved, changed};
+    return AllOf(*sweep, mechanism, q, u);
   };
-  const auto alone = rates(1);
-  EXPECT_EQ(alone[1].isZero(0.0), !evaluates);
-  for (const int threads : {2, 3, 7}) EXPECT_TRUE(rates(threads) == alone) << threads;
+  const auto alone = found(1);
+  EXPECT_EQ(alone.back(), Numbers::Constant(3, accepted));
+  for (const int threads : {2, 3, 7}) EXPECT_TRUE(found(threads) == alone) << threads;
 }
 
 /// A number that counts its products.

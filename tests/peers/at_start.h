@@ -9,7 +9,7 @@
 #include "harness/config/formulations.h"
 #include "mechanism/loops/tree_dynamics.h"
 #include "mechanism/start/assembly.h"
-#include "tests/peers/sensitivity.h"
+#include "tests/peers/shared.h"
 
 namespace loopbench::harness::peers_test {
 

@@ -9,12 +9,11 @@
 #include <filesystem>
 
 #include "harness/base/text.h"
-#include "harness/exchange/export_mechanism.h"
 #include "harness/exchange/export_names.h"
+#include "harness/exchange/model.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
 #include "tests/peers/expressible.h"
-#include "tests/peers/hostile_names.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
@@ -197,15 +196,9 @@ TEST(ExportedMjcf, IsLoadedAsDeepAsItIsWritten) {
 }
 
 TEST(ExportedMjcf, HasNamesThatAreOnlyNames) {
-  MechanismDescription mechanism = Ladder(2, 1.0, 0.5);
-  const std::vector<std::string> names = peers_test::HostileNames();
-  ASSERT_GE(names.size(), mechanism.bodies.size());
-  mechanism.name = "--><mujoco/>]]>\n<!-- \?\?/";
-  for (std::size_t i = 1; i < mechanism.bodies.size(); ++i) {
-    mechanism.bodies[i].name = names[i - 1];
-    mechanism.bodies[i].points[names[i]] = {0.25, 0.0, 0.0};
-  }
-  for (std::size_t i = 0; i < mechanism.joints.size(); ++i) mechanism.joints[i].name = names[i];
+  std::vector<std::string> names;
+  const MechanismDescription mechanism =
+      peers_test::HostileLadder("--><mujoco/>]]>\n<!-- \?\?/", &names);
   const exchange::ExportedFile file = exchange::Export(mechanism, kMjcf);
   Loaded loaded(Write("hostile", file.text));
   EXPECT_EQ(static_cast<std::size_t>(loaded.model().nbody), mechanism.bodies.size());

@@ -11,12 +11,10 @@
 
 #include "harness/base/json_document.h"
 #include "harness/base/text.h"
-#include "harness/exchange/export_mechanism.h"
+#include "harness/exchange/model.h"
 #include "mechanism/description/library.h"
 #include "tests/peers/at_start.h"
 #include "tests/peers/expressible.h"
-#include "tests/peers/gripper.h"
-#include "tests/peers/hostile_names.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
@@ -218,7 +216,7 @@ TEST(ExportedSimbody, OfJointsOfEveryKindHasTheOraclesAccelerations) {
   std::map<std::string, std::string> texts;
   for (const auto& [name, one] : drawn) {
     try {
-      texts[name] = exchange::WriteSimbodyProgram(one.model).program;
+      texts[name] = exchange::WriteSimbodyProgram(one.model).text;
     } catch (const Unsupported& missing) {
       EXPECT_NE(std::string(missing.what()).find("helical"), std::string::npos) << missing.what();
     }
@@ -242,15 +240,9 @@ TEST(ExportedSimbody, OfJointsOfEveryKindHasTheOraclesAccelerations) {
 }
 
 TEST(ExportedSimbody, HasNamesThatAreOnlyNames) {
-  MechanismDescription mechanism = Ladder(2, 1.0, 0.5);
-  const std::vector<std::string> names = peers_test::HostileNames();
-  ASSERT_GE(names.size(), mechanism.bodies.size());
-  mechanism.name = "-->\n*/ \?\?/\n#error harmed \\";
-  for (std::size_t i = 1; i < mechanism.bodies.size(); ++i) {
-    mechanism.bodies[i].name = names[i - 1];
-    mechanism.bodies[i].points[names[i]] = {0.25, 0.0, 0.0};
-  }
-  for (std::size_t i = 0; i < mechanism.joints.size(); ++i) mechanism.joints[i].name = names[i];
+  std::vector<std::string> names;
+  const MechanismDescription mechanism =
+      peers_test::HostileLadder("-->\n*/ \?\?/\n#error harmed \\", &names);
   const fs::path folder = Folder("hostile");
   WriteFileAtomically(folder / "named.cpp", exchange::Export(mechanism, kSimbody).text);
   ASSERT_EQ(CompileProgram(folder / "named.cpp", folder / "named"), "");

@@ -5,8 +5,7 @@
 
 #include "mechanism/start/assembly.h"
 #include "tests/peers/expressible.h"
-#include "tests/peers/gripper.h"
-#include "tests/peers/registered.h"
+#include "tests/peers/shared.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::testing {
@@ -92,19 +91,7 @@ double EndError(const harness::MechanismFile& file, double tolerance, double hor
   const harness::Record theirs = RunFile(file, kMujoco, tolerance, horizon);
   const harness::Record ours = RunFile(file, kOdca, 1e-10, horizon);
   EXPECT_EQ(theirs.Text("outcome"), "finished") << theirs.Text("message");
-  double difference = 0.0;
-  int poses = 0;
-  for (const auto& [key, value] : ours.items()) {
-    if (!key.starts_with("series.final.")) continue;
-    const std::vector<double> a = ours.Numbers(key), b = theirs.Numbers(key);
-    if (a.size() != b.size()) return INFINITY;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      difference = std::max(difference, std::abs(a[i] - b[i]));
-    }
-    ++poses;
-  }
-  EXPECT_GT(poses, 0);
-  return difference;
+  return harness::peers_test::EndDifference(ours, theirs);
 }
 
 class ShippedMujoco : public ::testing::TestWithParam<std::string> {};

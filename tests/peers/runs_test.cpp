@@ -5,7 +5,7 @@
 #include "harness/judge/analysis.h"
 #include "harness/run/run.h"
 #include "harness/run/timing.h"
-#include "tests/peers/registered.h"
+#include "tests/peers/shared.h"
 #include "tests/reference/cases.h"
 
 namespace loopbench::harness {
@@ -42,19 +42,7 @@ TEST_P(ShippedRuns, OfSimbodyEndWhereThoseOfOdcaDo) {
   EXPECT_EQ(theirs.Text("integrator"), "simbody-merson");
   const Record ours = RunShipped(GetParam(), kOdca, kRtol, horizon);
   // some 100 steps with errors of rtol each, in both runs; half a second magnifies them little
-  double difference = 0.0;
-  int poses = 0;
-  for (const auto& [key, value] : ours.items()) {
-    if (!key.starts_with("series.final.")) continue;
-    const std::vector<double> a = ours.Numbers(key), b = theirs.Numbers(key);
-    ASSERT_EQ(a.size(), b.size()) << key;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      difference = std::max(difference, std::abs(a[i] - b[i]));
-    }
-    ++poses;
-  }
-  EXPECT_GT(poses, 0);
-  EXPECT_LE(difference, 100 * kRtol);
+  EXPECT_LE(peers_test::EndDifference(ours, theirs), 100 * kRtol);
   // its projection goes to a tenth of the tolerance, by a norm of all constraints
   EXPECT_LE(theirs.Number("drift_position_max"), kRtol);
   EXPECT_EQ(OwnWarnings(theirs), "");

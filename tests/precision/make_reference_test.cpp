@@ -11,7 +11,7 @@
 
 #include "harness/config/mechanism_reader.h"
 #include "harness/judge/analysis.h"
-#include "harness/precision/witness.h"
+#include "harness/precision/exact.h"
 #include "tests/precision/pendulum.h"
 #include "tests/reference/published_numbers.h"
 

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "mechanism/algebra/decompositions.h"
-#include "tests/contract/generators.h"
+#include "tests/contract/placed.h"
 #include "tests/mechanism/shipped.h"
 
 namespace loopbench::reduction {
@@ -20,9 +20,7 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 VectorX<double> RandomVector(Eigen::Index size, std::uint64_t seed) {
   Random random(seed);
-  VectorX<double> v(size);
-  for (double& x : v) x = random.Uniform(-1.0, 1.0);
-  return v;
+  return testing::RandomNumbers(random, size);
 }
 
 /// The matrices of a mechanism at one position, and its null space factored there.

@@ -9,12 +9,13 @@
 #include <limits>
 
 #include "mechanism/algebra/factors.h"
-#include "tests/contract/generators.h"
+#include "tests/contract/placed.h"
 
 namespace loopbench::reduction {
 namespace sparse_lu_test {
 
 using testing::Random;
+using testing::RandomNumbers;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
@@ -77,9 +78,8 @@ TEST(SparseLu, SolvesWithTheRowsThatItChose) {
     const auto bound = [&](const MatrixX<double>& x) {
       return 100.0 * kEps * columns * A_D.norm() * x.norm();
     };
-    VectorX<double> r(columns), solved = VectorX<double>::Constant(rows, 7.0);
-    for (double& value : r) value = random.Uniform(-1.0, 1.0);
-    VectorX<double> lost = r;
+    const VectorX<double> r = RandomNumbers(random, columns);
+    VectorX<double> lost = r, solved = VectorX<double>::Constant(rows, 7.0);
     lu.SolveTransposed(lost.data(), solved.data());
     const MatrixX<double> x_D = RowsOf(solved, pivots);
     EXPECT_LE((A_D.transpose() * x_D - r).norm(), bound(x_D)) << seed;
@@ -99,8 +99,7 @@ TEST(SparseLu, SolvesWithTheRowsThatItChose) {
               bound(B_D) + 100.0 * kEps * sample.A.norm())
         << seed;
 
-    VectorX<double> y(rows), x(columns);
-    for (double& value : y) value = random.Uniform(-1.0, 1.0);
+    VectorX<double> y = RandomNumbers(random, rows), x(columns);
     const MatrixX<double> y_D = RowsOf(y, pivots);
     lu.Solve(y.data(), x.data());
     EXPECT_LE((A_D * x - y_D).norm(), bound(x)) << seed;
@@ -169,8 +168,7 @@ TEST(SparseLu, IsTheSameAfterOtherPivots) {
       ASSERT_TRUE(std::ranges::equal(lu.pivots(), fresh.pivots()));
       others += !pivots.empty() && !std::ranges::equal(lu.pivots(), pivots);
       pivots.assign(lu.pivots().begin(), lu.pivots().end());
-      VectorX<double> r(20);
-      for (double& value : r) value = random.Uniform(-1.0, 1.0);
+      const VectorX<double> r = RandomNumbers(random, 20);
       VectorX<double> lost = r, x = VectorX<double>::Zero(30), expected = x;
       lu.SolveTransposed(lost.data(), x.data());
       lost = r;

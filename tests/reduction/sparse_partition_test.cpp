@@ -20,6 +20,7 @@ namespace loopbench::reduction {
 namespace sparse_partition_test {
 
 using testing::ConsistentState;
+using testing::LadderAt;
 using testing::Random;
 using testing::RandomNumbers;
 using testing::State;
@@ -110,16 +111,6 @@ TYPED_TEST(SparsePartitionTest, SolvesWhatDenseMultipliersSolve) {
 }
 
 using InPlane = testing::SystemWith<Reduction, Planar, double>;
-
-/// Cranks of a ladder at `angle`, all speeds zero.
-VectorX<double> LadderAt(const Mechanism<Planar, double>& mechanism, double angle) {
-  VectorX<double> q = VectorX<double>::Zero(mechanism.num_q());
-  for (const TreeStep& step : mechanism.tree()) {
-    const bool is_crank = step.parent == kGround;
-    q[mechanism.joints()[step.joint].q_offset] = is_crank ? angle : -angle;
-  }
-  return q;
-}
 
 struct LadderRun {
   LadderRun(int windows, Enforcement level, Matrices matrices = Matrices::kSparse)

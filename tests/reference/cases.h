@@ -2,6 +2,8 @@
 // them, and mechanisms made in code.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -10,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "harness/config/experiment_reader.h"
@@ -73,6 +76,41 @@ inline std::string NameOf(const Method& method) {
   return name;
 }
 
+/// Another name as part of a test's.
+inline std::string WithoutDashes(std::string name) {
+  std::erase(name, '-');
+  return name;
+}
+
+/// Names of parameters as names of tests.
+struct NameOfParam {
+  std::string operator()(const ::testing::TestParamInfo<Method>& one) const {
+    return NameOf(one.param);
+  }
+  std::string operator()(const ::testing::TestParamInfo<std::string>& one) const {
+    return WithoutDashes(one.param);
+  }
+  std::string operator()(
+      const ::testing::TestParamInfo<std::tuple<std::string, Method>>& one) const {
+    return WithoutDashes(std::get<0>(one.param) + NameOf(std::get<1>(one.param)));
+  }
+};
+
+/// Rank-revealing solvers of each formulation at these levels, in these coordinate sets.
+inline std::vector<Method> MethodsAt(std::vector<Enforcement> levels,
+                                     std::vector<Coordinates> sets = {Coordinates::kJoint,
+                                                                      Coordinates::kAbsolute}) {
+  std::vector<Method> methods;
+  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+    for (const Enforcement level : levels) {
+      for (const Coordinates set : sets) {
+        methods.push_back({.formulation = formulation, .enforcement = level, .coordinates = set});
+      }
+    }
+  }
+  return methods;
+}
+
 /// One run of a problem. Ten minutes of CPU time: limits are for suites, a test must not end by one
 /// on a busy machine.
 inline Case CaseOf(const Experiment& experiment, const std::string& problem, const Method& method,
@@ -96,7 +134,12 @@ inline MechanismFile Shipped(const std::string& name) {
   return ReadMechanism(kConfigs / "mechanisms" / (name + ".json"));
 }
 
-/// Names of all of them, and such a name as part of a test's.
+/// A mechanism of configs/experiments/overconstrained/.
+inline MechanismFile Overconstrained(const std::string& name) {
+  return ReadMechanism(kConfigs / "experiments/overconstrained" / (name + ".json"));
+}
+
+/// Names of the shipped mechanisms.
 inline std::vector<std::string> ShippedNames() {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(kConfigs / "mechanisms")) {
@@ -104,10 +147,6 @@ inline std::vector<std::string> ShippedNames() {
   }
   std::ranges::sort(names);
   return names;
-}
-inline std::string WithoutDashes(std::string name) {
-  std::erase(name, '-');
-  return name;
 }
 
 /// Whether a record says anything under a key.

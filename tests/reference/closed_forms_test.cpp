@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <iostream>
 #include <numbers>
 
 #include "mechanism/description/library.h"
@@ -25,7 +24,6 @@ double Bound(const Record& record) { return record.Number("steps") * kTolerance;
 void Expect(const Record& record, const char* key, double bound) {
   ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
   EXPECT_LE(record.Number(key), bound) << key;
-  std::cout << key << " " << record.Number(key) << " of " << bound << " allowed\n";
 }
 
 double LastAngle(const Record& record, const std::string& joint) {
@@ -115,8 +113,7 @@ TEST_P(ClosedForm, LaddersPassThroughTheDerivedAngles) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, ClosedForm, testing::ValuesIn(AllMethods()),
-                         [](const auto& method) { return NameOf(method.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, ClosedForm, testing::ValuesIn(AllMethods()), NameOfParam());
 
 class LongLadder : public testing::TestWithParam<Method> {};
 
@@ -142,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, LongLadder,
                                          Published("odca", Coordinates::kAbsolute),
                                          Published("lagrange", Coordinates::kJoint),
                                          Published("reduction", Coordinates::kJoint)),
-                         [](const auto& method) { return NameOf(method.param); });
+                         NameOfParam());
 
 }  // namespace closed_forms_test
 }  // namespace loopbench::harness::reference

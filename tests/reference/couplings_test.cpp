@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <iostream>
 #include <numbers>
 
 #include "mechanism/description/library.h"
@@ -16,14 +15,8 @@ namespace couplings_test {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-MechanismDescription GearedFiveBar() {
-  return ReadMechanism(kConfigs / "mechanisms/geared-five-bar.json").description;
-}
-
-double AngleOf(const BodyState& body) { return std::atan2(body.R(1, 0), body.R(0, 0)); }
-
 TEST(Couplings, ConserveEnergyFor100Seconds) {
-  const MechanismDescription description = GearedFiveBar();
+  const MechanismDescription description = Shipped("geared-five-bar").description;
   const int left = BodyNamed(description, "left-crank"),
             right = BodyNamed(description, "right-crank");
   for (const Method& method : PositionMethods()) {
@@ -39,9 +32,16 @@ TEST(Couplings, ConserveEnergyFor100Seconds) {
     EXPECT_LE(run.energy_error, 1e-6 * size) << ToString(method);
     // angles of about 600 rad are round to 1e-13, of which the relation takes some
     EXPECT_LE(worst, 2e-12) << ToString(method);
-    std::cout << ToString(method) << ": energy " << run.energy_error << " J of " << size
-              << ", coupling " << worst << " rad\n";
   }
+}
+
+/// Along x of Ground.
+JointDescription Slide(const std::string& name, int body) {
+  JointDescription slide;
+  slide.name = name;
+  slide.type = JointType::kPrismatic;
+  slide.to.body = body;
+  return slide;
 }
 
 /// A disc turns a smaller one 20 times as fast, and rolls along a rack, which counts its turns.
@@ -58,11 +58,7 @@ MechanismDescription GearsAndRack() {
   }
   d.joints.push_back(Revolute("slow", 0, {0.0, 0.0, 0.0}, 1, Eigen::Vector3d::Zero()));
   d.joints.push_back(Revolute("fast", 0, {0.6, 0.1, 0.0}, 2, Eigen::Vector3d::Zero()));
-  JointDescription slide;
-  slide.name = "rack";
-  slide.type = JointType::kPrismatic;
-  slide.to.body = 3;
-  d.joints.push_back(slide);
+  d.joints.push_back(Slide("rack", 3));
   d.couplings.push_back({"mesh", {{0, 20.0}, {1, 1.0}}, 0.0});
   d.couplings.push_back({"rack", {{2, 1.0}, {0, -0.05}}, 0.0});
   d.initial.coordinates.push_back({0, {3.0}});  // near the end of a measured turn
@@ -72,36 +68,27 @@ MechanismDescription GearsAndRack() {
 }
 
 TEST(Couplings, TurnWithoutEndInAbsoluteCoordinatesOfSpace) {
-  const MechanismDescription description = InSpace(GearsAndRack(), {0.3, -0.2, 0.9});
+  const MechanismDescription description = InSpace(GearsAndRack(), AnyTurn());
   constexpr double kTurns = 10.0;  // one in a second
-  const Eigen::Matrix3d R = Eigen::AngleAxisd(Eigen::Vector3d(0.3, -0.2, 0.9).norm(),
-                                              Eigen::Vector3d(0.3, -0.2, 0.9).normalized())
-                                .toRotationMatrix();
-  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
-    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity,
-                                    Enforcement::kPosition, Enforcement::kBaumgarte}) {
-      const Method method{.formulation = formulation,
-                          .enforcement = level,
-                          .coordinates = Coordinates::kAbsolute,
-                          .solver = SolverKind::kRankRevealing};
-      const Simulation run = Simulate(description, method, Options("dormand-prince", 1e-7), kTurns);
-      ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(method);
-      const auto angle = [&](int body) {
-        const Eigen::Matrix3d turned = R.transpose() * run.last.bodies[body].R;
-        return std::atan2(turned(1, 0), turned(0, 0));
-      };
-      const double s = (R.transpose() * run.last.bodies[3].p).x(),
-                   turns = (s - 0.15) / (kTurn * 0.05);
-      const double rack = std::remainder(s / 0.05 - angle(1), kTurn);
-      const double mesh = std::remainder(20 * angle(1) + angle(2), kTurn);
-      std::cout << ToString(method) << ": turns " << turns << ", rack " << rack << " rad, mesh "
-                << mesh << " rad\n";
-      EXPECT_NEAR(turns, kTurns, 1e-3) << ToString(method);
-      // 200 turns of the small disc: 1260 rad, round to 2e-13
-      const double most = level == Enforcement::kPosition ? 1e-10 : 2e-2;
-      EXPECT_NEAR(rack, 0.0, most) << ToString(method);
-      EXPECT_NEAR(mesh, 0.0, most) << ToString(method);
-    }
+  const Eigen::Matrix3d R = AnyRotation();
+  for (const Method& method : MethodsAt({Enforcement::kAcceleration, Enforcement::kVelocity,
+                                         Enforcement::kPosition, Enforcement::kBaumgarte},
+                                        {Coordinates::kAbsolute})) {
+    const Simulation run = Simulate(description, method, Options("dormand-prince", 1e-7), kTurns);
+    ASSERT_EQ(run.result.outcome, Outcome::kFinished) << ToString(method);
+    const auto angle = [&](int body) {
+      const Eigen::Matrix3d turned = R.transpose() * run.last.bodies[body].R;
+      return std::atan2(turned(1, 0), turned(0, 0));
+    };
+    const double s = (R.transpose() * run.last.bodies[3].p).x(),
+                 turns = (s - 0.15) / (kTurn * 0.05);
+    const double rack = std::remainder(s / 0.05 - angle(1), kTurn);
+    const double mesh = std::remainder(20 * angle(1) + angle(2), kTurn);
+    EXPECT_NEAR(turns, kTurns, 1e-3) << ToString(method);
+    // 200 turns of the small disc: 1260 rad, round to 2e-13
+    const double most = method.enforcement == Enforcement::kPosition ? 1e-10 : 2e-2;
+    EXPECT_NEAR(rack, 0.0, most) << ToString(method);
+    EXPECT_NEAR(mesh, 0.0, most) << ToString(method);
   }
 }
 
@@ -111,21 +98,15 @@ MechanismFile SliderWithPinion() {
   d.name = "slider-with-pinion";
   d.bodies.push_back(Bar("crank", 0.1, 1.0, 0.001));
   d.bodies.push_back(Bar("rod", 0.3, 0.5, 0.004));
-  BodyDescription body = Bar("slider", 0.1, 0.4, 0.001);
-  d.bodies.push_back(body);
-  body = Bar("pinion", 0.1, 0.3, 0.0002);
-  body.com.setZero();
-  d.bodies.push_back(body);
+  d.bodies.push_back(Bar("slider", 0.1, 0.4, 0.001));
+  d.bodies.push_back(Bar("pinion", 0.1, 0.3, 0.0002));
+  d.bodies.back().com.setZero();
   d.joints.push_back(Revolute("A", 0, {0, 0, 0}, 1, {0, 0, 0}));
   d.joints.push_back(Revolute("B", 1, {0.1, 0, 0}, 2, {0, 0, 0}));
   d.joints.push_back(Revolute("C", 2, {0.3, 0, 0}, 3, {0, 0, 0}));
   d.joints.push_back(Revolute("P", 0, {0.3, -0.05, 0}, 4, {0, 0, 0}));
-  JointDescription slide;
-  slide.name = "slide";
-  slide.type = JointType::kPrismatic;
-  slide.to.body = 3;
-  slide.cut = true;
-  d.joints.push_back(slide);
+  d.joints.push_back(Slide("slide", 3));
+  d.joints.back().cut = true;
   d.couplings.push_back({"rack", {{4, 1.0}, {3, -0.05}}, 0.3});
   d.initial.coordinates = {{0, {1.0}}, {1, {-1.3}}, {2, {0.3}}};
   d.initial.held = {0};
@@ -137,10 +118,7 @@ MechanismFile SliderWithPinion() {
 
 TEST(Couplings, DriftAsOtherConstraintsDo) {
   const auto drift = [](const std::string& formulation, Enforcement level, double horizon) {
-    const Method method{.formulation = formulation,
-                        .enforcement = level,
-                        .coordinates = Coordinates::kJoint,
-                        .solver = SolverKind::kRankRevealing};
+    const Method method{.formulation = formulation, .enforcement = level};
     const Record record = RunFile(SliderWithPinion(), method, 1e-8, horizon);
     EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
     return record.Number("drift.loop.rack");
@@ -151,7 +129,6 @@ TEST(Couplings, DriftAsOtherConstraintsDo) {
                  linear = drift(formulation, Enforcement::kVelocity, 40.0) /
                           drift(formulation, Enforcement::kVelocity, 10.0),
                  none = drift(formulation, Enforcement::kPosition, 40.0);
-    std::cout << formulation << ": " << square << " " << linear << " " << none << " m\n";
     // 4^p over the quadruple time
     EXPECT_NEAR(std::log(square) / std::log(4.0), 2.0, 0.3);
     EXPECT_NEAR(std::log(linear) / std::log(4.0), 1.0, 0.5);
@@ -192,22 +169,14 @@ MechanismFile CardanCircles(const std::string& motion) {
 /// branch, with errors of some 200 steps, and nothing is regularized. Then `check(record)`.
 template <class Check>
 void ExpectRegular(const MechanismFile& file, double tolerance, const Check& check) {
-  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
-    for (const Enforcement level :
-         {Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition}) {
-      for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-        const Method method{.formulation = formulation,
-                            .enforcement = level,
-                            .coordinates = set,
-                            .solver = SolverKind::kRankRevealing};
-        SCOPED_TRACE(ToString(method));
-        const Record record = RunFile(file, method, tolerance, 2.0);
-        ASSERT_EQ(record.Text("outcome"), "finished");
-        EXPECT_EQ(record.Number("regularized_evaluations"), 0.0);
-        EXPECT_LT(record.Number("branch_error_max"), 1e3 * tolerance);
-        check(record);
-      }
-    }
+  for (const Method& method :
+       MethodsAt({Enforcement::kAcceleration, Enforcement::kVelocity, Enforcement::kPosition})) {
+    SCOPED_TRACE(ToString(method));
+    const Record record = RunFile(file, method, tolerance, 2.0);
+    ASSERT_EQ(record.Text("outcome"), "finished");
+    EXPECT_EQ(record.Number("regularized_evaluations"), 0.0);
+    EXPECT_LT(record.Number("branch_error_max"), 1e3 * tolerance);
+    check(record);
   }
 }
 
@@ -275,9 +244,8 @@ TEST(Couplings, RotorsOfScrewsKeepTheEnergyBalance) {
        "to": {"body": "B"}, "axis": [0, 0, 1], "cut": true, "rotor_inertia": 0.05}],
     "initial": {"coordinates": {}}})",
                                             "screw.json");
-  const Experiment experiment = Single(file);
   for (const Method& method : PositionMethods()) {
-    const Record record = RunCase(experiment, CaseOf(experiment, "screw", method, 1e-9, 2.0));
+    const Record record = RunFile(file, method, 1e-9, 2.0);
     ASSERT_EQ(record.Text("outcome"), "finished") << ToString(method) << record.Text("message");
     // Some 500 steps with errors of the tolerance.
     EXPECT_LT(record.Number("energy_error_relative"), 500 * 1e-9) << ToString(method);

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "mechanism/description/library.h"
+#include "mechanism/description/transforms.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/simulate.h"
 
@@ -15,13 +16,6 @@ namespace driven_passages_test {
 
 constexpr double kPi = std::numbers::pi;
 const Eigen::Vector3d kZero = Eigen::Vector3d::Zero();
-
-std::string NameOfParam(const testing::TestParamInfo<Method>& info) { return NameOf(info.param); }
-
-double AngleOf(const MechanismDescription& d, const Snapshot& at, const std::string& body) {
-  const Eigen::Matrix3d& R = at.bodies[static_cast<std::size_t>(BodyNamed(d, body))].R;
-  return std::atan2(R(1, 0), R(0, 0));
-}
 
 /// A mechanism with the exact angles of some of its bodies.
 struct Known {
@@ -38,7 +32,7 @@ MechanismFile FileOf(const MechanismDescription& description) {
 double LargestError(const Known& known, const Snapshot& at) {
   double worst = 0.0;
   for (const auto& [body, angle] : known.angles) {
-    const double miss = AngleOf(known.description, at, body) - angle(at.t);
+    const double miss = AngleOf(at.bodies[BodyNamed(known.description, body)]) - angle(at.t);
     worst = std::max(worst, std::abs(std::remainder(miss, 2 * kPi)));
   }
   return worst;
@@ -150,7 +144,7 @@ TEST_P(DrivenPassage, KeepsTheBranchAtLevelPosition) {
 TEST_P(DrivenPassage, KeepsTheBranchInSpace) {
   const Known flat = Parallelogram(Polynomial{{0.5, 1.0}});
   const Eigen::Matrix3d R = AnyRotation();
-  MechanismDescription tilted = Tilted(flat.description, R);
+  MechanismDescription tilted = InSpace(flat.description, AnyTurn());
   double worst = 0.0;
   const Simulation run =
       Simulate(tilted, GetParam(), Options("dormand-prince", 1e-8), 8.0, [&](const Snapshot& at) {
@@ -212,37 +206,33 @@ TEST_P(DrivenPassage, DeadEndsAreNone) {
   for (const double tolerance : {1e-5, 1e-8}) ExpectDeadEnd(GetParam(), tolerance);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, DrivenPassage, testing::ValuesIn(PositionMethods()), NameOfParam);
+INSTANTIATE_TEST_SUITE_P(Methods, DrivenPassage, testing::ValuesIn(PositionMethods()),
+                         NameOfParam());
+
+std::vector<Method> MethodsBelowPosition() {
+  return MethodsAt({Enforcement::kAcceleration, Enforcement::kVelocity});
+}
 
 TEST(DrivenPassageBelowPosition, DeadEndsHaveOneOutcome) {
-  for (Method method : RankRevealingMethods()) {
-    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
-      method.enforcement = level;
-      ExpectDeadEnd(method, 1e-8);
-    }
-  }
+  for (const Method& method : MethodsBelowPosition()) ExpectDeadEnd(method, 1e-8);
 }
 
 /// Below level projection a passage ends on its branch or with a name and the cure.
 TEST(DrivenPassageBelowPosition, IsRightOrNamed) {
   int named = 0;
-  for (Method method : RankRevealingMethods()) {
-    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kVelocity}) {
-      method.enforcement = level;
-      for (const Known& known : {Parallelogram(Polynomial{{0.5, 1.0}}), AntiParallelogram(0.7, 1.5),
-                                 SliderCrank(-0.4, -2.5)}) {
-        const Record record = RunFile(FileOf(known.description), method, 1e-8, 8.0);
-        if (record.Text("outcome") == "finished") {
-          const Simulation run =
-              Simulate(known.description, method, Options("ode45", 1e-8), 8.0, {});
-          EXPECT_LE(LargestError(known, run.last), 1e-3) << ToString(method);
-          continue;
-        }
-        ++named;
-        const std::string message = record.Text("message");
-        EXPECT_NE(message.find("singular configuration"), std::string::npos) << message;
-        EXPECT_NE(message.find("level projection"), std::string::npos) << message;
+  for (const Method& method : MethodsBelowPosition()) {
+    for (const Known& known : {Parallelogram(Polynomial{{0.5, 1.0}}), AntiParallelogram(0.7, 1.5),
+                               SliderCrank(-0.4, -2.5)}) {
+      const Record record = RunFile(FileOf(known.description), method, 1e-8, 8.0);
+      if (record.Text("outcome") == "finished") {
+        const Simulation run = Simulate(known.description, method, Options("ode45", 1e-8), 8.0);
+        EXPECT_LE(LargestError(known, run.last), 1e-3) << ToString(method);
+        continue;
       }
+      ++named;
+      const std::string message = record.Text("message");
+      EXPECT_NE(message.find("singular configuration"), std::string::npos) << message;
+      EXPECT_NE(message.find("level projection"), std::string::npos) << message;
     }
   }
   EXPECT_GT(named, 0) << "nothing was tested";

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <iostream>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -27,9 +26,7 @@ constexpr double kErrorPerTolerance = 1e3;  // [J]
 std::vector<Method> Methods() {
   std::vector<Method> methods = PublishedMethods();
   for (Method& method : methods) {
-    if (method.formulation == "reduction") {
-      method.solver = SolverKind::kRankRevealing;
-    }
+    if (method.formulation == "reduction") method.solver = SolverKind::kRankRevealing;
   }
   return methods;
 }
@@ -136,23 +133,12 @@ TEST_P(BalanceTest, ClosesToTheTolerance) {
     const double error = record.Number("energy_error_max");
     const double supplied = record.Number("energy_supplied");
     const double dissipated = record.Number("energy_dissipated");
-    std::cout << "balance " << error / rtol << " rtol J, supplied " << supplied << " J, dissipated "
-              << dissipated << " J\n";
     EXPECT_LE(error, kErrorPerTolerance * rtol) << rtol;
     // there is something to balance
     EXPECT_GT(std::abs(supplied) + dissipated, 0.1);
-    if (name == "damped") {
-      EXPECT_EQ(supplied, 0.0);
-    }
-    if (name == "driven") {
-      EXPECT_EQ(dissipated, 0.0);
-    }
-    if (name != "driven") {
-      EXPECT_GT(dissipated, 0.1);
-    }
-    if (name != "damped") {
-      EXPECT_NE(supplied, 0.0);
-    }
+    EXPECT_EQ(supplied == 0.0, name == "damped");
+    EXPECT_EQ(dissipated == 0.0, name == "driven");
+    EXPECT_EQ(dissipated > 0.1, name != "driven");
     // 1e4 in tolerance; 1e2 in error leaves room for chance and for the quadratures' own order
     if (rtol == 1e-6) coarse = error;
     if (rtol == 1e-10) {
@@ -165,9 +151,7 @@ INSTANTIATE_TEST_SUITE_P(FourBar, BalanceTest,
                          testing::Combine(testing::Values("damped", "driven", "dragged", "kinked",
                                                           "prescribed", "everything"),
                                           testing::ValuesIn(Methods())),
-                         [](const auto& test) {
-                           return std::get<0>(test.param) + NameOf(std::get<1>(test.param));
-                         });
+                         NameOfParam());
 
 TEST(Balance, ClosesInSpaceToo) {
   MechanismFile problem = ProblemOf("everything");

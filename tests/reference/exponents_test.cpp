@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <iostream>
 
 #include "tests/reference/cases.h"
 
@@ -26,9 +25,6 @@ void ExpectExponent(const Record& record, double exponent) {
   EXPECT_NEAR(record.Number("growth_exponent"), exponent, 0.15);
   EXPECT_EQ(record.Text("growth_hypothesis"), exponent == 2.0 ? "t^2" : "t^1");
   EXPECT_EQ(record.Text("growth_hypothesis_resolved"), "true");
-  std::cout << record.Text("formulation") << ": t^" << record.Number("growth_exponent") << " +- "
-            << record.Number("growth_spread") << ", drift " << record.Number("drift_position_max")
-            << " m\n";
 }
 
 TEST(DriftOfTheGeneralFourBar, GrowsQuadraticallyAtAccelerationLevel) {
@@ -50,7 +46,6 @@ TEST(DriftOfTheGeneralFourBar, IsTheSameForOdcaAndMultipliersInTheSameCoordinate
   // one round-off of 1 m against a drift of 4e-7 m is 5e-10; each of some 1e3 steps adds one, and
   // those of the speeds grow with time like the drift itself
   EXPECT_LE(relative, 1e-4);
-  std::cout << "drift " << drift << " m, relative difference " << relative << "\n";
 }
 
 TEST(DriftOfTheSquareSevenBar, StaysAtRoundOffInJointCoordinates) {
@@ -61,8 +56,6 @@ TEST(DriftOfTheSquareSevenBar, StaysAtRoundOffInJointCoordinates) {
       const Record record = RunPaper("square-seven-bar",
                                      Published(formulation, Coordinates::kJoint), tolerance, 10.0);
       EXPECT_LE(record.Number("drift_position_max"), 1e-12) << tolerance;
-      std::cout << record.Text("formulation") << " " << tolerance << ": "
-                << record.Number("drift_position_max") << " m\n";
     }
   }
 }
@@ -70,13 +63,11 @@ TEST(DriftOfTheSquareSevenBar, StaysAtRoundOffInJointCoordinates) {
 TEST(DriftOfTheSquareSevenBar, FollowsTheToleranceInAbsoluteCoordinates) {
   for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
     const Method method = Published(formulation, Coordinates::kAbsolute);
-    const double coarse =
-        RunPaper("square-seven-bar", method, 1e-6, 10.0).Number("drift_position_max");
-    const double fine =
-        RunPaper("square-seven-bar", method, 1e-10, 10.0).Number("drift_position_max");
+    const auto drift = [&](double tolerance) {
+      return RunPaper("square-seven-bar", method, tolerance, 10.0).Number("drift_position_max");
+    };
+    const double coarse = drift(1e-6), fine = drift(1e-10);
     EXPECT_GE(coarse / fine, 1e3) << ToString(method);
-    std::cout << ToString(method) << ": " << coarse << " / " << fine << " = " << coarse / fine
-              << "\n";
   }
 }
 

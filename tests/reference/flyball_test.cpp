@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
-#include <string>
 
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
@@ -33,24 +31,13 @@ double Difference(const A05State& a, const A05State& b) {
   return std::max({std::abs(a.s - b.s), std::abs(a.alpha - b.alpha), std::abs(a.omega - b.omega)});
 }
 
-/// Runs to the time of `exact` and prints what it took.
-Simulation RunAndPrint(const Method& method, const std::string& profile, double rtol,
-                       const A05State& exact) {
-  const Simulation run = Simulate(Governor(), method, Options(profile, rtol), exact.t);
-  std::cout << profile << " " << rtol << ", " << exact.t << " s: error "
-            << Difference(StateOf(run.last), exact) << ", " << run.result.steps << " steps, "
-            << run.result.rhs_evaluations << " right-hand sides, energy balance "
-            << run.energy_error << " J\n";
-  return run;
-}
-
 class Flyball : public testing::TestWithParam<Method> {};
 
 TEST_P(Flyball, ExplicitMethodFollowsTheDerivedNumbers) {
   // 3.6e3 steps a second in joint coordinates, for stability; 1.3e4 in absolute ones
   const bool joint = GetParam().coordinates == Coordinates::kJoint;
   const A05State& exact = joint ? kA05Derived.back() : kA05Derived.front();
-  const Simulation run = RunAndPrint(GetParam(), "ode45", 1e-9, exact);
+  const Simulation run = Simulate(Governor(), GetParam(), Options("ode45", 1e-9), exact.t);
   ASSERT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
   // steps for stability are far shorter than accuracy asks for: one tolerance per swing of 1 s
   EXPECT_LE(Difference(StateOf(run.last), exact), 1e-9 * 10);
@@ -59,8 +46,8 @@ TEST_P(Flyball, ExplicitMethodFollowsTheDerivedNumbers) {
 TEST_P(Flyball, ImplicitMethodNeedsAFiftiethOfTheSteps) {
   if (GetParam().coordinates != Coordinates::kJoint) return;
   const A05State& exact = kA05Derived.back();
-  const Simulation stiff = RunAndPrint(GetParam(), "kvaerno-54", 1e-6, exact);
-  const Simulation other = RunAndPrint(GetParam(), "ode45", 1e-6, exact);
+  const Simulation stiff = Simulate(Governor(), GetParam(), Options("kvaerno-54", 1e-6), exact.t);
+  const Simulation other = Simulate(Governor(), GetParam(), Options("ode45", 1e-6), exact.t);
   ASSERT_EQ(stiff.result.outcome, Outcome::kFinished) << stiff.result.message;
   ASSERT_EQ(other.result.outcome, Outcome::kFinished) << other.result.message;
   EXPECT_LE(50 * stiff.result.steps, other.result.steps);
@@ -69,7 +56,7 @@ TEST_P(Flyball, ImplicitMethodNeedsAFiftiethOfTheSteps) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, Flyball, testing::ValuesIn(RankRevealingMethods()),
-                         [](const auto& method) { return NameOf(method.param); });
+                         NameOfParam());
 
 }  // namespace flyball_test
 }  // namespace loopbench::harness::reference

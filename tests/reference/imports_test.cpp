@@ -291,7 +291,7 @@ TEST_P(Imports, FurutaPendulumOfSdfFollowsItsEquations) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, Imports, testing::ValuesIn(RankRevealingMethods()),
-                         [](const auto& method) { return NameOf(method.param); });
+                         NameOfParam());
 
 }  // namespace imports_test
 }  // namespace loopbench::harness::reference

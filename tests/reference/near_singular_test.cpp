@@ -72,8 +72,7 @@ double ErrorOf(const KnownEnd& known, const Method& method, double tolerance) {
   if (run.result.outcome != Outcome::kFinished) return std::numeric_limits<double>::infinity();
   double worst = 0.0;
   for (const auto& [body, angle] : known.angles) {
-    const Eigen::Matrix3d& R = run.last.bodies[static_cast<std::size_t>(BodyNamed(d, body))].R;
-    const double miss = std::atan2(R(1, 0), R(0, 0)) - angle;
+    const double miss = AngleOf(run.last.bodies[BodyNamed(d, body)]) - angle;
     worst = std::max(worst, std::abs(std::remainder(miss, 2 * std::numbers::pi)));
   }
   for (const auto& [body, origin] : known.origins) {
@@ -116,7 +115,7 @@ TEST_P(NearSingular, WrongOnesAreFlaggedAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, NearSingular, testing::ValuesIn(PositionMethods()),
-                         [](const auto& one) { return NameOf(one.param); });
+                         NameOfParam());
 
 }  // namespace near_singular_test
 }  // namespace loopbench::harness::reference

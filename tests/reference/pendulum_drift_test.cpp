@@ -64,8 +64,7 @@ std::vector<Method> BothLevels() {
   return methods;
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, PendulumDrift, testing::ValuesIn(BothLevels()),
-                         [](const auto& method) { return NameOf(method.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, PendulumDrift, testing::ValuesIn(BothLevels()), NameOfParam());
 
 }  // namespace pendulum_drift_test
 }  // namespace loopbench::harness::reference

@@ -1,5 +1,4 @@
 // Files with few digits: loops close within their accuracy, and what differs by less is redundant.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,6 +16,15 @@ namespace loopbench::harness::reference {
 namespace rounded_test {
 
 constexpr double kQuarter = std::numbers::pi / 2;
+
+MechanismFile Rounded(const std::string& name) {
+  return ReadMechanism(kRoot / "tests/reference/rounded" / (name + ".json"));
+}
+
+template <class Space>
+Start<double> StartOf(const MechanismDescription& description) {
+  return Assemble<Space>(description, Mechanism<Space, double>(description, Coordinates::kJoint));
+}
 
 /// A planar four-bar described in space. The crank's axis and that of the joint which closes the
 /// loop stand at `angle` from z, a quarter turn in a file with enough digits.
@@ -61,29 +69,21 @@ TEST_P(Lean, IsNamedAndLeavesTheMechanismFreeToMove) {
 
 TEST_P(Lean, ChangesAMotionByItsOwnSize) {
   const MechanismFile exact = FourBar(kQuarter), leaning = FourBar(kQuarter + GetParam());
-  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
-    for (const Coordinates set : {Coordinates::kJoint, Coordinates::kAbsolute}) {
-      for (const Enforcement level : {Enforcement::kVelocity, Enforcement::kPosition}) {
-        const auto end = [&](const MechanismFile& file) {
-          Experiment experiment = Single(file);
-          experiment.compile.planar = false;
-          const Method method{.formulation = formulation,
-                              .enforcement = level,
-                              .coordinates = set,
-                              .solver = SolverKind::kRankRevealing};
-          return RunCase(experiment, CaseOf(experiment, file.description.name, method, 1e-9, 1.0));
-        };
-        const Record expected = end(exact), record = end(leaning);
-        EXPECT_EQ(record.Text("outcome"), "finished");
-        // loops close: what lean is left over belongs to rows that are not imposed
-        if (level == Enforcement::kPosition) {
-          EXPECT_LT(record.Number("drift_position_max"), 1e-13);
-        }
-        // some 200 steps with errors of the tolerance
-        EXPECT_LT(std::abs(record.Number("energy_error_relative")), 1e-7);
-        EXPECT_NEAR(record.Number("steps"), expected.Number("steps"), 5);
-      }
+  for (const Method& method : MethodsAt({Enforcement::kVelocity, Enforcement::kPosition})) {
+    const auto end = [&](const MechanismFile& file) {
+      Experiment experiment = Single(file);
+      experiment.compile.planar = false;
+      return RunCase(experiment, CaseOf(experiment, file.description.name, method, 1e-9, 1.0));
+    };
+    const Record expected = end(exact), record = end(leaning);
+    EXPECT_EQ(record.Text("outcome"), "finished");
+    // loops close: what lean is left over belongs to rows that are not imposed
+    if (method.enforcement == Enforcement::kPosition) {
+      EXPECT_LT(record.Number("drift_position_max"), 1e-13);
     }
+    // some 200 steps with errors of the tolerance
+    EXPECT_LT(std::abs(record.Number("energy_error_relative")), 1e-7);
+    EXPECT_NEAR(record.Number("steps"), expected.Number("steps"), 5);
   }
 }
 
@@ -98,16 +98,15 @@ TEST(RoundedInput, AnExactLinkageStaysExact) {
 
 TEST(RoundedInput, ALeanBeyondTheAccuracyIsNoRounding) {
   MechanismFile file = FourBar(kQuarter + 1e-4);
-  const Mechanism<Spatial, double> mechanism(file.description, Coordinates::kJoint);
-  EXPECT_NE(Assemble<Spatial>(file.description, mechanism).outcome, Outcome::kFinished);
+  EXPECT_NE(StartOf<Spatial>(file.description).outcome, Outcome::kFinished);
   // unless the file is less accurate
   file.description.accuracy = 1e-3;
-  EXPECT_EQ(Assemble<Spatial>(file.description, mechanism).outcome, Outcome::kFinished);
+  EXPECT_EQ(StartOf<Spatial>(file.description).outcome, Outcome::kFinished);
 }
 
 /// A linkage with its geometry in numbers of six decimals.
 MechanismFile SixDecimals(const std::string& name) {
-  MechanismFile file = ReadMechanism(kConfigs / "experiments/overconstrained" / (name + ".json"));
+  MechanismFile file = Overconstrained(name);
   const auto shorten = [](Eigen::Vector3d& v) { v = (v * 1e6).array().round() / 1e6; };
   for (JointDescription& joint : file.description.joints) {
     shorten(joint.axis);
@@ -123,15 +122,10 @@ MechanismFile SixDecimals(const std::string& name) {
 /// Self-stresses of these linkages turn, so that no fixed choice of released directions serves for
 /// the whole motion: with one the joints came apart by up to 1 m.
 TEST(RoundedInput, OverconstrainedLinkagesKeepTheirMotion) {
-  for (const char* name : {"goldberg-5r", "bennett-turning", "myard-5r", "schatz"}) {
-    const MechanismFile exact =
-        ReadMechanism(kConfigs / "experiments/overconstrained" / (std::string(name) + ".json"));
-    for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-      SCOPED_TRACE(fmt::format("{}, {}", name, formulation));
-      const Method method{.formulation = formulation,
-                          .enforcement = Enforcement::kPosition,
-                          .coordinates = Coordinates::kJoint,
-                          .solver = SolverKind::kRankRevealing};
+  for (const std::string name : {"goldberg-5r", "bennett-turning", "myard-5r", "schatz"}) {
+    const MechanismFile exact = Overconstrained(name);
+    for (const Method& method : MethodsAt({Enforcement::kPosition}, {Coordinates::kJoint})) {
+      SCOPED_TRACE(name + ToString(method));
       const auto end = [&](const MechanismFile& file) {
         const MechanismDescription run_as =
             Release(file.description, FindRedundancy(file.description));
@@ -150,22 +144,17 @@ TEST(RoundedInput, OverconstrainedLinkagesKeepTheirMotion) {
 /// Rounding grows near singular positions: the walk that looks for redundant rows must neither take
 /// one for independent there, nor count loops as open. These linkages were rigid, or kept all rows.
 TEST(RoundedInput, LinkagesThatPassNearSingularPositionsAreFreeToMove) {
-  const std::filesystem::path folder =
-      std::filesystem::path(LOOPBENCH_SOURCE_DIR) / "tests/reference/rounded";
   for (const char* name : {"waldron-six-digits", "waldron-other-six-digits", "waldron-five-digits",
                            "plano-spherical-five-digits"}) {
     SCOPED_TRACE(name);
-    const MechanismFile file = ReadMechanism(folder / (std::string(name) + ".json"));
+    const MechanismFile file = Rounded(name);
     const Redundancy found = FindRedundancy(file.description);
     EXPECT_EQ(found.rows, 5);
     EXPECT_EQ(found.rank, 4);
     ASSERT_EQ(found.released.size(), 1u);
     EXPECT_EQ(found.released[0].directions.size(), 1u);
     const auto end = [&](const char* formulation) {
-      const Method method{.formulation = formulation,
-                          .enforcement = Enforcement::kPosition,
-                          .coordinates = Coordinates::kJoint,
-                          .solver = SolverKind::kRankRevealing};
+      const Method method{.formulation = formulation, .enforcement = Enforcement::kPosition};
       const Simulation run =
           Simulate(Release(file.description, found), method, Options("ode45", 1e-8), 0.5);
       EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
@@ -180,43 +169,32 @@ TEST(RoundedInput, LinkagesThatPassNearSingularPositionsAreFreeToMove) {
 /// dropped row of this joint replaces it. Pivoting alone did not replace it: the loop opened by
 /// 0.71 m.
 TEST(RoundedInput, RowsOfAJointAreExchangedWhereOthersNeedTheirs) {
-  const MechanismFile file = ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /
-                                           "tests/reference/rounded/cognates-eight-digits.json");
-  for (const std::string formulation : {"odca", "lagrange", "reduction"}) {
-    for (const Enforcement level : {Enforcement::kAcceleration, Enforcement::kPosition}) {
-      const Method method{.formulation = formulation,
-                          .enforcement = level,
-                          .coordinates = Coordinates::kJoint,
-                          .solver = SolverKind::kRankRevealing};
-      SCOPED_TRACE(ToString(method));
-      const Record record = RunFile(file, method, 1e-8, 10.0);
-      EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
-      EXPECT_EQ(record.Text("warnings"), "");
-      EXPECT_GE(record.Number("mode_changes"), 10);
-      // the exact linkage has 1.4e-7 m at level acceleration
-      EXPECT_LT(record.Number("drift_position_max"), 1e-6);
-      // rounding of 2e-8 m, by seventeen changes and expansion coefficients of two
-      EXPECT_LT(record.Number("energy_error_relative"), 1e-5);
-    }
+  const MechanismFile file = Rounded("cognates-eight-digits");
+  for (const Method& method :
+       MethodsAt({Enforcement::kAcceleration, Enforcement::kPosition}, {Coordinates::kJoint})) {
+    SCOPED_TRACE(ToString(method));
+    const Record record = RunFile(file, method, 1e-8, 10.0);
+    EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+    EXPECT_EQ(record.Text("warnings"), "");
+    EXPECT_GE(record.Number("mode_changes"), 10);
+    // the exact linkage has 1.4e-7 m at level acceleration
+    EXPECT_LT(record.Number("drift_position_max"), 1e-6);
+    // rounding of 2e-8 m, by seventeen changes and expansion coefficients of two
+    EXPECT_LT(record.Number("energy_error_relative"), 1e-5);
   }
 }
 
 /// A planar four-bar in space with angles of three digits: axes lean by 8e-4 rad. Its rank is
 /// determined within the accuracy that the file states.
 TEST(RoundedInput, RankIsJudgedByTheStatedAccuracy) {
-  MechanismFile file = ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /
-                                     "tests/reference/rounded/four-bar-three-digits.json");
+  MechanismFile file = Rounded("four-bar-three-digits");
   for (const double accuracy : {1e-3, 1e-2}) {
     file.description.accuracy = accuracy;
     const Redundancy found = FindRedundancy(file.description);
     EXPECT_EQ(found.rows, 5);
     EXPECT_EQ(found.rank, 2) << accuracy;
     EXPECT_EQ(AnalyseStructure(file.description).freedom_at_start(), 1);
-    for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-      const Method method{.formulation = formulation,
-                          .enforcement = Enforcement::kPosition,
-                          .coordinates = Coordinates::kJoint,
-                          .solver = SolverKind::kRankRevealing};
+    for (const Method& method : MethodsAt({Enforcement::kPosition}, {Coordinates::kJoint})) {
       SCOPED_TRACE(ToString(method));
       const Record record = RunFile(file, method, 1e-8, 2.0);
       EXPECT_EQ(record.Text("outcome"), "finished") << record.Text("message");
@@ -234,27 +212,19 @@ TEST(RoundedInput, DrivenLinkagesExchangeNoEnergyPerTurn) {
   file.description.joints[0].motions = {{0, Polynomial{.coefficients = {0.0, kSpeed}}}};
   std::erase_if(file.description.initial.coordinates,
                 [](const JointValues& values) { return values.joint == 0; });
-  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-    const Method method{.formulation = formulation,
-                        .enforcement = Enforcement::kVelocity,
-                        .coordinates = Coordinates::kJoint,
-                        .solver = SolverKind::kRankRevealing};
-    const Experiment experiment = Single(file);
-    const Record record = RunCase(experiment, CaseOf(experiment, file.description.name, method,
-                                                     1e-8, 2.0 * std::numbers::pi / kSpeed));
-    EXPECT_EQ(record.Text("outcome"), "finished") << formulation;
+  for (const Method& method : MethodsAt({Enforcement::kVelocity}, {Coordinates::kJoint})) {
+    const Record record = RunFile(file, method, 1e-8, 2.0 * std::numbers::pi / kSpeed);
+    EXPECT_EQ(record.Text("outcome"), "finished") << ToString(method);
     // Speeds miss by the lean of 1e-6 times T^2 times the ratio of joint speeds, here above 100.
-    EXPECT_LT(record.Number("energy_error_relative"), 5e-3) << formulation;
+    EXPECT_LT(record.Number("energy_error_relative"), 5e-3) << ToString(method);
   }
 }
 
 /// Speeds of all joints of a four-bar in a file of six digits and more.
 TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
-  MechanismDescription description =
-      ReadMechanism(kConfigs / "mechanisms/four-bar.json").description;
-  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  MechanismDescription description = Shipped("four-bar").description;
   description.initial.speeds = {{0, {2.0}}};
-  const Start<double> exact = Assemble<Planar>(description, mechanism);
+  const Start<double> exact = StartOf<Planar>(description);
   ASSERT_EQ(exact.outcome, Outcome::kFinished);
   ASSERT_EQ(exact.u.size(), 3);
   for (const double unit : {1e-6, 1e-8, 1e-3}) {
@@ -262,7 +232,7 @@ TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
     for (int j = 0; j < 3; ++j) {
       description.initial.speeds.push_back({j, {std::round(exact.u[j] / unit) * unit}});
     }
-    const Start<double> start = Assemble<Planar>(description, mechanism);
+    const Start<double> start = StartOf<Planar>(description);
     EXPECT_EQ(start.outcome == Outcome::kFinished, unit < 1e-3) << start.message;
     EXPECT_EQ(start.message.find("they fit with an") == std::string::npos, unit < 1e-3);
     if (unit == 1e-3) continue;
@@ -274,31 +244,23 @@ TEST(RoundedInput, GivenSpeedsOfALoopFitWithinTheAccuracy) {
 
 /// Squares of these speeds overflow.
 TEST(RoundedInput, HugeSpeedsThatContradictEachOtherDoNotFit) {
-  MechanismDescription description =
-      ReadMechanism(kConfigs / "mechanisms/four-bar.json").description;
-  const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
+  MechanismDescription description = Shipped("four-bar").description;
   description.initial.speeds = {{0, {1e300}}, {1, {1.0}}, {2, {1.0}}};
-  EXPECT_EQ(Assemble<Planar>(description, mechanism).outcome, Outcome::kInconsistentStart);
+  EXPECT_EQ(StartOf<Planar>(description).outcome, Outcome::kInconsistentStart);
 }
 
 /// Four decimals: the position closes with the default accuracy, but the given speed does not fit.
 TEST(RoundedInput, SpeedsThatDoNotFitNameTheAccuracyWithWhichTheyDo) {
-  MechanismDescription description =
-      ReadMechanism(std::filesystem::path(LOOPBENCH_SOURCE_DIR) /
-                    "tests/reference/rounded/waldron-four-digits.json")
-          .description;
-  const auto start = [&description] {
-    const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
-    return Assemble<Spatial>(description, mechanism);
-  };
-  const std::string message = start().message;
+  MechanismDescription description = Rounded("waldron-four-digits").description;
+  const std::string message = StartOf<Spatial>(description).message;
   EXPECT_NE(message.find("no speeds that fit"), std::string::npos) << message;
   const std::string hint = "they fit with an \"accuracy\" of ";
   const std::size_t at = message.find(hint);
   ASSERT_NE(at, std::string::npos) << message;
   description.accuracy = std::stod(message.substr(at + hint.size()));
   EXPECT_LT(description.accuracy, 1e-3);
-  EXPECT_EQ(start().outcome, Outcome::kFinished) << start().message;
+  const Start<double> start = StartOf<Spatial>(description);
+  EXPECT_EQ(start.outcome, Outcome::kFinished) << start.message;
 }
 
 /// Positions where the directions released elsewhere would leave the joint open.
@@ -329,15 +291,13 @@ TEST(RoundedInput, StartsDoNotFollowTheFreeMotion) {
     description.initial.held.clear();
     description.initial.speeds.clear();
     for (JointValues& values : description.initial.coordinates) values.values[0] += missed;
-    const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
-    const Start<double> found = Assemble<Spatial>(description, mechanism);
+    const Start<double> found = StartOf<Spatial>(description);
     EXPECT_EQ(found.outcome, Outcome::kFinished) << found.message;
     return found.q;
   };
   for (const double missed : {0.0, 0.005}) {
     for (const std::string name : {"bennett-turning", "goldberg-5r", "myard-5r"}) {
-      const MechanismFile exact =
-          ReadMechanism(kConfigs / "experiments/overconstrained" / (name + ".json"));
+      const MechanismFile exact = Overconstrained(name);
       const VectorX<double> apart =
           start(SixDecimals(name).description, missed) - start(exact.description, missed);
       // Leans of 1e-6 rad times ratios of angles below 100. Steps of different damping lead from a

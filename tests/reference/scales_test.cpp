@@ -23,39 +23,11 @@ struct FirstEvaluation {
   std::string units;  ///< of the speeds in joint coordinates: 'a' angle, 'l' length per time
 };
 
-/// Of a joint's speeds, in their order; '?' where a joint is none of a tree.
+/// Of a joint's speeds, in their order.
 std::string UnitsOf(JointType type, SpaceKind space) {
-  switch (type) {
-    case JointType::kWeld:
-      return "";
-    case JointType::kPrismatic:
-      return "l";
-    case JointType::kRevolute:
-    case JointType::kHelical:
-      return "a";
-    case JointType::kPinInSlot:
-    case JointType::kCylindrical:
-      return "al";
-    case JointType::kUniversal:
-      return "aa";
-    case JointType::kSpherical:
-      return "aaa";
-    case JointType::kPlanar:
-      return "all";
-    case JointType::kFree:
-      return space == SpaceKind::kPlanar ? "all" : "aaalll";
-    case JointType::kTranslation:
-      return "lll";
-    case JointType::kSchoenflies:
-      return "alll";
-    case JointType::kPointOnLine:
-      return "aaal";
-    case JointType::kPointInPlane:
-      return "aaall";
-    case JointType::kRod:
-      break;
-  }
-  return "?";
+  std::string units;
+  for (const ValueWord& word : ValueWords(type, space, true)) units += word.is_length() ? 'l' : 'a';
+  return units;
 }
 
 template <class Space>
@@ -144,10 +116,8 @@ TEST_P(RegularScales, AnglesMoveAsBefore) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Scales, testing::ValuesIn(ShippedNames()),
-                         [](const auto& name) { return WithoutDashes(name.param); });
-INSTANTIATE_TEST_SUITE_P(All, RegularScales, testing::ValuesIn(RegularNames()),
-                         [](const auto& name) { return WithoutDashes(name.param); });
+INSTANTIATE_TEST_SUITE_P(All, Scales, testing::ValuesIn(ShippedNames()), NameOfParam());
+INSTANTIATE_TEST_SUITE_P(All, RegularScales, testing::ValuesIn(RegularNames()), NameOfParam());
 
 /// D5: stiffness is physical, rank is not.
 TEST(Masses, RankOfTheFourBarIgnoresThem) {

@@ -1,10 +1,11 @@
-// Every shipped mechanism runs: all three formulations, both coordinate sets, a short while.
+// Energy: every shipped mechanism with all three formulations and both coordinate sets for a short
+// while, and the paper's conservative problems that stay clear of singular positions.
 #include <gtest/gtest.h>
 
-#include <iostream>
+#include <string>
+#include <tuple>
 
 #include "tests/reference/cases.h"
-#include "tests/reference/simulate.h"
 
 namespace loopbench::harness::reference {
 namespace shipped_mechanisms_test {
@@ -35,13 +36,31 @@ TEST_P(ShippedMechanism, RunsInEveryColumnAndBalancesItsEnergy) {
     // errors of at most rtol per step and component, some 1e3 steps and energies up to 1e3 J
     EXPECT_LE(record.Number("energy_error_max"), 1e6 * kRtol) << ToString(method);
     EXPECT_LE(record.Number("drift_position_max"), 1e3 * kRtol) << ToString(method);
-    std::cout << ToString(method) << ": " << record.Number("energy_error_max") << " J, "
-              << record.Number("drift_position_max") << " m\n";
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedMechanism, testing::ValuesIn(ShippedNames()),
-                         [](const auto& name) { return WithoutDashes(name.param); });
+INSTANTIATE_TEST_SUITE_P(All, ShippedMechanism, testing::ValuesIn(ShippedNames()), NameOfParam());
+
+/// Errors of at most rtol per step and component, some 1e3 steps and energies of some 10 J.
+constexpr double kErrorPerTolerance = 1e4;  // [J]
+
+class ConservativeProblem : public testing::TestWithParam<std::tuple<std::string, Method>> {};
+
+TEST_P(ConservativeProblem, KeepsItsEnergyWithinTheTolerance) {
+  const auto& [problem, method] = GetParam();
+  for (const double rtol : {1e-6, 1e-8, 1e-10}) {
+    const Record record = RunPaper(problem, method, rtol, 10.0);
+    ASSERT_EQ(record.Text("outcome"), "finished") << record.Text("message");
+    EXPECT_LE(record.Number("energy_error_max"), kErrorPerTolerance * rtol) << rtol;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Paper, ConservativeProblem,
+                         testing::Combine(testing::Values("square-four-bar", "square-seven-bar",
+                                                          "four-bar", "seven-bar",
+                                                          "general-seven-bar"),
+                                          testing::ValuesIn(PublishedMethods())),
+                         NameOfParam());
 
 }  // namespace shipped_mechanisms_test
 }  // namespace loopbench::harness::reference

@@ -33,17 +33,14 @@ class WithIntegrals final : public Ode {
   System<Space, double>& formulation_;
 };
 
-BodyState StateOf(const Pose<Planar, double>& X, const Velocity<Planar, double>& V) {
+template <class Space>
+BodyState StateOf(const Pose<Space, double>& X, const Velocity<Space, double>& V) {
   BodyState state;
-  state.R.topLeftCorner<2, 2>() = X.R.eigen();
-  state.p.head<2>() = X.p.eigen();
-  state.w.z() = V.angular[0];
-  state.v.head<2>() = V.linear.eigen();
+  state.R.topLeftCorner<Space::kLin, Space::kLin>() = X.R.eigen();
+  state.p.head<Space::kLin>() = X.p.eigen();
+  state.w.tail<Space::kRot>() = V.angular.eigen();
+  state.v.head<Space::kLin>() = V.linear.eigen();
   return state;
-}
-
-BodyState StateOf(const Pose<Spatial, double>& X, const Velocity<Spatial, double>& V) {
-  return {X.R.eigen(), X.p.eigen(), V.angular.eigen(), V.linear.eigen()};
 }
 
 template <class Space>
@@ -99,22 +96,13 @@ Simulation SimulateIn(const MechanismDescription& description, const Method& met
   return simulation;
 }
 
-/// Rotation vector of R1 then, in the turned axes, the rotation of vector `turn`.
-Eigen::Vector3d After(const Eigen::Matrix3d& R1, const Eigen::Vector3d& turn) {
-  const double angle = turn.norm();
-  Eigen::Matrix3d R = R1;
-  if (angle > 0.0) R = R1 * Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
-  const Eigen::AngleAxisd both(R);
-  return both.angle() * both.axis();
-}
-
 }  // namespace
 
 Simulation Simulate(const MechanismDescription& description, const Method& method,
                     const IntegratorOptions& options, double horizon, const Watch& watch) {
-  return description.space == SpaceKind::kPlanar
-             ? SimulateIn<Planar>(description, method, options, horizon, watch)
-             : SimulateIn<Spatial>(description, method, options, horizon, watch);
+  return ForSpace(description.space, [&]<class Space>(Space) {
+    return SimulateIn<Space>(description, method, options, horizon, watch);
+  });
 }
 
 IntegratorOptions Options(const std::string& profile, double tolerance) {
@@ -143,36 +131,10 @@ Eigen::Vector3d VelocityOf(const MechanismDescription& description, const Snapsh
   return state.v + state.w.cross(state.R * (at - description.bodies[body].com));
 }
 
-MechanismDescription Tilted(MechanismDescription description, const Eigen::Matrix3d& R) {
-  const bool planar = description.space == SpaceKind::kPlanar;
-  description.space = SpaceKind::kSpatial;
-  description.gravity = (R * description.gravity).eval();
-  for (auto& [name, point] : description.bodies[kGround].points) point = (R * point).eval();
-  for (JointDescription& joint : description.joints) {
-    if (planar && joint.type == JointType::kFree) {
-      throw std::invalid_argument("free joint " + joint.name + " of a planar problem");
-    }
-    for (JointSide* side : {&joint.from, &joint.to}) {
-      if (side->body != kGround) continue;
-      side->position = (R * side->position).eval();
-      side->rotation = After(R, side->rotation);
-    }
-  }
-  for (ForceDescription& force : description.forces) {
-    if (auto* point = std::get_if<PointForce>(&force); point && !point->in_body_axes) {
-      point->force = (R * point->force).eval();
-    }
-    if (auto* spring = std::get_if<SpringDamper>(&force)) {
-      for (BodyPoint* end : {&spring->from, &spring->to}) {
-        if (end->body == kGround) end->at = (R * end->at).eval();
-      }
-    }
-  }
-  return description;
-}
+Eigen::Vector3d AnyTurn() { return 1.2345 * Eigen::Vector3d(0.48, -0.6, 0.64); }
 
 Eigen::Matrix3d AnyRotation() {
-  return Eigen::AngleAxisd(1.2345, Eigen::Vector3d(0.48, -0.6, 0.64)).toRotationMatrix();
+  return Eigen::AngleAxisd(AnyTurn().norm(), AnyTurn().normalized()).toRotationMatrix();
 }
 
 const std::vector<Method>& RankRevealingMethods() {
@@ -185,11 +147,7 @@ const std::vector<Method>& RankRevealingMethods() {
 }
 
 const std::vector<Method>& PositionMethods() {
-  static const std::vector<Method> kMethods = [] {
-    std::vector<Method> methods = RankRevealingMethods();
-    for (Method& method : methods) method.enforcement = Enforcement::kPosition;
-    return methods;
-  }();
+  static const std::vector<Method> kMethods = MethodsAt({Enforcement::kPosition});
   return kMethods;
 }
 

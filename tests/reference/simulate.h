@@ -2,6 +2,7 @@
 // compare poses and speeds, not the columns of tables.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
@@ -45,6 +46,9 @@ Simulation Simulate(const MechanismDescription& description, const Method& metho
 /// rtol = atol, ten minutes of CPU time: a test must not end by them, sanitizers or not.
 IntegratorOptions Options(const std::string& profile, double tolerance);
 
+/// Angle of a body's x axis in the plane [rad].
+inline double AngleOf(const BodyState& body) { return std::atan2(body.R(1, 0), body.R(0, 0)); }
+
 /// Index of a body by its name; throws std::invalid_argument when there is none.
 int BodyNamed(const MechanismDescription& description, const std::string& name);
 
@@ -54,13 +58,8 @@ Eigen::Vector3d PointOf(const MechanismDescription& description, const Snapshot&
 Eigen::Vector3d VelocityOf(const MechanismDescription& description, const Snapshot& snapshot,
                            int body, const Eigen::Vector3d& at);
 
-/// The same problem turned by `R` in space: gravity, the ground's points and joint frames, forces
-/// in ground axes. Bodies keep their axes, joints their coordinates. Spatial whatever it was;
-/// throws std::invalid_argument for a planar problem with free joints, whose coordinates differ in
-/// space.
-MechanismDescription Tilted(MechanismDescription description, const Eigen::Matrix3d& R);
-
-/// A rotation about no particular axis, the same one for all.
+/// A rotation about no particular axis, the same one for all, and its vector.
+Eigen::Vector3d AnyTurn();
 Eigen::Matrix3d AnyRotation();
 
 /// The three formulations at the level of the paper with rank-revealing solvers, in both coordinate

@@ -1,11 +1,12 @@
-// Through singular positions at level projection: what no level below it does at every tolerance.
+// Through singular positions at level projection, which no level below does at every tolerance, and
+// at level velocity.
 // configs/experiments/extremes/ runs the same at full size; here are the smaller members.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
+#include <limits>
 #include <numbers>
 #include <tuple>
 #include <vector>
@@ -22,10 +23,7 @@
 namespace loopbench::harness::reference {
 namespace singular_test {
 
-const Method kOdcaPosition{.formulation = "odca",
-                           .enforcement = Enforcement::kPosition,
-                           .coordinates = Coordinates::kJoint,
-                           .solver = SolverKind::kRankRevealing};
+const Method kOdcaPosition{.enforcement = Enforcement::kPosition};
 
 class Passage : public testing::TestWithParam<Method> {
  protected:
@@ -49,11 +47,6 @@ TEST_P(Passage, ParallelogramKeepsItsBranch) {
       EXPECT_LE(record.Number("drift_position_max"), 1e-13) << name << " " << tolerance;
       EXPECT_LE(record.Number("closed_form_error_max"), 100 * tolerance) << name;
       EXPECT_LE(record.Number("energy_error_max"), 500 * tolerance) << name;
-      std::cout << name << " " << tolerance << ": branch " << record.Number("branch_error_max")
-                << ", closed form " << record.Number("closed_form_error_max") / tolerance
-                << " tol, energy " << record.Number("energy_error_max") / tolerance
-                << " tol, steps " << record.Number("steps") << ", rejected "
-                << record.Number("rejected") << "\n";
     }
   }
 }
@@ -104,8 +97,7 @@ TEST_P(Passage, RedundantLoopsPassToo) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, Passage, testing::ValuesIn(PositionMethods()),
-                         [](const auto& test) { return NameOf(test.param); });
+INSTANTIATE_TEST_SUITE_P(Methods, Passage, testing::ValuesIn(PositionMethods()), NameOfParam());
 
 /// What the passages cost: steps of the motion itself, a pendulum without any loop.
 TEST(PassageCost, StepsStayNearThoseOfThePlainPendulum) {
@@ -121,8 +113,6 @@ TEST(PassageCost, StepsStayNearThoseOfThePlainPendulum) {
     ASSERT_EQ(plain.outcome, Outcome::kFinished);
     const Record record = RunShipped("parallelogram", kOdcaPosition, tolerance, 20.0);
     EXPECT_LE(record.Number("steps"), 1.4 * static_cast<double>(plain.steps)) << tolerance;
-    std::cout << tolerance << ": " << record.Number("steps") << " steps, pendulum " << plain.steps
-              << "\n";
   }
 }
 
@@ -228,13 +218,48 @@ double AddWheelAndRotor(MechanismDescription& description) {
   return 4.0 * 3.0 + 0.5;
 }
 
-/// A parallelogram with one heavy or light bar, with and without a wheel and a rotor, near the
-/// position in line: the accelerations of the swinging motion, which the regularized equations
-/// alone miss by up to 600 rad/s^2.
-TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
+/// A parallelogram with one heavy or light bar.
+MechanismDescription Parallelogram(int bar, double mass) {
+  MechanismDescription description = Shipped("parallelogram").description;
+  description.bodies[bar].mass = mass;
+  description.bodies[bar].inertia = mass * Eigen::Matrix3d::Identity();
+  return description;
+}
+
+/// Compares the accelerations near the position in line with those of the swinging motion, which
+/// the regularized equations alone miss by up to 600 rad/s^2. `positions` and `velocities` return
+/// those of an angle and a speed of the cranks; `added` belongs to their moment of inertia.
+template <class Space, class Positions, class Velocities>
+void ExpectAccelerations(const MechanismDescription& description,
+                         const Mechanism<Space, double>& mechanism, double added,
+                         const Positions& positions, const Velocities& velocities) {
   // Round-off of 1e-16 in positions at the ends of the interpolated interval, 8e-3 rad from the
   // position in line, enters the forces there by its third power: 2e-9 of 10 m/s^2.
   const double bound = 1e-8;
+  // The middle bar translates; each other one turns about its end, its inertia m * (1 m)^2.
+  const std::vector<BodyDescription>& bodies = description.bodies;
+  const double torque = bodies[1].mass / 2 + bodies[2].mass + bodies[3].mass / 2;
+  const double inertia = 1.25 * bodies[1].mass + bodies[2].mass + 1.25 * bodies[3].mass + added;
+  for (const char* formulation : {"odca", "lagrange", "reduction"}) {
+    SCOPED_TRACE(formulation);
+    const auto system = MakeFormulation<Space>(
+        formulation, mechanism,
+        {.enforcement = Enforcement::kPosition, .solver = SolverKind::kRankRevealing});
+    ASSERT_EQ(system->Start(0.0, positions(0.06), velocities(0.0)), Outcome::kFinished);
+    std::vector<double> state(system->size()), rates(state.size());
+    for (const double angle : {1e-3, 3e-4, 1e-4, 2e-5, 1e-6, -1e-5, -2e-4}) {
+      system->ToState(positions(angle), velocities(-0.13), state);
+      ASSERT_EQ(system->Examine(0.0, state, rates), Outcome::kFinished);
+      const VectorX<double> expected = velocities(-9.81 * std::sin(angle) * torque / inertia);
+      for (int i = 0; i < mechanism.num_u(); ++i) {
+        EXPECT_NEAR(rates[mechanism.num_q() + i], expected[i], bound) << angle;
+      }
+    }
+  }
+}
+
+/// With and without a wheel and a rotor.
+TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
   for (const auto& [bar, mass, is_coupled] : {std::tuple{1, 1.0, false},
                                               {1, 1e6, false},
                                               {1, 1e-6, false},
@@ -247,14 +272,10 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
                                               {2, 1e6, true},
                                               {3, 1e6, true},
                                               {3, 1e-6, true}}) {
-    MechanismDescription description = Shipped("parallelogram").description;
-    std::vector<BodyDescription>& bodies = description.bodies;
-    bodies[bar].mass = mass;
-    bodies[bar].inertia = mass * Eigen::Matrix3d::Identity();
-    // The middle bar translates; each other one turns about its end, its inertia m * (1 m)^2.
-    const double torque = bodies[1].mass / 2 + bodies[2].mass + bodies[3].mass / 2;
-    const double inertia = 1.25 * bodies[1].mass + bodies[2].mass + 1.25 * bodies[3].mass +
-                           (is_coupled ? AddWheelAndRotor(description) : 0.0);
+    SCOPED_TRACE(
+        fmt::format("bar {} of {} kg{}", bar, mass, is_coupled ? ", wheel and rotor" : ""));
+    MechanismDescription description = Parallelogram(bar, mass);
+    const double added = is_coupled ? AddWheelAndRotor(description) : 0.0;
     const Mechanism<Planar, double> mechanism(description, Coordinates::kJoint);
     // per angle of the cranks, by joint
     const std::vector<double> ratios = {1.0, -1.0, 1.0, 0.0, 2.0};
@@ -268,45 +289,24 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranch) {
     };
     const double pi = std::numbers::pi;
     const std::vector<double> hanging = {-pi / 2, 0.0, pi, 0.0, -pi}, none(5, 0.0);
-    for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-      SCOPED_TRACE(fmt::format("{}, bar {} of {} kg{}", formulation, bar, mass,
-                               is_coupled ? ", wheel and rotor" : ""));
-      const auto system = MakeFormulation<Planar>(
-          formulation, mechanism,
-          {.enforcement = Enforcement::kPosition, .solver = SolverKind::kRankRevealing});
-      ASSERT_EQ(system->Start(0.0, by_joint(hanging, 0.06), by_joint(none, 0.0)),
-                Outcome::kFinished);
-      std::vector<double> state(system->size()), rates(state.size());
-      for (const double angle : {1e-3, 3e-4, 1e-4, 2e-5, 1e-6, -1e-5, -2e-4}) {
-        system->ToState(by_joint(hanging, angle), by_joint(none, -0.13), state);
-        ASSERT_EQ(system->Examine(0.0, state, rates), Outcome::kFinished);
-        const VectorX<double> expected = by_joint(none, -9.81 * std::sin(angle) * torque / inertia);
-        for (int i = 0; i < mechanism.num_u(); ++i) {
-          EXPECT_NEAR(rates[mechanism.num_q() + i], expected[i], bound) << angle;
-        }
-      }
-    }
+    ExpectAccelerations(
+        description, mechanism, added, [&](double angle) { return by_joint(hanging, angle); },
+        [&](double speed) { return by_joint(none, speed); });
   }
 }
 
-/// A parallelogram in space. Its third bar has spherical joints at both ends.
+/// In space. The third bar has spherical joints at both ends.
 TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranchInSpace) {
-  const double bound = 1e-8;  // as above
   for (const auto& [bar, mass] :
        {std::pair{1, 1.0}, {1, 1e6}, {1, 1e-6}, {2, 1e6}, {2, 1e-6}, {3, 1e6}, {3, 1e-6}}) {
-    MechanismDescription description =
-        InSpace(Shipped("parallelogram").description, Eigen::Vector3d::Zero());
-    std::vector<BodyDescription>& bodies = description.bodies;
-    bodies[bar].mass = mass;
-    bodies[bar].inertia = mass * Eigen::Matrix3d::Identity();
+    SCOPED_TRACE(fmt::format("bar {} of {} kg", bar, mass));
+    MechanismDescription description = InSpace(Parallelogram(bar, mass), Eigen::Vector3d::Zero());
     JointDescription &closing = description.joints[2], &pivot = description.joints[3];
     closing.type = pivot.type = JointType::kSpherical;
     closing.cut = true;
     pivot.cut = false;
     std::swap(pivot.from, pivot.to);
     description.initial = {};
-    const double torque = bodies[1].mass / 2 + bodies[2].mass + bodies[3].mass / 2;
-    const double inertia = 1.25 * bodies[1].mass + bodies[2].mass + 1.25 * bodies[3].mass;
     const Mechanism<Spatial, double> mechanism(description, Coordinates::kJoint);
     const auto& joints = mechanism.joints();
     const auto positions = [&](double angle) {
@@ -324,23 +324,64 @@ TEST(RegularizedPositions, HaveTheAccelerationsOfTheirBranchInSpace) {
       u[joints[1].u_offset] = -speed;
       return u;
     };
-    for (const char* formulation : {"odca", "lagrange", "reduction"}) {
-      SCOPED_TRACE(fmt::format("{}, bar {} of {} kg", formulation, bar, mass));
-      const auto system = MakeFormulation<Spatial>(
-          formulation, mechanism,
-          {.enforcement = Enforcement::kPosition, .solver = SolverKind::kRankRevealing});
-      ASSERT_EQ(system->Start(0.0, positions(0.06), velocities(0.0)), Outcome::kFinished);
-      std::vector<double> state(system->size()), rates(state.size());
-      for (const double angle : {1e-3, 3e-4, 1e-4, 2e-5, 1e-6, -1e-5, -2e-4}) {
-        system->ToState(positions(angle), velocities(-0.13), state);
-        ASSERT_EQ(system->Examine(0.0, state, rates), Outcome::kFinished);
-        const VectorX<double> expected = velocities(-9.81 * std::sin(angle) * torque / inertia);
-        for (int i = 0; i < mechanism.num_u(); ++i) {
-          EXPECT_NEAR(rates[mechanism.num_q() + i], expected[i], bound) << angle;
-        }
-      }
-    }
+    ExpectAccelerations(description, mechanism, 0.0, positions, velocities);
   }
+}
+
+// Benchmark A02 with speeds that satisfy the loops, joint coordinates and rank-revealing solvers:
+// every formulation stays on the parallel branch, where the motion is known in closed form.
+
+/// Where the tip of the first crank is at the end: infinitely far if a step met a position in line.
+Eigen::Vector3d Tip(int windows, const Method& method, double rtol, double horizon) {
+  const MechanismDescription ladder = Ladder(windows, std::numbers::pi / 2, -1.0);
+  const Simulation run = Simulate(ladder, method, Options("ode45", rtol), horizon);
+  if (run.result.outcome == Outcome::kSingular) {
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  }
+  EXPECT_EQ(run.result.outcome, Outcome::kFinished) << run.result.message;
+  EXPECT_EQ(run.result.t_reached, horizon);
+  const int crank = BodyNamed(ladder, "crank0");
+  return PointOf(ladder, run.last, crank, Eigen::Vector3d::UnitX());
+}
+
+class Passages : public testing::TestWithParam<std::string> {
+ protected:
+  Method method() const {
+    return {.formulation = GetParam(), .enforcement = Enforcement::kVelocity};
+  }
+};
+
+/// How near a step comes to a position in line is chance, and with it what is lost there: of 41
+/// tolerances around 1e-10 each formulation kept the energy to 1.7e-7 J, which moves the tip by
+/// some 1e-7 m, at 23 to 30, and at 2 to 7 it left the branch, which runs mark (warnings_test.cpp).
+/// Reduction, whose partition has no pivot in line, ends as `singular` at 2 of 41.
+/// Which ones these are, round-off decides. The test is of the median of nine.
+TEST_P(Passages, TenOfTheNFourBarOfTwo) {
+  std::vector<Eigen::Vector3d> tips;
+  for (int k = -4; k <= 4; ++k) tips.push_back(Tip(2, method(), (1.0 + 0.01 * k) * 1e-10, 10.0));
+  const PathPoint& end = kA02DerivedN2AtTenSeconds;
+  const auto distance = [&](const Eigen::Vector3d& tip) {
+    return std::max(std::abs(tip.x() - end.x), std::abs(tip.y() - end.y));
+  };
+  std::ranges::nth_element(tips, tips.begin() + 4, {}, distance);
+  const Eigen::Vector3d& tip = tips[4];
+  // at 2 of 41, chance puts 3 or more into nine once in 130 times
+  EXPECT_LE(std::ranges::count_if(tips, [](const auto& one) { return !one.allFinite(); }), 2);
+  EXPECT_LE(distance(tip), 1e-7) << "890 steps of errors below 1e-10";
+  // what EXUDYN's series of step sizes tends to, known to 1e-7
+  EXPECT_NEAR(tip.x(), kA02ExudynLimitX, 2e-7);
+}
+
+INSTANTIATE_TEST_SUITE_P(Formulations, Passages, testing::Values("odca", "lagrange", "reduction"),
+                         [](const auto& test) { return test.param; });
+
+TEST(LongPassages, TwentyOfTheNFourBarOfFortyByOdca) {
+  const Method odca{.enforcement = Enforcement::kVelocity};
+  // ADAMS's file is within 4.1e-6 of the closed form at 20 s; ours adds 700 steps of 1e-8
+  const PathPoint& end = kA02PublishedN40At20Seconds;
+  const Eigen::Vector3d tip = Tip(40, odca, 1e-8, end.t);
+  EXPECT_NEAR(tip.x(), end.x, 4.1e-6 + 7e-6);
+  EXPECT_NEAR(tip.y(), end.y, 4.1e-6 + 7e-6);
 }
 
 }  // namespace singular_test

@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <iostream>
 #include <numbers>
 
 #include "tests/reference/cases.h"
@@ -58,6 +57,17 @@ MechanismDescription BodyOnPoint(const BodyDescription& body, Hold hold, const E
   return problem;
 }
 
+const Eigen::Vector3d kMoments(0.4, 0.8, 1.1), kRates(3.0, 0.0, 2.5);  // in principal axes
+
+/// Without forces.
+MechanismDescription AsymmetricBody(Hold hold, const Eigen::Matrix3d& R) {
+  BodyDescription body;
+  body.name = "body";
+  body.mass = 1.3;
+  body.inertia = kMoments.asDiagonal();
+  return BodyOnPoint(body, hold, Eigen::Vector3d::Zero(), R, R * kRates);
+}
+
 /// For elements of a rotation matrix, energies of some joules and lengths below a metre: each step
 /// adds an error below the tolerance, and one that is carried along grows at most with time.
 double Bound(const Simulation& simulation) {
@@ -81,8 +91,6 @@ void ExpectAttitude(const MechanismDescription& problem, const Method& method,
   EXPECT_LE(run.energy_error, Bound(run));
   const Eigen::Vector3d held = PointOf(problem, run.last, 1, Eigen::Vector3d::Zero());
   EXPECT_LE(held.norm(), Bound(run));
-  std::cout << "attitude " << worst << " of " << Bound(run) << ", energy " << run.energy_error
-            << " J, point " << held.norm() << " m, " << run.result.steps << " steps\n";
 }
 
 class OneBody : public testing::TestWithParam<std::tuple<Method, Hold>> {
@@ -92,16 +100,9 @@ class OneBody : public testing::TestWithParam<std::tuple<Method, Hold>> {
 };
 
 TEST_P(OneBody, AsymmetricWithoutMomentsTurnsAsJacobiSays) {
-  BodyDescription body;
-  body.name = "body";
-  body.mass = 1.3;
-  const Eigen::Vector3d moments(0.4, 0.8, 1.1);
-  body.inertia = moments.asDiagonal();
-  const double w1 = 3.0, w3 = 2.5;
-  const FreeBody exact(moments, w1, w3);
+  const FreeBody exact(kMoments, kRates[0], kRates[2]);
   const Eigen::Matrix3d R0 = AnyRotation();
-  const MechanismDescription problem =
-      BodyOnPoint(body, hold(), Eigen::Vector3d::Zero(), R0, R0 * Eigen::Vector3d(w1, 0.0, w3));
+  const MechanismDescription problem = AsymmetricBody(hold(), R0);
   ExpectAttitude(problem, method(),
                  [&](double t) -> Eigen::Matrix3d { return R0 * exact.Attitude(t); });
 }
@@ -109,14 +110,8 @@ TEST_P(OneBody, AsymmetricWithoutMomentsTurnsAsJacobiSays) {
 /// Quaternions are normalised where they are used and nowhere else: every method keeps its order,
 /// which a normalisation of the state after each step need not.
 TEST_P(OneBody, QuaternionsKeepTheOrderOfTheIntegrator) {
-  BodyDescription body;
-  body.name = "body";
-  body.mass = 1.3;
-  const Eigen::Vector3d moments(0.4, 0.8, 1.1);
-  body.inertia = moments.asDiagonal();
-  const FreeBody exact(moments, 3.0, 2.5);
-  const MechanismDescription problem = BodyOnPoint(body, hold(), Eigen::Vector3d::Zero(),
-                                                   Eigen::Matrix3d::Identity(), {3.0, 0.0, 2.5});
+  const FreeBody exact(kMoments, kRates[0], kRates[2]);
+  const MechanismDescription problem = AsymmetricBody(hold(), Eigen::Matrix3d::Identity());
   for (const auto& [profile, order] : {std::pair{"bogacki-shampine", 3}, {"dormand-prince", 5}}) {
     const auto error = [&](double step) {
       IntegratorOptions options = Options(profile, 1e-3);
@@ -202,12 +197,10 @@ TEST_P(Bennett, LinkageKeepsTheRelationOfItsAngles) {
   const double bound = static_cast<double>(run.result.steps) * kRtol;
   EXPECT_LE(worst, bound);
   EXPECT_LE(run.energy_error, 10.0 * bound);  // energies of some 10 J
-  std::cout << "relation " << worst << " of " << bound << ", energy " << run.energy_error << " J, "
-            << run.result.steps << " steps\n";
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, Bennett, testing::ValuesIn(RankRevealingMethods()),
-                         [](const auto& method) { return NameOf(method.param); });
+                         NameOfParam());
 
 // The closed forms themselves against facts that need no elliptic function.
 
@@ -242,12 +235,11 @@ TEST(SymmetricTop, TurnsBetweenTheHeightsThatEnergyAllows) {
 }
 
 TEST(FreeBody, KeepsItsMomentumAndEnergy) {
-  const Eigen::Vector3d moments(0.4, 0.8, 1.1);
-  const FreeBody body(moments, 3.0, 2.5);
-  const Eigen::Vector3d L0 = moments.cwiseProduct(body.Rates(0.0));
+  const FreeBody body(kMoments, kRates[0], kRates[2]);
+  const Eigen::Vector3d L0 = kMoments.cwiseProduct(body.Rates(0.0));
   const double T0 = L0.dot(body.Rates(0.0));
   for (const double t : {0.2, 1.0, 3.7}) {
-    const Eigen::Vector3d L = moments.cwiseProduct(body.Rates(t));
+    const Eigen::Vector3d L = kMoments.cwiseProduct(body.Rates(t));
     EXPECT_LE((body.Attitude(t) * L - L0).norm(), 1e-13) << t;
     EXPECT_NEAR(L.dot(body.Rates(t)), T0, 1e-13) << t;
     // attitude and rates belong together: R' = R [w]x

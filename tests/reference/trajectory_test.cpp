@@ -9,6 +9,7 @@
 
 #include "harness/base/text.h"
 #include "harness/observers/observer.h"
+#include "mechanism/description/transforms.h"
 #include "mechanism/start/assembly.h"
 #include "tests/reference/cases.h"
 #include "tests/reference/published_numbers.h"
@@ -30,11 +31,14 @@ struct Written {
 
   double At(std::size_t row, const std::string& kind, const std::string& name,
             const std::string& component) const {
-    const auto column = rows.Find(kind, name, component);
+    const auto column = FindColumn(rows.columns, kind, name, component);
     if (!column) throw std::invalid_argument("no column " + kind + ":" + name + ":" + component);
     return rows.At(row, *column);
   }
-  double Time(std::size_t row) const { return rows.At(row, rows.time); }
+  double Time(std::size_t row) const { return rows.Time(row); }
+  double Energy(std::size_t row) const {
+    return At(row, "energy", "", "kinetic") + At(row, "energy", "", "potential");
+  }
 };
 
 MechanismFile ShippedFile(const std::string& name) {
@@ -62,16 +66,9 @@ Written WriteTrajectory(const MechanismFile& mechanism, const Method& method,
 }
 
 OutputOptions Times(std::vector<double> times, bool exact = false) {
-  OutputOptions output;
-  output.times = std::move(times);
-  output.exact = exact;
-  return output;
+  return {.times = std::move(times), .exact = exact};
 }
-OutputOptions Rows(int number) {
-  OutputOptions output;
-  output.number = number;
-  return output;
-}
+OutputOptions Rows(int number) { return {.number = number, .times = {}}; }
 
 /// What steps may leave (each an error below the tolerance), carried along by a stable motion, and
 /// what interpolation adds: at least the distance of its two degrees.
@@ -108,8 +105,7 @@ TEST(Trajectory, OfA01IsTheEllipticFunctionAndItsPinForce) {
       worst_force = std::max({worst_force, std::abs(run.At(row, "reaction", "O", "fx") - fx),
                               std::abs(run.At(row, "reaction", "O", "fy") - fy)});
       EXPECT_NEAR(run.At(row, "reaction", "O", "mz"), 0.0, 100 * kEpsilon);  // a pin has none
-      EXPECT_NEAR(run.At(row, "energy", "", "kinetic") + run.At(row, "energy", "", "potential"),
-                  0.0, 20 * bound);
+      EXPECT_NEAR(run.Energy(row), 0.0, 20 * bound);
     }
     EXPECT_LE(worst, bound);
     EXPECT_LE(worst_force, 30 * bound);  // forces change by some 30 N/rad
@@ -118,9 +114,7 @@ TEST(Trajectory, OfA01IsTheEllipticFunctionAndItsPinForce) {
     for (const PathPoint& point : kA01Published) {
       for (std::size_t row = 0; row < 7; ++row) {
         if (run.Time(row) != point.t) continue;
-        const auto x = run.rows.Find("point", "bob:B", "x", true);
-        ASSERT_TRUE(x);
-        EXPECT_NEAR(run.rows.At(row, *x), point.x, 0.5e-6 + bound);  // six digits
+        EXPECT_NEAR(run.At(row, "point", "bob:B", "x"), point.x, 0.5e-6 + bound);  // six digits
       }
     }
     EXPECT_EQ(run.record.Text("trajectory_output"), exact ? "exact times" : "dense output");
@@ -210,13 +204,10 @@ TEST(Trajectory, ForcesInSpaceFollowFullTurns) {
     // the rows are up to 3 rad apart
     const Written run =
         WriteTrajectory(mechanism, method, "ode45", kTolerance, 2.0, Rows(3), spatial);
-    const double first = run.At(0, "energy", "", "kinetic") + run.At(0, "energy", "", "potential");
     for (std::size_t row = 0; row < run.rows.rows(); ++row) {
       const double angle = run.At(row, "joint", "A", "angle");
-      const double energy =
-          run.At(row, "energy", "", "kinetic") + run.At(row, "energy", "", "potential");
       const double bound = 100.0 * BoundOf(run, kTolerance);
-      EXPECT_NEAR(energy, first, bound);
+      EXPECT_NEAR(run.Energy(row), run.Energy(0), bound);
       EXPECT_NEAR(run.At(row, "energy", "", "potential"), 0.05 * angle * angle - 0.2 * angle,
                   bound);
     }
@@ -336,13 +327,10 @@ TEST(Reactions, OfGearsAreThoseOfTheirTorques) {
                                              "gears.json");
   for (const Method& method : RankRevealingMethods()) {
     const Written run = WriteTrajectory(gears, method, "ode45", 1e-9, 1.0, Rows(3));
-    const auto P = run.rows.Find("coupling", "mesh:P", "effort", true),
-               Q = run.rows.Find("coupling", "mesh:Q", "effort", true);
-    ASSERT_TRUE(P && Q);
     for (std::size_t row = 0; row < 3; ++row) {
       const double bound = 1000 * T * kEpsilon;  // two bodies, condition below 10
-      EXPECT_NEAR(run.rows.At(row, *Q), effort, bound) << ToString(method);
-      EXPECT_NEAR(run.rows.At(row, *P), 2 * effort, bound);
+      EXPECT_NEAR(run.At(row, "coupling", "mesh:Q", "effort"), effort, bound) << ToString(method);
+      EXPECT_NEAR(run.At(row, "coupling", "mesh:P", "effort"), 2 * effort, bound);
     }
   }
 }
@@ -367,12 +355,13 @@ void ExpectMultipliers(const MechanismDescription& description, const std::strin
   AppliedForces<Space, double>(kinematics, applied);
 
   const Compiled compiled = Compile(description, CompileOptions::None());
-  std::vector<BodyMotion> bodies = AtRest(compiled);
-  EnterPart<Space>(compiled, 0, kinematics, {}, &bodies);
-  UserMechanism<Space> user(description);
-  user.Set(0.0, bodies);
-  Reactions<Space> reactions(user);
-  reactions.Solve(A, applied);
+  RunSample start_row{.bodies = AtRest(compiled),
+                      .followed = std::vector(description.joints.size(), std::nan(""))};
+  EnterPart<Space>(compiled, 0, kinematics, A, &start_row.bodies);
+  const OutputOptions output{.times = {}, .quantities = {OutputPart::kReactions}};
+  const auto rows = MakeRowWriter(description, output);
+  std::vector<double> row;
+  rows->Write(start_row, &row);
   double load = 1.0, worst = 0.0;
   for (const auto& wrench : applied) load = std::max(load, wrench.norm());
   for (const int j : mechanism.constraints()) {
@@ -383,10 +372,16 @@ void ExpectMultipliers(const MechanismDescription& description, const std::strin
       expected += state.D(i) * lambda[joint.row + i];
     }
     load = std::max(load, expected.norm());
-    const auto found = reactions.Of(j, Rotation<Space, double>::Identity());
+    // force first, in a row
+    const auto first =
+        FindColumn(rows->columns(), "reaction", LabelName(mechanism.joint_names()[j]), "fx");
+    ASSERT_TRUE(first);
     for (int i = 0; i < Space::kDim; ++i) {
-      ASSERT_FALSE(std::isnan(found[i])) << mechanism.joint_names()[j];
-      worst = std::max(worst, std::abs(found[i] - expected[i]));
+      const double found = row[*first + static_cast<std::size_t>(i)];
+      const double sought =
+          i < Space::kLin ? expected.linear[i] : expected.angular[i - Space::kLin];
+      ASSERT_FALSE(std::isnan(found)) << mechanism.joint_names()[j];
+      worst = std::max(worst, std::abs(found - sought));
     }
   }
   // both solve equations whose condition is some thousand here
@@ -420,7 +415,7 @@ TEST(Reactions, AreOpenWhereConstraintsAreRedundant) {
   }
   // the same loop in the plane of x and y, as a spatial mechanism
   MechanismFile turned = ShippedFile("four-bar");
-  turned.description = Tilted(turned.description, Eigen::Matrix3d::Identity());
+  turned.description = InSpace(turned.description, Eigen::Vector3d::Zero());
   CompileOptions whole = CompileOptions::None();
   for (const CompileOptions& compile : {CompileOptions(), whole}) {
     const Written run = WriteTrajectory(turned, kOdcaJoint, "ode45", 1e-9, 1.0, Rows(5), compile);

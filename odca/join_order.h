@@ -1,11 +1,11 @@
 // Order of joins: the tree behind an assembly tree's lists (plan.h, docs/theory/order-of-joins.md).
 //
 // Three rules compete; the estimated cost of a pass decides (`JoinCost`). *Pairing* grows the tree
-// from below: the next pair of neighbouring assemblies has the smallest boundary after its join, in
-// classes a factor sqrt(2) apart, then the fewest bodies, in powers of two. If it makes large
-// joins, two other rules are tried. *Front* adds body after body to one assembly. *Dissection* cuts
-// from above (George 1973; Lipton, Rose and Tarjan 1979); the best rule orders its parts in turn.
-// All take O(n log n) steps per level of the dissection, of which there are O(log n).
+// from below. The next pair of neighbouring assemblies has the smallest boundary after its join, in
+// classes a factor sqrt(2) apart. Among equals it has the fewest bodies, in powers of two. If this
+// makes large joins, two other rules are tried. *Front* adds body after body to one assembly.
+// *Dissection* cuts from above (George 1973; Lipton, Rose and Tarjan 1979); the best rule orders
+// its parts in turn. All take O(n log n) steps in each of the O(log n) levels of the dissection.
 #pragma once
 
 #include <span>

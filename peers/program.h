@@ -41,9 +41,9 @@ class Program {
 /// cut joints and couplings become constraints, rotors become flywheels, forces become Simbody's
 /// own elements. Throws Unsupported for a helical cut joint.
 ///
-/// RungeKuttaMersonIntegrator runs with `accuracy` = tolerance (|W yerr|_RMS, its own weights) and
-/// a tenth of it as constraint tolerance, Simbody's default. Positions, speeds and the error
-/// estimate are projected if they violate it.
+/// RungeKuttaMersonIntegrator runs with `accuracy` = tolerance (|W yerr|_RMS, its own weights). The
+/// constraint tolerance is a tenth of the accuracy, Simbody's default. Positions, speeds and the
+/// error estimate are projected if they violate it.
 std::unique_ptr<Program> MakeSimbodyProgram(const exchange::Model& model);
 
 /// Makes a program of MuJoCo from the document of harness/exchange/export_mjcf.h at zero, and

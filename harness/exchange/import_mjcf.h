@@ -181,7 +181,7 @@ class MjcfModel {
   std::size_t num_copies_ = 0;
 };
 
-/// Resolves the elements that stand for other files, at most kMaxConfigBytes in all, or for copies.
+/// Resolves the elements that stand for other files, at most kMaxConfigBytes in all, or for copies:
 ///   <include file="...">: the children of the root element of that file, which is read once.
 ///   <attach model="..." body="..." prefix="...">: a body of a <model> in <asset>, or its whole
 ///   world; then its defaults, meshes, tendons, constraints and actuators, with prefixed names.

@@ -32,7 +32,7 @@ struct XmlFile {
   std::optional<std::filesystem::path> main;  ///< the main file; without it there are no others
 };
 
-/// An element of a file, or a copy of it, with the file and line of the original.
+/// An element of a file, or its copy, with file and line of the original.
 struct XmlNode {
   struct Attribute {
     std::string name, value = "";

@@ -43,9 +43,9 @@ struct Hypothesis {
 /// Power laws have one free number (the factor), e^(k t) has two. The score of a hypothesis in one
 /// member is ln(mean square residual) + m ln(n) / n with m free numbers and n independent readings:
 /// the Bayesian information criterion per reading. The winner has the least mean score over the
-/// members. It is "none" when a power law wins whose exponent is far from the mean of the fitted
-/// ones, or when e^(k t) wins without growing by a factor e or without beating a power law of free
-/// exponent.
+/// members. It is "none" if a power law wins whose exponent is further than 0.15 from the mean of
+/// the fitted ones. It is also "none" if e^(k t) wins, but does not grow by a factor e or does not
+/// beat a power law of free exponent.
 ///
 /// Score differences between two hypotheses are formed member by member. Their standard error over
 /// the members decides whether a rival is refuted: members are independent, readings of one run are
@@ -153,9 +153,9 @@ std::vector<std::string> FindUnitWarnings(const MechanismDescription& descriptio
 std::vector<std::string> FindGuessWarnings(const MechanismDescription& description,
                                            const VectorX<double>& q);
 
-/// Returns all warnings. They concern units and guesses; starts that are inconsistent, singular or
-/// nearly so; locked mechanisms; redundancy within the accuracy of the input; parts that no joint
-/// connects to ground; and masses or centres of mass that lose digits.
+/// Returns all warnings: on units and guesses, and on starts that are inconsistent, singular or
+/// nearly singular. Others are on locked mechanisms, redundancy within the accuracy of the input,
+/// parts that no joint connects to ground, and masses or centres of mass that lose digits.
 std::vector<std::string> FindWarnings(const MechanismDescription& description,
                                       const Structure& structure);
 

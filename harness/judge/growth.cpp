@@ -180,8 +180,8 @@ constexpr double kFloor = 10;
 constexpr double kShortestRatio = 4;
 constexpr int kFewestSamples = 16;
 /// Means of the two windows that differ by less than this agree even if the spread is smaller.
-/// The running maximum of a drift with period P lags by up to P, which alone raises a slope p by
-/// some p P / (2 t), t being the window's start: 0.04 for p = 2 and seven periods. The spread
+/// The running maximum of a drift with period P lags by up to P. This alone raises a slope p by
+/// some p P / (2 t), where t is the window's start: 0.04 for p = 2 and seven periods. The spread
 /// does not show this bias, so windows should start after several periods.
 constexpr double kSlopeBias = 0.05;
 /// Largest standard error of either mean. Exponents that theory offers (1/2, 1, 3/2, 2) lie half

@@ -179,7 +179,7 @@ class Runner {
   Runner(const SuiteOptions& options, FinishedRuns& finished, ResultStore& store)
       : options_(options), finished_(finished), store_(store) {}
 
-  /// Runs the unfinished pieces of `pieces`, which are in the order of the experiments.
+  /// Runs the unfinished ones of `pieces`, which are in the order of the experiments.
   /// @param estimate  time estimates of their experiments, used if a progress line is visible
   /// @param shared    short pieces may share a process
   /// @returns  number of their records with an outcome other than "finished"

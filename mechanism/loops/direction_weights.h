@@ -13,8 +13,8 @@
 // the eigenvalues of its block in the block Cholesky factorisation. They fall with the square of
 // the distance from a singular configuration, like the lambda, and have the same product, but lie
 // closer together. A row of n windows has an eigenvalue of 2 / n^2 in its best position; its p,
-// closed along the row, do not depend on n. A single joint has p_i = lambda_i. A small eigenvalue
-// behind moderate p is regularized by lambda_least while a hundredth of it is accurate.
+// closed along the row, do not depend on n. A single joint has p_i = lambda_i. If lambda
+// is small but p is not, lambda_least regularizes it while a hundredth of lambda is accurate.
 #pragma once
 
 #include <span>

@@ -259,7 +259,7 @@ class Measuring {
     whole_.compute(G);
   }
 
-  /// x^T of it x is twice the kinetic energy of the body.
+  /// Returns the matrix E of a body; x^T E x is twice its kinetic energy.
   MatrixXd Energies(int body) const {
     const Eigen::Index n = permitted_.cols();
     MatrixXd G(n, n);

@@ -47,7 +47,7 @@ class Findings {
 
 constexpr double kLater = 0.8;  ///< [s]
 
-/// What the oracle knows of a sample in one coordinate set, whatever the formulation.
+/// The oracle's values of a sample in one coordinate set, for any formulation.
 template <class Space>
 struct Truth {
   Truth(const Sample<Space>& from, Coordinates coordinates)

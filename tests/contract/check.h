@@ -1,6 +1,6 @@
-// Whether a formulation keeps what every formulation owes: for programs that register one of their
-// own (harness/config/formulations.h). It is installed, as the library loopbench::contract, and
-// needs no test framework.
+// Checks the requirements on every formulation, also for programs that register their own
+// (harness/config/formulations.h). It is installed as the library loopbench::contract, and needs no
+// test framework.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@
 namespace loopbench::contract {
 namespace {
 
-/// What is wrong with a Planted solver.
+/// Planted faults of a solver.
 enum class Flaw { kNone, kNoSpeeds, kMemory, kForces, kRank, kNotFinite };
 
 /// The dense equations by LU, with a flaw.

@@ -16,11 +16,11 @@ struct Comparison {
   int rank = 0;              ///< as the formulation reports it
 };
 
-/// What O-DCA makes of the sample's state.
+/// Compares O-DCA with the oracle at the sample's state.
 template <class Space>
 Comparison CompareOdca(const Sample<Space>& sample, Coordinates coordinates, SolverKind solver);
 
-/// What a family of samples must show, and its worst.
+/// Requirements on a family of samples, and its worst error.
 class Family {
  public:
   /// At least `share` of the samples must have rcond above 1e-2, and these are held to 1e-12. A

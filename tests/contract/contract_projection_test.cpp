@@ -1,4 +1,4 @@
-// What level position owes on top of the contract.
+// Level `projection`: requirements beyond the common contract.
 #include <cmath>
 
 #include "tests/contract/contract.h"

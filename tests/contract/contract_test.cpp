@@ -1,5 +1,5 @@
-// What every formulation owes beside check.h, whatever its method: one suite for all combinations
-// of formulation, level of enforcement, solver, coordinate set and space.
+// Requirements on every formulation beyond check.h: one suite for all combinations of formulation,
+// level of enforcement, solver, coordinate set and space.
 #include "tests/contract/contract.h"
 
 #include <cmath>

@@ -78,13 +78,13 @@ MechanismDescription RedundantGraph(int n, int loops, SpaceKind space, std::uint
 MechanismDescription AnyMechanism(int n, int closures, int motions, SpaceKind space,
                                   std::uint64_t seed, DrawnKinds kinds = DrawnKinds::kUpToHelical);
 
-/// Chain of n bodies through all kinds of joints in turn, those that the space has, closed to
-/// Ground by a revolute joint at its end; one more body floats beyond the last on a free joint.
+/// Chain of n bodies through all joint types of the space in turn, closed to Ground by a revolute
+/// joint. One more body is connected to the last one by a free joint.
 MechanismDescription ChainOfEveryKind(int n, SpaceKind space, std::uint64_t seed);
 
-/// Loops inside loops: the first is closed on Ground, each further one has its ends on the two
-/// branches of the one before, half way along, and is made of two new branches of revolute joints
-/// that meet at their tips. A loop shares bodies with the one around and the one inside. It has
+/// Loops inside loops. The first is closed on Ground. Each further one consists of two new branches
+/// of revolute joints that meet at their tips; they begin half way along the two branches of the
+/// loop before. A loop shares bodies with the one around and the one inside. It has
 /// 6 new bodies in the plane, 18 in space.
 MechanismDescription NestedLoops(int loops, SpaceKind space, std::uint64_t seed);
 

@@ -61,7 +61,7 @@ Layout LayoutOf(const Mechanism<Space, S>& mechanism) {
   return layout;
 }
 
-/// What the oracle says about one (q, u).
+/// The oracle's values at one (q, u).
 struct Answer {
   RealVector udot;
   std::vector<Real6> accelerations;  ///< of the centres of mass, ground axes; by body

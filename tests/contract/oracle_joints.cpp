@@ -32,7 +32,7 @@ JetMatrix AboutY(const Jet& angle) {
   return R;
 }
 
-/// Of a quaternion of any length.
+/// Returns the rotation of a quaternion of any length.
 JetMatrix FromQuaternion(const Jet* e) {
   const Jet &w = e[0], &x = e[1], &y = e[2], &z = e[3];
   const Jet s = Reciprocal(w * w + x * x + y * y + z * z), two(2);

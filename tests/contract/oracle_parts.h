@@ -48,11 +48,11 @@ struct Mismatch {
   Jet value;
 };
 
-/// Of a prescribed coordinate with the value s, M being at X in F.
+/// Returns the mismatch of a prescribed coordinate with the value s, where M is at X in F.
 Mismatch DriveMismatch(const JointDescription& joint, int coordinate, const JetPose& X,
                        const Jet& s);
 
-/// Of all constrained directions.
+/// Returns the mismatches of all constrained directions.
 std::vector<Mismatch> Mismatches(const JointDescription& joint, bool spatial, const JetPose& X);
 
 }  // namespace loopbench::testing

@@ -4,9 +4,9 @@
 // squares of the singular values of K_g^-1 J L_g^-T in joint coordinates, for unit masses with the
 // mechanism's length as radius of gyration. It is geometry alone, since rank is; masses here differ
 // by a factor of e^2 at most. K_g makes it a pure number near one, and it is compared with one. A
-// value between 1e-12 and 1e-4 is neither lost nor kept for certain: such a sample is ambiguous and
-// owes a named outcome alone. In all others the rank is the number of values above the gap, by an
-// SVD in long double, and formulations owe that rank and the oracle's accelerations.
+// value between 1e-12 and 1e-4 is neither lost nor kept for certain: such a sample is ambiguous,
+// and only a named outcome is required. In all others the rank is the number of values above the
+// gap, by an SVD in long double. Formulations must find this rank and the oracle's accelerations.
 #include <gtest/gtest.h>
 
 #include <Eigen/SVD>
@@ -73,7 +73,7 @@ std::string Text(const RealVector& spectrum) {
   return text;
 }
 
-/// What the oracle knows of one sample in one coordinate set.
+/// The oracle's values of one sample in one coordinate set.
 template <class Space>
 struct Truth {
   Truth(const Sample<Space>& sample, Coordinates coordinates)

@@ -34,8 +34,8 @@ class Sample {
     const bool own = coordinates == Coordinates::kAbsolute && absolute_answer_;
     return own ? absolute_answer_->forces : joint_answer_.forces;
   }
-  /// What the comparison allows: 100 eps n / rcond, round-off of n bodies magnified by the
-  /// condition of the closures.
+  /// Allowed error: 100 eps n / rcond, round-off of n bodies magnified by the condition of the
+  /// closures.
   double Bound() const;
 
  private:

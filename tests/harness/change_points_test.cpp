@@ -45,7 +45,7 @@ double CostOfSegments(const std::vector<double>& x, std::vector<std::size_t> beg
   return cost;
 }
 
-/// Of all segmentations, by the recursion over the last segment, without pruning.
+/// Returns the best of all segmentations, by recursion over the last segment, without pruning.
 double LeastCost(const std::vector<double>& x, double bound, double penalty) {
   std::vector<double> best(x.size() + 1, std::numeric_limits<double>::infinity());
   best[0] = -penalty;

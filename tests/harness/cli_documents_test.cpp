@@ -7,7 +7,7 @@ namespace cli_documents_test {
 
 class CliDocumentsTest : public CommandLineTest {
  protected:
-  /// What Python says of the document that the command prints, bound to d.
+  /// Returns the value of a Python expression of d, the document that the command prints.
   Ending Ask(const std::string& arguments, const std::string& expression) const {
     return Call(arguments +
                 " 2>err.txt | python3 -c 'import json, sys; d = json.load(sys.stdin); "

@@ -196,7 +196,7 @@ std::string Rounded(const std::string& text) {
   return rounded;
 }
 
-/// What stands in models.md: the command that wrote it.
+/// models.md contains the command that wrote it.
 std::string CommandIn(const fs::path& page) {
   const std::string text = ReadFile(page);
   const std::size_t begin = text.find("`loopbench ") + std::string("`loopbench ").size();

@@ -33,7 +33,7 @@ TEST(Conditions, CompareNumbers) {
   }
 }
 
-/// Whatever is asked of a value that is not there, or is none, is not so.
+/// Every condition on a missing value, or on a value that is not a number, is false.
 TEST(Conditions, NothingIsKnownOfWhatIsNotThere) {
   for (const char* key : {"absent", "nan", "other"}) {
     for (const char* rest : {"<1", "<=1", ">1", ">=1", "=1", "!=1"}) {

@@ -1,4 +1,4 @@
-// Of more records than a picture has points, those that it shows apart.
+// Choice of the records that differ in a picture with fewer points than records.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,8 +39,8 @@ TEST(DistinctPoints, AreAllOfFewCutDownToWhatIsDrawn) {
   EXPECT_EQ(points.records()[0].Number("mass"), 2.0) << "a parameter";
 }
 
-/// Of a line over a small part of its values, and of one over ten decades: every point has one that
-/// was kept within two cells, linear and logarithmic, for a cell that begins where it was set.
+/// A line over a small part of its values, and one over ten decades. Each point has a kept point
+/// within two cells, linear and logarithmic.
 TEST(DistinctPoints, StandForAllOthersOnEitherAxis) {
   for (const bool decades : {false, true}) {
     const auto y_of = [decades](double x) {

@@ -11,7 +11,7 @@ namespace documents_test {
 
 using DocumentsTest = CommandLineTest;
 
-/// What stands between the first fence after `words` and the next one.
+/// Returns the text between the first fence after `words` and the next one.
 std::string BlockAfter(const std::string& text, const std::string& words) {
   const std::size_t at = text.find(words);
   if (at == std::string::npos) return "";

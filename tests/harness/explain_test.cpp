@@ -27,8 +27,8 @@ struct AxisExample {
   Eigen::Vector3d first;  ///< in ground axes: along or about what the first coordinate moves
 };
 
-/// What docs/mechanism-files.md says of `axis` and `rotation`, by example: explain's words and the
-/// motion itself.
+/// The rules for `axis` and `rotation` in docs/mechanism-files.md, by examples: texts of explain
+/// and the motion itself.
 TEST_F(ExplainTest, AxesAreSaidAndAreWhatJointsMoveAlongOrAbout) {
   const std::string x = "x = (1 0 0)", y = "y = (0 1 0)", z = "z = (0 0 1)";
   const std::string to_x = R"(, "axis": [1, 0, 0])", to_y = R"(, "axis": [0, 1, 0])",

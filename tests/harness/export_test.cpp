@@ -33,7 +33,7 @@ std::vector<std::string> ShippedNames() {
   return names;
 }
 
-/// What `format` does not have of a mechanism.
+/// Returns the parts of a mechanism that `format` does not support.
 std::vector<std::string> Missing(const MechanismDescription& mechanism,
                                  const ExportFormat& format) {
   try {

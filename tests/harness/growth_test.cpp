@@ -34,25 +34,32 @@ DriftSeries Sample(const std::function<double(double)>& drift, double t_end = kE
   return series;
 }
 
-// scale t^p (1 + 0.5 sin(w t + phase)) (1 + 0.02 noise), with a period of about 1.4 s like a
-// mechanism's swing; period and phase differ between members like perturbed starts.
-std::vector<DriftSeries> PowerLaw(double exponent, double scale, int members = kMembers,
-                                  double t_end = kEnd, int count = 4000) {
+/// Runs of law(t), each times a swing of its own and (1 + 0.02 noise). `swing_of` draws the swing,
+/// a function of time, for each member: phases differ like those of perturbed starts.
+std::vector<DriftSeries> Swinging(const std::function<double(double)>& law, const auto& swing_of,
+                                  int members, double t_end = kEnd, int count = 4000) {
   std::vector<DriftSeries> runs;
   for (int k = 0; k < members; ++k) {
     std::mt19937_64 generator(static_cast<std::uint64_t>(k) + 1);
     std::uniform_real_distribution<double> uniform(0, 1);
     std::normal_distribution<double> noise(0, 0.02);
-    const double phase = 2 * std::numbers::pi * uniform(generator);
-    const double frequency = 4.4 + 0.2 * uniform(generator);
-    runs.push_back(Sample(
-        [&](double t) {
-          return scale * std::pow(t, exponent) * (1 + 0.5 * std::sin(frequency * t + phase)) *
-                 (1 + noise(generator));
-        },
-        t_end, count));
+    const auto swing = swing_of([&] { return uniform(generator); });
+    runs.push_back(
+        Sample([&](double t) { return law(t) * swing(t) * (1 + noise(generator)); }, t_end, count));
   }
   return runs;
+}
+
+/// scale t^p times a swing of a half, whose period of about 1.4 s is like a mechanism's.
+std::vector<DriftSeries> PowerLaw(double exponent, double scale, int members = kMembers,
+                                  double t_end = kEnd, int count = 4000) {
+  return Swinging([=](double t) { return scale * std::pow(t, exponent); },
+                  [](const auto& draw) {
+                    const double phase = 2 * std::numbers::pi * draw(),
+                                 frequency = 4.4 + 0.2 * draw();
+                    return [=](double t) { return 1 + 0.5 * std::sin(frequency * t + phase); };
+                  },
+                  members, t_end, count);
 }
 
 /// Runs of law(t) with factors between 1 and 1.15.
@@ -254,20 +261,15 @@ TEST(Envelope, IsEmptyWithoutAnInterval) {
   EXPECT_TRUE(Envelope({{0, 1, 2}, {0, 1, 2}}, 1).t.empty());
 }
 
-/// Sixteen runs of law(t) times a swing of a third with a period of about 1.4 s, whose phase
-/// differs between members, and two per cent of noise.
+/// Runs of law(t) times a swing of a third with a period of about 1.4 s.
 std::vector<DriftSeries> Runs(const std::function<double(double)>& law, int members = kMembers) {
-  std::vector<DriftSeries> runs;
-  for (int k = 0; k < members; ++k) {
-    std::mt19937_64 generator(static_cast<std::uint64_t>(k) + 1);
-    std::uniform_real_distribution<double> uniform(0, 1);
-    std::normal_distribution<double> noise(0, 0.02);
-    const double phase = 2 * std::numbers::pi * uniform(generator);
-    runs.push_back(Sample([&](double t) {
-      return law(t) * (1 + std::sin(4.5 * t + phase) / 3) * (1 + noise(generator));
-    }));
-  }
-  return runs;
+  return Swinging(
+      law,
+      [](const auto& draw) {
+        const double phase = 2 * std::numbers::pi * draw();
+        return [=](double t) { return 1 + std::sin(4.5 * t + phase) / 3; };
+      },
+      members);
 }
 
 Growth Analyse(const std::function<double(double)>& law, int members = kMembers) {

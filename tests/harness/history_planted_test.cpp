@@ -18,14 +18,14 @@ namespace history_test {
 
 constexpr std::size_t kCommits = 200, kCases = 8;
 using ByCase = std::vector<std::vector<double>>;  ///< [case][commit]
-/// What a machine does to times that are the same.
+/// Effects of a machine on equal times.
 struct Machine {
   ByCase noise;         ///< of their logarithms
   ByCase calibrations;  ///< [ns]; none if the speed of the machine is unknown
 };
 
-/// What a file of noise says of a machine whose cores others share, about the medians: for each
-/// record the times of a right-hand side and of a simulation, then their calibrations.
+/// Reads the noise of a machine with shared cores, relative to the medians. Each record has the
+/// times of a right-hand side and of a simulation, then their calibrations.
 Machine SharedMachine(const char* noise = "timing-noise.csv") {
   std::ifstream file(fs::path(LOOPBENCH_SOURCE_DIR) / "tests/harness" / noise);
   Machine machine{ByCase(kCases), ByCase(kCases)};

@@ -65,7 +65,7 @@ TEST_F(HistoryOf, NamesOfCommitsAreNoPaths) {
   EXPECT_EQ(FindingsOf(ReadHistory(folder_)).series.size(), 2u);  // steps and drift
 }
 
-// Of a history that an earlier version wrote: the ending stands before the hash.
+// File of a history by an earlier version: the ending stands before the hash.
 TEST_F(HistoryOf, ResultsAreReadWhateverTheirEnding) {
   const HistoryEntry added = Add(1, {Measured("bar", 1e-3, 7)});
   const std::string old = "x-00.jsonl-73cea767";

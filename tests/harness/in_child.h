@@ -37,7 +37,7 @@ void InChild(Check check) {
   GTEST_FLAG_SET(death_test_style, style);
 }
 
-/// What loopbench prints, called with these words after its name.
+/// Returns the output of loopbench with these arguments.
 inline std::string Printed(std::vector<std::string> words) {
   words.insert(words.begin(), "loopbench");
   std::vector<char*> arguments;

@@ -352,7 +352,7 @@ TEST(TimingOfCases, EveryAccuracyRowHasATimingRowOfItsKeys) {
   EXPECT_EQ(CountTimings(experiment), cases.size());
 }
 
-/// What a timing runs is what the accuracy run ran, seen at the steps it takes.
+/// A timing runs the same case as the accuracy run: it takes the same steps.
 TEST(TimingOfCases, RunsTheCaseAsItIs) {
   const Experiment experiment = FourBar(kOdca, R"(, "tolerances": [1e-3, 1e-7], "fixed_steps": 0.1,
                         "integrator": ["ode45", "trbdf2"], "timing": {"repeats": 1, "cases": true})");
@@ -411,7 +411,7 @@ TEST(FixedSteps, NeitherJudgeNorAreJudgedByTheEndsOfOthers) {
   EXPECT_TRUE(agreements[2].flagged && agreements[3].flagged);
 }
 
-/// Of one integrator all end alike, of the other none: the first decide at their own tolerance.
+/// All runs of one integrator agree, none of the other: the first decide at their own tolerance.
 TEST(Integrators, ThoseThatAllEndAlikeDecide) {
   const auto run = [](const std::string& integrator, const std::string& level, double at) {
     Record record = FixedRun(level, at);

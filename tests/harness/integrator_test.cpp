@@ -258,8 +258,8 @@ TEST(IntegratorRun, BlowUpIsStepTooSmall) {
   EXPECT_NEAR(result.t_reached, 1, 1e-6);
 }
 
-// From t = 0.5 on the derivative is noise of size 1e30: seven reductions of one step, by a factor
-// of ten at most, do not bring its error below the tolerance, and ARKODE gives up (its code -3).
+// From t = 0.5 on the derivative is noise of size 1e30. Seven reductions of a step, each by a
+// factor of ten at most, do not suffice for the tolerance. ARKODE then ends with its code -3.
 TEST(IntegratorRun, RepeatedErrorTestFailureIsStepTooSmall) {
   double sign = 1;
   TestOde ode(1, [&](double t, auto, auto ydot) {

@@ -51,7 +51,7 @@ JointTraits Named(JointType type, std::string_view name) {
   return traits;
 }
 
-/// What is wrong with a joint kind that is the built-in one but for a change.
+/// Returns the faults of a built-in joint kind after a change.
 template <class Change>
 std::string WrongWith(JointType type, Change change) {
   JointTraits traits = Named(type, "other");

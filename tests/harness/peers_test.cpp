@@ -26,7 +26,7 @@ Experiment Read(const std::string& text) {
   return ParseExperiment(text, kConfigs / "mechanisms/peers.json");
 }
 
-/// What RequirePeers() says; "none" where it says nothing.
+/// Returns the message of RequirePeers(), "none" without one.
 std::string Refusal(const Experiment& experiment) {
   try {
     RequirePeers({experiment});

@@ -137,7 +137,7 @@ TEST(SideBySide, HasStacksForWorkspaces) {
   EXPECT_EQ(sum, 3);
 }
 
-/// What is left once `mebibytes` of address space are all that can be had.
+/// Returns the number of runs that end with at most `mebibytes` of further address space.
 int EndedWithin(std::size_t mebibytes) {
   std::size_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;

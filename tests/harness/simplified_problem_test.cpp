@@ -96,7 +96,7 @@ TEST(SimplifiedProblemTest, IslandsRunAloneAndAddUp) {
   }
 }
 
-/// Whatever a run of the whole writes, but for series and what belongs to one sequence of steps.
+/// All keys of a run of the whole mechanism, except series and keys of one sequence of steps.
 TEST(SimplifiedProblemTest, IslandsKeepTheCountsOfProjectionAndNewton) {
   Experiment experiment = Single(Shipped("four-islands"));
   experiment.compile = CompileOptions();

@@ -34,7 +34,7 @@ class StoreIntegrity : public CommandLineTest {
     text_ = ReadFile(folder_ / "store/results.jsonl");
   }
 
-  /// What reading `text` as a store says: an error or a warning, or "" for neither.
+  /// Returns the error or the first warning of reading `text` as a store, or "".
   std::string Complaint(const std::string& text) const {
     const fs::path file = folder_ / "changed.jsonl";
     std::ofstream(file, std::ios::binary) << text;

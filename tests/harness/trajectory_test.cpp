@@ -271,7 +271,7 @@ constexpr const char* kEveryKind =
       "e": [0.4, 0.2, 0.1], "u": [0.6, -0.4], "h": -0.5, "f": [1, -2, 0.5, 0.1, 0.2, 0.3],
       "t": [0.1, -0.2, 0.3], "m": [0.5, 0.1, 0.2, 0.3], "l": [0.1, 0.2, 0.3, 0.4], "n": [0.3, 0.2, 0.1, 0.4, 0.5]}}})";
 
-/// What the user gives to kEveryKind, as columns.
+/// The user's values for kEveryKind, as columns.
 constexpr const char* kGivenValues =
     R"(r:angle [rad] = 7.5; p:shift [m] = 0.3; s:angle [rad] = 0.4; s:shift [m] = 0.2;
   c:shift [m] = 0.1; b:qw [1] = 0.8; b:qx [1] = 0.2; b:qy [1] = 0.4; b:qz [1] = 0.4;

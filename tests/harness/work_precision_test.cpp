@@ -110,7 +110,7 @@ TEST(WorkPrecision, RowsThatAreNotComparedSayWhy) {
                                                "warnings: energy drift"}));
 }
 
-/// What the reference cannot tell apart is not what a row may win by.
+/// Differences below the accuracy of the reference decide nothing.
 TEST(WorkPrecision, NoErrorIsBelievedBelowWhatTheReferenceIsCertifiedTo) {
   std::vector<Record> records = Store({1e-12, 3e-12}, {2.0, 1.0});
   for (Record& record : records) record.Set("reference_error", 2e-12);

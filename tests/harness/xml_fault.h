@@ -7,8 +7,8 @@
 
 namespace loopbench::harness {
 
-/// What is no XML: tags and comments that do not close, ampersands and control characters of their
-/// own.
+/// Returns the first fault of an XML text: open tags or comments, bare ampersands, control
+/// characters.
 inline std::string FaultOfXml(const std::string& text) {
   static const std::regex known("&(amp|lt|gt|quot|#39|#9|#10|#13);");
   const auto fault_of_entities = [](const std::string& part) -> std::string {

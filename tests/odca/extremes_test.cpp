@@ -26,8 +26,8 @@ struct Residuals {
   long operations = 0;
 };
 
-/// What the equations miss at the described position with random speeds. A comes from udot along
-/// the tree, not from the sweep; together the residuals being zero determine A.
+/// Returns the residuals of the equations at the described position with random speeds. A comes
+/// from udot along the tree, not from the sweep. Only the correct A makes all residuals zero.
 template <class Space>
 Residuals ResidualsOf(const MechanismDescription& description) {
   const Mechanism<Space, double> mechanism(description, Coordinates::kJoint);

@@ -90,8 +90,8 @@ std::set<int> Cited(const std::string& line) {
   return numbers;
 }
 
-/// What is cited in the function and in the comment above it: from the blank line before its name
-/// to the end of its body; or in the whole file. Empty where the file has no such function.
+/// Returns the equations cited in a function and the comment above it, or in the whole file. The
+/// text begins at the blank line before the name. Empty if the file has no such function.
 std::set<int> CitedIn(const Place& place, bool& found) {
   const std::vector<std::string> lines = Lines(harness::ReadFile(kRoot / place.file));
   const std::regex name("\\b" + place.function + "\\(");

@@ -70,7 +70,7 @@ inline RealVector MeasureNumbers(const TwoHandles& k, const TwoHandles& k1, cons
          RealVector(k.z21 * F_k - k1.z12 * F_k1 + k.z23 - k1.z13 + cut.Hdot_u);  // (17)
 }
 
-/// What (15) misses for these measure numbers.
+/// Returns the residual of (15) for these measure numbers.
 inline RealVector Missing15(const TwoHandles& k, const TwoHandles& k1, const Cut& cut,
                             const RealVector& F_k, const RealVector& F_k1, const RealVector& f) {
   return cut.D.transpose() * (k1.z11 + k.z22) * cut.D * f -
@@ -155,7 +155,7 @@ struct CoupledLoop {
   }
 };
 
-/// What (57) and (58) miss, one after the other; (60) and (62) are the same, sorted.
+/// Returns the residuals of (57) and (58); (60) and (62) are the same, sorted.
 inline RealVector Missing57And58(const TwoHandles& body2, const TwoHandles& sys, const Cut& j4,
                                  const Cut& j6, const RealVector& F_ext, const RealVector& F) {
   const auto d = j4.D.rows();

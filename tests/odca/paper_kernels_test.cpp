@@ -12,7 +12,7 @@
 namespace loopbench::odca::paper {
 namespace paper_kernels_test {
 
-/// Of the kernels' numbers, which are projected on the D of pins.
+/// Returns the numbers of a kernel, which are projected on the D of planar revolute joints.
 RealMatrix ToReal(const pins::Matrix2<double>& A) {
   RealMatrix real(2, 2);
   real << A.xx, A.xy, A.yx, A.yy;
@@ -145,7 +145,8 @@ std::vector<ArmPlace> InnerBodies(const Scene<Spatial>& scene, const arms::Arm& 
   return places;
 }
 
-/// What the kernel makes of the body alone; `speed` counts g of the joint at its handle 1.
+/// Returns the kernel's handle of a single body; with `speed` it contains g of the joint at
+/// handle 1.
 arms::Free<double> FreeOf(const Scene<Spatial>& scene, const ArmPlace& at, double speed) {
   const Joint<Spatial, double>& joint = scene.mechanism().joints()[at.joint];
   const auto& side = joint.from == at.body ? joint.X_PF : joint.X_QM;

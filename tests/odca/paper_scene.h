@@ -71,7 +71,7 @@ class Scene {
     M.topLeftCorner(Space::kRot, Space::kRot) = ToReal(rotational);
     return M;
   }
-  /// What acts on the body beside joints, less w x I w.
+  /// Wrench on the body without its joints, less w x I w.
   RealVector Wrench(int body) const {
     RealVector wrench = ToReal(wrenches_[body]);
     const RealVector w = AngularVelocity(body);

@@ -95,7 +95,7 @@ class Series {
   void Replace(int place, const TwoHandles& handles) { handles_[place] = handles; }
 
   TwoHandles Assembly() { return Assembly(0, static_cast<int>(bodies_.size())); }
-  /// Of bodies first .. last - 1, halved again and again.
+  /// Returns the assembly of bodies first .. last - 1, by halves.
   TwoHandles Assembly(int first, int last) {
     if (last - first == 1) return handles_[first];
     const int middle = (first + last) / 2;

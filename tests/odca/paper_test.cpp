@@ -102,9 +102,9 @@ TEST(PaperTest, ChainsClosedOnGroundInSpace) {
   EXPECT_GE(tally.assemblies, tally.scenes);
 }
 
-/// What stands in (7) beside H udot, less Hdot u with H differentiated in ground axes: where the
-/// joint slides, Mo moves along P, and w_P x v_rel is left over. Tree joints; the largest such
-/// rest.
+/// Returns the largest term of (7), over tree joints, beside H udot and Hdot u with H
+/// differentiated in ground axes. Where the joint slides, Mo moves along P, and w_P x v_rel
+/// remains.
 template <class Space>
 double RestOfEquation7(std::uint64_t seed) {
   constexpr double h = 1e-5;  // truncation h^2 and round-off eps / h are both below 1e-9

@@ -35,7 +35,7 @@ inline double Bound(int n, double rcond) {
   return 100.0 * std::numeric_limits<double>::epsilon() * n / rcond;
 }
 
-/// What both make of a state, loops closed or not, at a level with these speeds.
+/// Results of the fast path and of the general sweep for a state at a level with these speeds.
 struct Both {
   Outcome outcome = Outcome::kFinished;
   Diagnostics general;

@@ -122,9 +122,9 @@ TYPED_TEST(ShortCutTest, LosesNoMoreAtExtremesThanTheGeneralSweep) {
   EXPECT_LE(errors.back(), 10.0 * errors_general.back());
 }
 
-/// Of a sum along all bodies [m]: each one's place is rounded, and in the plane its angle, whose
-/// last place moves the body's arm by as much. Alone, along paths of 941 states and against long
-/// double, either way to add up is off by up to 1.9 times the part of the places.
+/// Returns the round-off of a sum along all bodies [m]. Each position is rounded, and in the plane
+/// each angle, which moves the body's arm by as much. Along paths of 941 states, each way to add up
+/// differs from long double by at most 1.9 times the part of the positions.
 template <class Space>
 double RoundOff(const Mechanism<Space, double>& model, const Numbers& y) {
   double sum = model.num_bodies();
@@ -136,8 +136,8 @@ double RoundOff(const Mechanism<Space, double>& model, const Numbers& y) {
   return 4.0 * kEps * model.length() * sum;
 }
 
-/// What level projection makes of an accepted step, by the short cut and in all generality:
-/// multipliers have no short cut, and their Newton steps are as long.
+/// Level `projection` after an accepted step, by the fast path and by multipliers, which have none
+/// and whose Newton steps are as long.
 TYPED_TEST(ShortCutTest, ProjectsAsTheGeneralWayDoes) {
   int projected = 0;
   double worst = 0.0, least_rcond = 1.0;

@@ -13,7 +13,7 @@
 
 namespace loopbench::harness::peers_test {
 
-/// Of one tree joint, in the order of files.
+/// Values of one tree joint, in the order of files.
 struct JointAtStart {
   std::vector<double> q, u, udot;
 };
@@ -25,7 +25,7 @@ struct AtStart {
   std::vector<double> udot_open, udot_without_bias;
   double bound = 0.0, bound_open = 0.0;  ///< of the round-off of udot and udot_open
 
-  /// Of accelerations, of whatever would move if its closures were open.
+  /// Scale of accelerations, also of those that the open loops would have.
   double Scale() const { return std::max(Largest(udot), Largest(udot_open)); }
 
   double position_residual = 0.0, speed_residual = 0.0, length = 0.0;
@@ -59,7 +59,7 @@ class StartOfOurs {
  private:
   static std::vector<double> ToVector(const VectorX<double>& v) { return {v.begin(), v.end()}; }
 
-  /// Of a state (q, u).
+  /// Returns udot of a state (q, u).
   std::vector<double> Closed(const std::vector<double>& y) {
     std::vector<double> ydot(y.size());
     EXPECT_EQ(system_->Examine(0.0, y, ydot), Outcome::kFinished);

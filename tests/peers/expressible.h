@@ -45,7 +45,7 @@ inline void AddConstantForces(MechanismDescription& tree, bool in_body_axes) {
                                    .in_body_axes = in_body_axes});
 }
 
-/// Of max |udot|, and what is allowed (Sample::Bound()).
+/// Error relative to max |udot|, and its bound (Sample::Bound()).
 struct AccelerationError {
   double relative = 0.0, bound = 0.0;
 };

@@ -86,7 +86,7 @@ const std::map<std::string, std::string> kInexpressible = {
      "joint "
      "\"thread\": helical; joint \"guide\": prismatic, which closes a loop"}};
 
-/// Of the final poses from those of O-DCA.
+/// Returns the difference of the final poses from O-DCA's.
 double EndError(const harness::MechanismFile& file, double tolerance, double horizon) {
   const harness::Record theirs = RunFile(file, kMujoco, tolerance, horizon);
   const harness::Record ours = RunFile(file, kOdca, 1e-10, horizon);

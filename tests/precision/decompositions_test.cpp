@@ -251,9 +251,8 @@ MatrixX<S> WithEigenvalues(const std::vector<double>& lambda) {
   return A;
 }
 
-/// Entries of U go through n reflections and some 2 n steps, which turn each column twice: sums
-/// of some 5 n roundings of numbers up to one, of which 8 (n + 1) leaves room for sums that do not
-/// cancel.
+/// Entries of U go through n reflections and some 2 n steps, which turn each column twice. This
+/// makes some 5 n roundings of numbers up to one; 8 (n + 1) bounds their sum without cancellation.
 double Roundings(Eigen::Index n) { return 8.0 * static_cast<double>(n + 1); }
 
 /// @return the eigenvalues

@@ -65,9 +65,9 @@ TYPED_TEST(OneStepTest, DormandPrinceHasOrderFive) {
   EXPECT_NEAR(std::log2(coarse / fine), 5, is_float ? 1.0 : 0.2);
 }
 
-/// What is left with short steps is round-off: of a random walk of 4096 steps, or with Gragg's
-/// method, without which float128 gets nowhere, of 16 steps whose last extrapolation adds up
-/// numbers with weights of 553 in all (product of n_j^2 / (n_j^2 - n_i^2)).
+/// With short steps only round-off remains. 4096 steps are a random walk of roundings. float128
+/// needs Gragg's method: 16 steps, whose last extrapolation has weights with the sum 553 (products
+/// of n_j^2 / (n_j^2 - n_i^2)).
 TYPED_TEST(OneStepTest, RoundOffIsTheScalars) {
   const double eps = static_cast<double>(std::numeric_limits<TypeParam>::epsilon());
   if (std::is_same_v<TypeParam, Float128>) {

@@ -121,7 +121,7 @@ TEST_P(LadderTest, DriftOfAParallelogramIsRoundOff) {
   }
 }
 
-/// What a prescribed motion says belongs to its time, in either coordinate set.
+/// A prescribed coordinate has the value of its time, in both coordinate sets.
 TEST(DrivenLadder, FollowsItsDrive) {
   LadderTask task = Task("driven-four-bar", "odca", Enforcement::kPosition);
   task.precision.scalars = {Scalar::kDouble};
@@ -150,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, LadderTest,
                                            std::pair{"reduction", Enforcement::kPosition}),
                          NameOf);
 
-/// Of another program, made in double alone.
+/// A level of another program, for double only.
 template <class Space, class S>
 class Own final : public Level<Space, S> {
  public:

@@ -148,7 +148,7 @@ TEST_P(Imports, CartPoleOfMjcfFollowsTheEquationsOf1983) {
   std::cout << "top " << error << " m, " << run.result.steps << " steps\n";
 }
 
-/// What the published angles are for: crank and its speed, in the plane and in space.
+/// The published angles are of the crank; its speed follows, in the plane and in space.
 TEST_P(Imports, AndrewsSqueezerOfMjcfIsThatOfA03) {
   const MechanismDescription shipped = Shipped("andrews-squeezer");
   const Simulation ours = RunTo(shipped, GetParam(), 0.03);

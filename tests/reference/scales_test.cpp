@@ -23,7 +23,7 @@ struct FirstEvaluation {
   std::string units;  ///< of the speeds in joint coordinates: 'a' angle, 'l' length per time
 };
 
-/// Of a joint's speeds, in their order.
+/// Returns a letter for the unit of each speed of a joint, in their order.
 std::string UnitsOf(JointType type, SpaceKind space) {
   std::string units;
   for (const ValueWord& word : ValueWords(type, space, true)) units += word.is_length() ? 'l' : 'a';

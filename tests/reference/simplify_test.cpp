@@ -29,7 +29,7 @@ const SimplificationRule& IdeaOf(const std::string& name) {
   return *std::ranges::find(SimplificationRules(), name, &SimplificationRule::name);
 }
 
-/// What the file of the model says: models are compared as they are written and read.
+/// Returns the model as it is written and read again.
 MechanismDescription AsWritten(const MechanismDescription& description) {
   return ParseMechanism(MechanismText(description, {}), "model").description;
 }
@@ -94,8 +94,8 @@ Simplified Apply(const std::string& idea, const MechanismDescription& descriptio
   return simplified;
 }
 
-/// What two tight runs of one motion may differ by [m]: the errors of their steps, each within the
-/// tolerance, add up over up to a hundred steps of problems of some metres.
+/// Largest difference of two tight runs of one motion [m]: errors within the tolerance add up over
+/// a hundred steps of problems of some metres.
 constexpr double kSameMotion = 1e2 * kTolerance;
 
 TEST(SimplifiedModels, ExactOnesMoveAsTheWholeModel) {

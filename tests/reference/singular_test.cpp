@@ -99,7 +99,7 @@ TEST_P(Passage, RedundantLoopsPassToo) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, Passage, testing::ValuesIn(PositionMethods()), NameOfParam());
 
-/// What the passages cost: steps of the motion itself, a pendulum without any loop.
+/// Passages cost no more steps than the same motion without a loop, a pendulum.
 TEST(PassageCost, StepsStayNearThoseOfThePlainPendulum) {
   for (const double tolerance : {1e-6, 1e-8, 1e-10, 1e-12}) {
     integrator_test::TestOde pendulum(2, [](double, auto y, auto ydot) {
@@ -137,7 +137,7 @@ TEST(PassageStarts, PerturbedStartsKeepTheirBranch) {
   }
 }
 
-/// What a run says of the singular positions it met.
+/// Records of a run about its singular positions.
 TEST(SingularityDistance, IsSmallWhereLoopsGoFlatAndOnlyThere) {
   for (const Coordinates coordinates : {Coordinates::kJoint, Coordinates::kAbsolute}) {
     Method method = kOdcaPosition;
@@ -351,11 +351,11 @@ class Passages : public testing::TestWithParam<std::string> {
   }
 };
 
-/// How near a step comes to a position in line is chance, and with it what is lost there: of 41
-/// tolerances around 1e-10 each formulation kept the energy to 1.7e-7 J, which moves the tip by
-/// some 1e-7 m, at 23 to 30, and at 2 to 7 it left the branch, which runs mark (warnings_test.cpp).
-/// Reduction, whose partition has no pivot in line, ends as `singular` at 2 of 41.
-/// Which ones these are, round-off decides. The test is of the median of nine.
+/// The distance of a step from a position in line is chance, and so is the error there. Of 41
+/// tolerances around 1e-10, each formulation kept the energy to 1.7e-7 J at 23 to 30; this moves
+/// the tip by some 1e-7 m. At 2 to 7 it left the branch, with a warning (warnings_test.cpp).
+/// Reduction, whose partition has no pivot in line, ends as `singular` at 2. Round-off decides
+/// which ones these are, so the test takes the median of nine.
 TEST_P(Passages, TenOfTheNFourBarOfTwo) {
   std::vector<Eigen::Vector3d> tips;
   for (int k = -4; k <= 4; ++k) tips.push_back(Tip(2, method(), (1.0 + 0.01 * k) * 1e-10, 10.0));

@@ -70,8 +70,8 @@ OutputOptions Times(std::vector<double> times, bool exact = false) {
 }
 OutputOptions Rows(int number) { return {.number = number, .times = {}}; }
 
-/// What steps may leave (each an error below the tolerance), carried along by a stable motion, and
-/// what interpolation adds: at least the distance of its two degrees.
+/// Returns the allowed error: the tolerance for each step of a stable motion, and the error of
+/// interpolation, estimated by the difference of its two degrees.
 double BoundOf(const Written& run, double tolerance) {
   const double steps = run.record.Number("steps") * tolerance;
   const double dense = run.record.Number("trajectory_interpolation_max");
